@@ -20,6 +20,9 @@ Item = TypeVar("Item")
 # Time between lines of progress where the output is no terminal [s]
 PROGRESS_INTERVAL = 5.0
 
+# Before lines on what may change an answer, and on what it assumes or leaves out on the safe side
+DOUBT_MARK, NOTE_MARK = "in doubt: ", "note: "
+
 # "Class.method": "module:function" below archfem; the function takes the instance first.
 LATE_BOUND_METHODS: Mapping[str, str] = {
     "Analysis.accuracy": "dynamics.accuracy:accuracy",

@@ -110,7 +110,7 @@ class LimitAnalysis:
         Args:
             structure: structure of the case.
         """
-        words, fill = describe_crushing(self.strength), self.fill
+        words, fill = describe_crushing(self.strength, structure), self.fill
         has_points = any(isinstance(load, PointLoad) for load in self.live)
         # a search of sliding without dilatancy in walls takes minutes
         takes_long = isinstance(fill, PlasticFill) or self.friction == "nonassociated"
@@ -118,6 +118,21 @@ class LimitAnalysis:
             return words
         weaker = replace(self, strength=ASSUMED_STRENGTH).solve(structure)
         return f"{words}; with {ASSUMED_STRENGTH / MPa:g} MPa, {weaker.sentence}"
+
+    def crushing_share(self, structure: Structure, direction: float) -> float:
+        """Return the share of a horizontal push that is left where stones crush [-].
+
+        Args:
+            structure: structure of the case.
+            direction: sense of the push along x, 1 or -1.
+        """
+        given: dict[str, Any] = {"live": BodyForce(direction), "fill": self.fill}
+        given["friction"] = self.friction and "coulomb"  # as assessments slide
+        crushing, without = (
+            collapse_factor(structure, strength=strength, **given).factor
+            for strength in (self.strength, np.inf)
+        )
+        return crushing / without
 
     @property
     def opposite(self) -> "LimitAnalysis | None":

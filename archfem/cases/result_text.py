@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
+from archfem._display import DOUBT_MARK, NOTE_MARK
 from archfem._files import align_columns
 from archfem.cases.analysis_keys import LimitAnalysis
 from archfem.cases.case import Case
@@ -18,7 +19,7 @@ from archfem.cases.run import DeadLoadResult
 from archfem.dynamics.accuracy import Accuracy
 from archfem.dynamics.history import Ending, History
 from archfem.dynamics.motion_scaling import CollapseScale, MechanismScales
-from archfem.dynamics.verdict import ALL_DEFINITIONS, DOUBT_MARK, Verdict
+from archfem.dynamics.verdict import ALL_DEFINITIONS, Verdict
 from archfem.joints.criteria import (
     assessed_joints,
     envelope,
@@ -54,9 +55,6 @@ RESULTS = {
     "accuracy": "comparison of models and time steps",
     "verdict_range": "range of the verdict over uncertain properties",
 }
-
-# Before what a kinematic assessment leaves out
-NOTE_MARK = "note: "
 
 Row = Sequence[str]  # result, demand, capacity or outcome, factor; "-" where there is none
 
@@ -319,15 +317,19 @@ def describe_ratings(
 
 
 def doubt_rating(found: Rating, limit: LimitAnalysis) -> list[str]:
-    """Return what a rating leaves in doubt: equilibrium, and a strength of the stones left out."""
+    """Return doubts about a rating, equilibrium and a strength left out, and a note on values."""
     if np.isnan(found.factor):
         words = "limit analysis finds no equilibrium of the bridge under its own weight; check the "
         return [f"{DOUBT_MARK}{words}thickness of its rings and piers, and the fill"]
-    if limit.strength is not None or not found.crushing_text:
-        return []
-    words = "joints do not crush, as the case gives no strength of the stones"
-    remedy = "give strength in [materials] or [limit]"
-    return [f"{DOUBT_MARK}{words}: {found.crushing_text}; {remedy}"]
+    lines = []
+    if limit.strength is None and found.crushing_text:
+        words = "joints do not crush, as the case gives no strength of the stones"
+        remedy = "give strength in [materials] or [limit]"
+        lines.append(f"{DOUBT_MARK}{words}: {found.crushing_text}; {remedy}")
+    if "from memory" in str(found):
+        words = "values from memory were not compared with the text of their code"
+        lines.append(f"{NOTE_MARK}{words}: look them up before you sign")
+    return lines
 
 
 def describe_limit(case: Case, found: Collapse, opposite: Collapse | None) -> tuple[Collapse, str]:
@@ -449,17 +451,22 @@ def _seconds(value: float) -> str:
 
 
 class Statement(NamedTuple):
-    """Decisive sentences of a result, its rows among the capacities, and its doubts."""
+    """Decisive sentences of a result, its rows among the capacities, its doubts and notes."""
 
     sentences: Sequence[str]
     rows: Sequence[Row]
-    doubts: Sequence[str] = ()  # lines of the text, or without their mark
+    doubts: Sequence[str] = ()  # lines of the text, or without their mark; also those of notes
+    notes: Sequence[str] = ()
 
     def as_file(self, name: str) -> dict[str, str]:
         """Return name and content of the file beside the text of a result."""
-        plain = (doubt.removeprefix(DOUBT_MARK).removeprefix(NOTE_MARK) for doubt in self.doubts)
-        doubts = list(dict.fromkeys(map(cut_remedy, plain)))
-        return {f"{name}.json": json.dumps(self._replace(doubts=doubts)._asdict(), indent=1)}
+        lines = [*self.doubts, *(f"{NOTE_MARK}{note}" for note in self.notes)]
+        doubts = (x.removeprefix(DOUBT_MARK) for x in lines if not x.startswith(NOTE_MARK))
+        notes = (x.removeprefix(NOTE_MARK) for x in lines if x.startswith(NOTE_MARK))
+        plain = self._replace(
+            doubts=list(dict.fromkeys(map(cut_remedy, doubts))), notes=list(dict.fromkeys(notes))
+        )
+        return {f"{name}.json": json.dumps(plain._asdict(), indent=1)}
 
 
 def cut_remedy(doubt: str) -> str:
@@ -509,36 +516,43 @@ def state_ratings(rated: Sequence[tuple[Rating, Sequence[str]]]) -> Statement:
 
 def state_assessments(found: Mapping[str, KinematicAssessment], doubts: list[str]) -> Statement:
     """State each check of an assessment with the directions in which it holds; the last decides."""
-    checks: dict[str, tuple[AssessmentCheck, list[str]]] = {}
+    checks: dict[tuple[str, str], tuple[AssessmentCheck, list[str]]] = {}
     for direction, result in found.items():
-        for check in result.checks:
-            checks.setdefault(str(check), (check, []))[1].append(direction)
+        for check, ratios in list_ratios(result):
+            checks.setdefault((str(check), ratios), (check, []))[1].append(direction)
     last = [str(result.checks[-1]) for result in found.values()]
     rows, sentences = [], []
-    for text, (check, directions) in checks.items():
+    for (text, ratios), (check, directions) in checks.items():
         ways, outcome = " and ".join(directions), check.outcome
         if check.passes and check.at_rest:
             outcome += ", for the mechanism does not begin to move"
         demand, capacity = (f"{x:.4g} {check.unit}" for x in (check.demand, check.capacity))
         name = f"assessment: {check.name}, {ways}"
-        rows.append((name, demand, f"{capacity}, {outcome}", check.ratios))
+        rows.append((name, demand, f"{capacity}, {outcome}", ratios))
         sentences += [f"kinematic assessment, {ways}: {text}"] if text in last else []
     sentences.append(describe_margin(found.values()))
-    notes = (note for result in found.values() for note in result.notes)
-    return Statement(sentences, rows, [*doubts, *notes])
+    return Statement(sentences, rows, doubts, [x for each in found.values() for x in each.notes])
+
+
+def list_ratios(found: KinematicAssessment) -> list[tuple[AssessmentCheck, str]]:
+    """List the checks of an assessment with their ratios; with one weight a body if it is less."""
+    listed = []
+    for check, whole in zip(found.checks, (found.of_bodies or found).checks, strict=True):
+        less = f" ({whole.ratio:.3g} with one weight a body)"
+        listed.append((check, check.ratios + less * (whole.ratio < 0.999 * check.least)))
+    return listed
 
 
 def describe_margin(found: Iterable[KinematicAssessment]) -> str:
-    """Describe the least ratio of the last checks, and its range over what is assumed of a fill."""
-    results = [*found]
-    checks = [result.checks[-1] for result in results]
-    if ranges := [check.over_fill for check in checks if check.over_fill is not None]:
-        least = FillRange.least_of(ranges)
-        return f"least margin {least.describe(digits=3)}: {least.outcome}"
-    check = min(checks, key=lambda each: each.ratio)
-    wholes = [(result.of_bodies or result).checks[-1].ratio for result in results]
-    whole = f" ({min(wholes):.3g} with one weight a body)" * (min(wholes) < 0.999 * check.ratio)
-    return f"least margin {check.ratios}{whole}: {check.outcome}"
+    """Describe the least ratio of all checks, and its range over what is assumed of a fill."""
+    listed = [each for result in found for each in list_ratios(result)]
+    check, ratios = min(listed, key=lambda each: each[0].least)
+    same = [x.over_fill for x, _ in listed if x.name == check.name and x.over_fill is not None]
+    if same:
+        over = FillRange.least_of(same)
+        ratios = ratios.replace(check.ratios, over.describe(digits=3))
+        return f"least margin {ratios}, by {check.name}: {over.outcome}"
+    return f"least margin {ratios}, by {check.name}: {check.outcome}"
 
 
 def state_risk(found: Any) -> Statement:  # of `archfem.studies`, a room to the right

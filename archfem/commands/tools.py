@@ -98,7 +98,7 @@ def thickness(options: argparse.Namespace) -> None:
         f"least thickness at rest: {format_mm(least)} of {format_mm(ring.thickness)}, the "
         "mean depth of its joints, about the middle line; the ring alone on fixed springings\n"
         f"geometric factor of safety: {ring.thickness / least:.3g}; "
-        f"{describe_crushing(limit.strength)}"
+        f"{describe_crushing(limit.strength, case.structure)}"
     )
 
 

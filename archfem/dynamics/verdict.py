@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import xarray as xr
 
+from archfem._display import DOUBT_MARK
 from archfem._typing import Array
 from archfem.dynamics.collapse_state import CollapseState
 from archfem.joints.criteria import (
@@ -47,7 +48,6 @@ ALL_DEFINITIONS = (*MECHANISM_DEFINITIONS, PUBLISHED_DEFINITION)
 
 
 # Begin of a line with a doubt, in texts and result files
-DOUBT_MARK = "in doubt: "
 
 # What a run without doubts still leaves open
 NO_RANGE = "one motion, one set of properties: range not computed"

@@ -11,13 +11,12 @@ import xarray as xr
 from numpy.typing import NDArray
 from scipy.special import betaincinv, xlogy
 
-from archfem._display import ResultDisplay
+from archfem._display import DOUBT_MARK, ResultDisplay
 from archfem._files import align_columns
 from archfem._netcdf import read_dataset, write_dataset
 from archfem._typing import Array
 from archfem._validation import validate_methods
 from archfem.dynamics.collapse_state import COLLAPSE_STATES, FALLEN_STATES
-from archfem.dynamics.verdict import DOUBT_MARK
 from archfem.models.model import Doubt, read_doubts
 
 # A condition is named if at most this share of random permutations of the outcomes has one that

@@ -617,11 +617,17 @@ def _read_joints(
     return joint_dataset(whole, resultants)
 
 
-def describe_crushing(strength: float | None) -> str:
-    """Describe at which strength of the stones joints crush, if at all."""
+def describe_crushing(strength: float | None, structure: Structure) -> str:
+    """Describe at which strength joints crush, if at all: that of the stones, or one for them."""
     if strength is None or np.isinf(strength):
         return "joints do not crush: no strength of the stones counts"
-    return f"joints crush at {strength / MPa:.3g} MPa, the strength of the stones"
+    blocks = {structure.blocks[k] for k in np.unique(structure.pairs[structure.judged]).tolist()}
+    own = sorted({block.material.strength or np.inf for block in blocks})
+    of_stones = "the strength of the stones"
+    if not np.isclose(strength, own).any():
+        listed = " and ".join(f"{x / MPa:.3g} MPa" for x in own if x < np.inf) or "not known"
+        of_stones = f"given for limit analysis (stones: {listed})"
+    return f"joints crush at {strength / MPa:.3g} MPa, {of_stones}"
 
 
 # by the table of load tests in docs/theory/fill.md

@@ -199,14 +199,18 @@ class Rating(ResultDisplay):
         return f"{width}, {self.by_rule:.4g} at this place{self._as_given}"
 
     def table(self) -> str:
-        """Return factors [-], axles and loaded road at all places [m], as rows of CSV."""
+        """Return factors [-], axles and loaded road [m] where loads count, as rows of CSV."""
         head = "direction,position of the vehicle's middle [m],factor [-],axles [-]"
         rows = [f"{head},road under the distributed load [m]"]
         for way in DRIVING_DIRECTIONS:
             here = self.moving.factors.sel(direction=way)
             values = (here[key].values for key in ("position", "factor", "axles", "loaded"))
             each = zip(*values, strict=True)
-            rows += [f"{way},{x:.6g},{f:.6g},{n},{length:.4g}" for x, f, n, length in each]
+            rows += [
+                f"{way},{x:.6g},{f:.6g},{n},{length:.4g}"
+                for x, f, n, length in each
+                if np.isfinite(f)
+            ]
         return "\n".join(rows)
 
     def _summary(self) -> str:
@@ -318,7 +322,7 @@ class Rating(ResultDisplay):
 
     def _describe_crushing(self) -> str:
         """Return at which strength joints crush, or the factor with an assumed one."""
-        text = describe_crushing(self.strength)
+        text = describe_crushing(self.strength, self.structure)
         return f"{text}; {self.crushing_text}" if self.crushing_text else text
 
     @property

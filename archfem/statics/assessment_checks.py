@@ -8,6 +8,8 @@ import numpy as np
 
 from archfem._validation import check_between, check_fields
 from archfem.limit.fill_range import FillAssumption, FillRange
+from archfem.motion.design_spectra import DesignSpectrum, registered_spectra
+from archfem.motion.motion import Motion
 
 
 @dataclass(frozen=True)
@@ -43,6 +45,20 @@ class LimitState:
         for key, most in limits.items():
             options: Any = {"ends": "(]", "remedy": "give a ratio, such as 0.4 for 40 %"}
             check_between(getattr(self, key), f"{self.name}, {key} [-]", 0.0, most, **options)
+
+    def doubt(self, spectrum: DesignSpectrum | Motion) -> list[str]:
+        """Return the doubt about a check of NTC against a spectrum of another code, if it is one.
+
+        Args:
+            spectrum: of the demand; a table and a motion are of no code.
+        """
+        codes = [name for name, kind in registered_spectra.items() if kind is type(spectrum)]
+        if not self.name.startswith("NTC") or {*codes} <= {"NTC-2018", "table"}:
+            return []
+        return [
+            f"the check is one of NTC, which was not made for a spectrum of {codes[0]}; give "
+            "limit_state with the rules of its code, or a spectrum of NTC-2018"
+        ]
 
 
 # Sources of displacement checks; the 2019 values were read in a transcription of the Circolare.
@@ -101,6 +117,11 @@ class AssessmentCheck:
         """The ratio as text, or its range over all assumptions on a fill."""
         over = self.over_fill
         return f"{self.ratio:.3g}" if over is None else over.format_ends(digits=3)
+
+    @property
+    def least(self) -> float:
+        """The ratio, or the least of all assumptions on a fill [-]."""
+        return self.ratio if self.over_fill is None else min(self.over_fill.values.values())
 
     @property
     def at_rest(self) -> bool:

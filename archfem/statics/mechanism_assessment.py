@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from archfem._display import ResultDisplay
+from archfem._display import DOUBT_MARK, NOTE_MARK, ResultDisplay
 from archfem._files import align_columns
 from archfem._typing import Array
 from archfem._validation import check_between, check_choice, validate_arguments
@@ -98,7 +98,8 @@ class KinematicAssessment(ResultDisplay):
         confidence_factor: FC, by which accelerations of the curve are divided in both checks [-].
         control: name of the block whose centroid is the control point.
         path: finite motion of the mechanism; None where nothing moves.
-        notes: what the result leaves out, and how far the curve holds.
+        notes: what the result assumes, or leaves out on the safe side.
+        doubts: why a ratio may be too high, by how much is not known, each with a remedy.
         least: that under the assumption on a fill that has the least ratio; None without a fill.
         of_bodies: the same with one weight for each body that moves as one, at its centroid, which
             raises e* and lowers both ratios; None of an assessment with such weights.
@@ -121,6 +122,7 @@ class KinematicAssessment(ResultDisplay):
     control: str
     path: MechanismPath | None
     notes: tuple[str, ...]
+    doubts: tuple[str, ...]
     of_bodies: "KinematicAssessment | None"
     least: "KinematicAssessment | None" = None
 
@@ -170,14 +172,9 @@ class KinematicAssessment(ResultDisplay):
 
     def table(self) -> str:
         """Return the quantities and both checks, a line each."""
-        rows = [
-            ("alpha_0", self.alpha_0, "-"),
-            ("e_star", self.e_star, "-"),
-            ("M_star", self.M_star, "kg"),
-            ("a_0_star", self.a_0_star, f"m/s² ({self.a_0_star / STANDARD_GRAVITY:.3f} g)"),
-            ("d_0_star", self.d_0_star, "m"),
-            ("T_s", self.T_s, "s"),
-        ]
+        units = {"alpha_0": "-", "e_star": "-", "M_star": "kg", "a_0_star": "", "d_0_star": "m"}
+        units["a_0_star"] = f"m/s² ({self.a_0_star / STANDARD_GRAVITY:.3f} g)"
+        rows = [(name, getattr(self, name), unit) for name, unit in {**units, "T_s": "s"}.items()]
         for check in self.checks:
             rows.append((f"{check.name}: capacity", check.capacity, check.unit))
             rows.append((f"{check.name}: demand", check.demand, check.unit))
@@ -221,7 +218,8 @@ class KinematicAssessment(ResultDisplay):
                 lines.append(f"over what is assumed of the fill: {over} times as strong")
                 own = (k for k, x in over_fill.values.items() if x == self.checks[-1].ratio)
                 lines += [f"all else is under one assumption: {key}" for key in [*own][:1]]
-        return "\n".join([*lines, *(f"note: {note}" for note in [*self.notes, *self._split_note])])
+        lines += [f"{NOTE_MARK}{note}" for note in [*self.notes, *self._split_note]]
+        return "\n".join([*lines, *(f"{DOUBT_MARK}{doubt}" for doubt in self.doubts)])
 
     @property
     def _split_note(self) -> list[str]:
@@ -230,7 +228,7 @@ class KinematicAssessment(ResultDisplay):
             return []
         ratios = join_names([f"{check.ratio:.3g} by {check.name}" for check in whole.checks])
         return [
-            "weights are at the centroids of blocks; one for each body that moves as one gives "
+            "weights are at the centroids of blocks, and one for each body that moves as one gives "
             f"e* = {whole.e_star:.3f}, and the spectrum may be as strong as {ratios}"
         ]
 
@@ -608,7 +606,7 @@ class _Oscillator:
         return xr.Dataset({key: ("place", values[key], {"units": units[key]}) for key in values})
 
     def notes(self, factor: float) -> list[str]:
-        """Return what the curve leaves out."""
+        """Return what the curve assumes, or leaves out on the safe side."""
         if self.path is None:
             return []
         found, collapse = [], self.path.mechanisms[0].factor
@@ -616,11 +614,6 @@ class _Oscillator:
             found.append(
                 "the pressures of the fill on the stones are those of the weights as built, all "
                 "along the motion, and that the fill stays in place is not checked"
-            )
-        elif self.fill:
-            found.append(
-                "the fill counts as weight and mass on the stones; its pressure on them, which "
-                "may hold an arch back or push a wall out, is left out; give fill for it"
             )
         if any(any(load.force) for load in self.placed.loads):
             found.append(
@@ -632,19 +625,29 @@ class _Oscillator:
                 f"sliding that dilates (associated flow) would raise alpha_0 to {collapse:.4g}, "
                 "and faces slide flat here"
             )
-        if self.holds < len(self.path.factors) - 1:
-            held = abs(float(self.curve["d"][self.holds]))
-            place, bound = f"beyond d* = {held:.3g} m", "there the curve"
-            if not self.holds:
-                place, bound = "from rest", "the whole curve, and each ratio,"
-            found.append(
-                f"{place} joints open or slide that the mechanism keeps closed: {bound} is an "
-                "upper bound; a time history with large displacements can test it"
-            )
         if self.path.end is not PathEnd.FALLS:
             found.append(
                 f"alpha does not vanish: {self.path.end.sentence}, and the displacement check "
                 "counts the end of the path as d_0*"
+            )
+        return found
+
+    @property
+    def doubts(self) -> list[str]:
+        """Why a ratio may be too high: another code's spectrum, a fill left out, other joints."""
+        found = self.rules.doubt(self.spectrum)
+        if self.fill and self.placed.fill is None and self.path is not None:
+            found.append(
+                "the fill counts as weight and mass on the stones: its pressure on them, which "
+                "may hold an arch back or push a wall out, is left out; give fill for it"
+            )
+        if self.path is not None and self.holds < len(self.path.factors) - 1:
+            held = abs(float(self.curve["d"][self.holds]))
+            late = f"beyond d* = {held:.3g} m", "there the curve"
+            place, bound = late if self.holds else ("from rest", "the whole curve, and each ratio,")
+            found.append(
+                f"{place} joints open or slide that the mechanism keeps closed: {bound} is an "
+                "upper bound; a time history with large displacements can test it"
             )
         return found
 
@@ -684,6 +687,7 @@ class _Oscillator:
             control,
             path,
             tuple(self.notes(alpha_0)),
+            tuple(self.doubts),
             None if self.by_body else replace(self, by_body=True).assess(q),
         )
 

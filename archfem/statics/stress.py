@@ -205,7 +205,7 @@ def strength_use_text(use: xr.Dataset) -> str:
     """Return the largest compression and tension of all blocks as text."""
     pressed, pulled = _largest(use, "compression"), _largest(use, "tension")
     share, strength = float(pressed["use"]), float(pressed["strength"]) / MPa
-    of = "" if np.isnan(share) else f" ({share:.2%} of strength {strength:.3g} MPa)"
+    of = "" if np.isnan(share) else f" ({share:.2%} of the stones' strength, {strength:.3g} MPa)"
     return (
         f"largest compression {_in_mpa(pressed['compression'])} in {_block_label(pressed)}{of}, "
         f"largest tension {_in_mpa(pulled['tension'])} in {_block_label(pulled)}"
@@ -233,8 +233,8 @@ def utilisation_text(structure: Structure, joints: xr.Dataset) -> str:
         return "no use of strength is known: all joints hinge or are open, or no strength is given"
     return (
         f"largest compression at the edge of a joint that does not hinge: {stress:.3f} MPa, "
-        f"{largest:.2%} of strength {stress / largest:.3g} MPa, in {found['name'].values} at "
-        f"{float(found['time']):.3f} s"
+        f"{largest:.2%} of the stones' strength, {stress / largest:.3g} MPa, in "
+        f"{found['name'].values} at {float(found['time']):.3f} s"
     )
 
 

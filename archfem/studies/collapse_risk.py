@@ -25,7 +25,7 @@ import xarray as xr
 from scipy import stats
 from scipy.special import ndtr
 
-from archfem._display import ResultDisplay
+from archfem._display import DOUBT_MARK, ResultDisplay
 from archfem._files import align_columns
 from archfem._netcdf import read_dataset, write_dataset
 from archfem._typing import Array
@@ -41,7 +41,6 @@ from archfem.dynamics.analysis import Analysis
 from archfem.dynamics.collapse_state import FALLEN_STATES, doubt_soft_blocks
 from archfem.dynamics.motion_scaling import admissible_range, check_search
 from archfem.dynamics.recorder import Record
-from archfem.dynamics.verdict import DOUBT_MARK
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.masonry.structure import Structure
 from archfem.models.model import Doubt, read_doubts, write_doubts

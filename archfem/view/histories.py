@@ -30,7 +30,7 @@ from archfem.joints.criteria import (
     step_lengths,
 )
 from archfem.masonry.structure import Structure
-from archfem.view.structure import short_name
+from archfem.view.structure import MAX_NAME_LETTERS, short_name
 from archfem.view.style import (
     Colour,
     Size,
@@ -43,9 +43,6 @@ from archfem.view.style import (
     set_title,
     style_axes,
 )
-
-# Letters of a joint's name for which there is room at an axis
-MAX_NAME_LETTERS = 16
 
 
 @validate_arguments

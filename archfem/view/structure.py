@@ -53,6 +53,9 @@ from archfem.view.style import (
 
 Action = BodyForce | PointLoad | Settlement
 
+# Letters of a joint's name for which there is room at an axis, or at the joint
+MAX_NAME_LETTERS = 16
+
 
 @validate_arguments
 def draw_structure(
@@ -313,6 +316,21 @@ def _join_segments(segments: Array) -> Array:
     return np.insert(segments, 2, np.nan, axis=1).reshape(-1, 2)
 
 
+def list_numbers(structure: Structure) -> list[str]:
+    """List by part the numbers that stand for long names of its joints in pictures, with these."""
+    texts = []
+    for part in dict.fromkeys(joint.part for joint in structure.joints):
+        names = [
+            short_name(joint.name, part)
+            for joint, own in zip(structure.joints, structure.judged, strict=True)
+            if own and joint.part == part
+        ]
+        if max(map(len, names), default=0) > MAX_NAME_LETTERS:
+            listed = ", ".join(f"{k} {name}" for k, name in enumerate(names))
+            texts.append(f"{part or 'joints'}: {listed}")
+    return texts
+
+
 def short_name(name: str, part: str) -> str:
     """Return the name of a joint within its part: "5" for "main arch, joint 5"."""
     own = name.removeprefix(f"{part}, ")
@@ -324,9 +342,10 @@ def draw_names(structure: Structure) -> Figure:
     """Draw the blocks, with the short names of joints beside their intrados.
 
     Joints of rings and piers are named, or all joints of a structure that has neither; where they
-    are too near to one another on a page, every second or third. The name of a ring stands above
-    it, that of another part below: "5" in "main arch" is "main arch, joint 5". Of a wall in bond
-    the stones are numbered instead, as in `structure.blocks`.
+    are too near to one another on a page, every second or third; long names are numbered. The name
+    of a ring stands above it, or in its opening below a deck, that of another part below: "5" in
+    "main arch" is "main arch, joint 5". Of a wall in bond the stones are numbered instead, as in
+    `structure.blocks`.
 
     Args:
         structure: the structure.
@@ -351,7 +370,8 @@ def draw_names(structure: Structure) -> Figure:
         if part in walls:
             _number_stones(axes, structure, part, inch)
         else:
-            _name_part(axes, [joint for joint in shown if joint.part == part], inch)
+            top = max(block.points[:, 1].max() for block in structure.blocks)
+            _name_part(axes, [joint for joint in shown if joint.part == part], inch, float(top))
     example = shown[len(shown) // 2].name
     title = f"{structure.name}: names of joints, such as '{example}'"
     if walls:
@@ -359,7 +379,9 @@ def draw_names(structure: Structure) -> Figure:
         stone = structure.blocks[number].name
         title = f"{structure.name}: numbers of stones; {number} is '{stone}'"
     set_title(axes, title)
-    add_note(cast(Figure, axes.figure), {"": structure.assessment})
+    numbers = [] if walls else list_numbers(structure)
+    note = "; ".join(filter(None, [structure.assessment, *numbers]))
+    add_note(cast(Figure, axes.figure), {"": note})
     return cast(Figure, axes.figure)
 
 
@@ -380,8 +402,8 @@ def _number_stones(axes: Axes, structure: Structure, part: str, inch: float) -> 
         annotate(axes, str(number), structure.centroids[number], (0.0, 0.0), **style)
 
 
-def _name_part(axes: Axes, joints: Sequence[Joint], inch: float) -> None:
-    """Write the names of a part and of its joints, as many as fit in legible type."""
+def _name_part(axes: Axes, joints: Sequence[Joint], inch: float, top: float) -> None:
+    """Write the names of a part and of its joints, as many as fit in legible type below a top."""
     style: dict[str, Any] = {"color": Colour.TEXT, "zorder": 8, "path_effects": white_halo(1.6)}
     ends = np.array([joint.ends[0] for joint in joints])
     apart = np.linalg.norm(np.diff(ends, axis=0), axis=1).min() if len(ends) > 1 else np.inf
@@ -389,22 +411,25 @@ def _name_part(axes: Axes, joints: Sequence[Joint], inch: float) -> None:
     fitting = 0.65 * 72.0 * apart / inch
     every = max(1, int(np.ceil(Size.NOTE / fitting)))
     size = min(every * fitting, Size.LABEL)
-    for joint in joints[::every]:
+    names = [short_name(joint.name, joint.part) for joint in joints]
+    if max(map(len, names)) > MAX_NAME_LETTERS:  # they would be written over each other
+        names = [str(k) for k in range(len(names))]
+    for joint, name in list(zip(joints, names, strict=True))[::every]:
         outward = -np.array(joint.tangent)
         angle = float(np.degrees(np.arctan2(outward[1], outward[0])))
         # a name must not be upside down; vertical ones are read from the right
         leftward = abs(angle) > 91.0
         style |= {"rotation": angle - 180.0 * leftward, "rotation_mode": "anchor"}
         style |= {"ha": "right" if leftward else "left", "va": "center_baseline"}
-        name = short_name(joint.name, joint.part)
         annotate(axes, name, joint.ends[0], 0.5 * size * outward, fontsize=size, **style)
     if not joints[0].name.startswith(f"{joints[0].part}, "):
         return
     is_ring = joints[0].role == "ring"
     corners = np.array([joint.ends for joint in joints]).reshape(-1, 2)
-    place = corners[:, 0].mean(), corners[:, 1].max() if is_ring else corners[:, 1].min()
-    style |= {"rotation": 0.0, "ha": "center", "va": "bottom" if is_ring else "top"}
-    annotate(axes, joints[0].part, place, (0.0, 2.0 if is_ring else -Size.LABEL), **style)
+    above = is_ring and corners[:, 1].max() > top - 1e-6  # a deck would strike the name through
+    place = corners[:, 0].mean(), corners[:, 1].max() if above else corners[:, 1].min()
+    style |= {"rotation": 0.0, "ha": "center", "va": "bottom" if above else "top"}
+    annotate(axes, joints[0].part, place, (0.0, 2.0 if above else -Size.LABEL), **style)
 
 
 @validate_arguments

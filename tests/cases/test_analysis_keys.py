@@ -116,7 +116,8 @@ def test_results_state_the_strength_with_which_joints_crush(tmp_path, capsys):
     """A column under its weight and an axle: its factor, and that without a given strength."""
     column = {"shape": "column", "breadth": 0.6, "heights": [1.0, 1.0]}
     tables = {"structure": column, "limit": {"horizontal": 1.0}}
-    tables["assessment"] = {"spectrum": {"code": "EC8", "ag": 0.2, "ground": "B"}}
+    spectrum = {"code": "NTC-2018", "ag": 0.2, "f0": 2.4, "tc_star": 0.3, "site": "B"}
+    tables["assessment"] = {"spectrum": spectrum}
     factors = []
     for materials, says in (({}, "do not crush"), ({"stone": {"strength": 1e6}}, "crush at 1 MPa")):
         path = tmp_path / "column.toml"
@@ -129,13 +130,15 @@ def test_results_state_the_strength_with_which_joints_crush(tmp_path, capsys):
             assert f"joints {says}" in said
             assert ("\nin doubt: joints do not crush, as the case gives no str" in said) == doubted
             factors += re.findall(r"(?:factor|, at) (inf|[\d.]+)", said)[:1]
-        assert af.commands.main(["assess", str(path)]) == 0
-        note = (
-            "note: joints hinge about their edges: that stones crush at the given 1 MPa would lower"
-        )
-        assert (note in capsys.readouterr().out) == bool(materials)
+        assert af.commands.main(["assess", str(path)]) == 3 * bool(materials)
+        lowers = re.findall(r"in doubt: joints hinge .* by ([\d.]+) %; r", capsys.readouterr().out)
+        assert len(lowers) == len(materials)
+    path.write_text(af.Case.of(tables | {"materials": {"stone": {"strength": 3e6}}}).text())
+    assert af.commands.main(["assess", str(path)]) == 0
+    assert "\nnote: joints hinge about their edges: crushing at 3 MPa" in capsys.readouterr().out
     push, rating, weaker_push, weaker_rating = map(float, factors)
     assert weaker_push < 0.97 * push
+    assert float(lowers[0]) == pytest.approx(100.0 * (1.0 - weaker_push / push), rel=0.01)
     assert weaker_rating < rating
 
 

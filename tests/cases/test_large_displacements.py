@@ -120,7 +120,8 @@ def test_a_range_in_the_folder_stands_in_place_of_what_a_run_cannot_know(held):
     attrs = {"properties": ["k_n", "dt"], "k_n": 1e9, "k_s": 1e9}
     data = ReportData(af.Case.of(tomllib.loads(CASE)), {"shake": held})
     without = sentences_of(data)
-    assert "Not varied: one motion, one set of properties, one model and time" in without[0]
+    varied = "motion, lengths, stiffness, friction, damping, size of the motions, time step"
+    assert f" M{varied[1:]} and fidelity were not varied." in without[0]
     data = ReportData(data.case, data.runs)
     vars(data)["verdict_range"] = af.dynamics.VerdictRange(xr.Dataset(rows, attrs=attrs))
     assert summarise_outcomes(data, [held]) == "stands; falls in 1 of 4 variations"
@@ -129,7 +130,7 @@ def test_a_range_in_the_folder_stands_in_place_of_what_a_run_cannot_know(held):
     assert " In variations of its properties it falls in 1 of 4: no property" in lead
     assert "; of 4 that vary all 1 (1% to 81% at 95%). " in lead
     changes = lead.partition("raise no doubt. ")[2]
-    assert changes == "Not varied: one motion, one model, size of motions."
+    assert changes == "Motion, lengths, size of the motions and fidelity were not varied."
     words = [piece.text for piece in _build_mechanism(data, held) if hasattr(piece, "text")]
     assert words[0].startswith("Outcome: stands; falls in 1 of 4 variations. Mechanism: ")
     assert not any("not varied" in line for line in words)

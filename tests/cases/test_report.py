@@ -92,8 +92,8 @@ def test_a_suite_has_a_report_with_a_player_for_each_pair(kept, capsys):
     assert "Not computed" not in words
     assert "The structure forms no mechanism under all 2 motions of PGA 0.05 g." in words
     assert "Measures of the motions as applied, at their own samples" in words
-    assert "The checks of the numbers raise no doubt. Not varied: one set of" in words
-    assert "ot varied: one set of properties, one model and time step, size of motions." in words
+    assert "The checks of the numbers raise no doubt. Lengths, stiffness, friction" in words
+    assert ", damping, size of the motions, time step and fidelity were not varied." in words
     assert "another case" not in words
     case = af.Case.read(kept / "case.toml")
     assert sha256(case.text().encode()).hexdigest() in words
@@ -110,8 +110,9 @@ CHECKS = [
 
 def state_each(hazard):
     """Statements by command and file, of results that were made up."""
-    notes = ("an upper bound; compare it with a run",)
-    assessed = SimpleNamespace(checks=CHECKS, notes=notes, of_bodies=None)
+    bodies = SimpleNamespace(checks=[CHECKS[0], replace(CHECKS[1], ratio=0.45)])
+    assessed = SimpleNamespace(checks=CHECKS, notes=("faces slide flat",), of_bodies=bodies)
+    upper = ["in doubt: an upper bound; compare it with a run"]
     place = "passes without all, with 2 axles at -0.1, 1.1 m"
     found = SimpleNamespace(hazard=hazard, doubts=(), sentence="falls at 0.002 a year")
     found.rate = lambda: Rate(0.002, 0.001, 0.003)
@@ -122,7 +123,7 @@ def state_each(hazard):
         ("limit", "limit"): result_text.state_outcome("limit analysis", *turns),
         ("rate", "rating"): result_text.Statement(["rated"], [("rating", "LM1", place, "1.25")]),
         ("assess", "assessment"): result_text.state_assessments(
-            {"right": assessed, "left": assessed}, []
+            {"right": assessed, "left": assessed}, upper
         ),
         ("risk", "risk"): result_text.state_risk(found),
     }
@@ -163,7 +164,7 @@ def test_demand_and_capacity_stand_beside_their_doubts(kept, undrawn):
             )
             for name, demand, capacity, factor in (
                 ("linear, q = 2, FC = 1.35", "2.844 m/s²", "8.212 m/s², passes", "2.89"),
-                ("a code", "0.22 m", "0.11 m, fails", "0.5"),
+                ("a code", "0.22 m", "0.11 m, fails", "0.5 (0.45 with one weight a body)"),
             )
         ),
         (
@@ -176,13 +177,15 @@ def test_demand_and_capacity_stand_beside_their_doubts(kept, undrawn):
     texts = [each.text for each in sentences if each.kind == "words"]
     assert texts[0] == (
         "For 0.25 g, 475 years: the structure forms no mechanism under all 2 motions of PGA "
-        "0.05 g. The least margin is 0.5, on the spectrum of the motion, by a code, right and "
-        "left, which it fails. The doubts below, on limit analysis, kinematic assessment, may "
-        "change this. Not varied: one set of properties, one model and time step."
+        "0.05 g. The least margin is 0.5 (0.45 with one weight a body), on the spectrum of the "
+        "motion, by a code, right and left, which it fails. The doubts below, on limit analysis, "
+        "kinematic assessment, may change this. Lengths, stiffness, friction, damping, time step "
+        "and fidelity were not varied."
     )
     assert texts[1:] == [
         "In doubt, limit analysis: A made one.",
         "In doubt, kinematic assessment: An upper bound.",
+        "Note, kinematic assessment: Faces slide flat.",
     ]
     facts = dict(list_facts(data))
     assert facts["in doubt"] == "limit analysis, kinematic assessment"
@@ -190,7 +193,7 @@ def test_demand_and_capacity_stand_beside_their_doubts(kept, undrawn):
     alone = report_data.ReportData(case, {}, found.folder)
     lead = build_conclusion(alone).pieces[0].text
     assert lead.startswith("For 0.25 g, 475 years: limit analysis: it turns, at 4.8 times the load")
-    assert "The least margin is 0.5, on the spectrum of the motion, by a code, right and" in lead
+    assert "The least margin is 0.5 (0.45 with one weight a body), on the spectrum of the" in lead
     outcomes = "the given load: it turns, at 4.8 times the load, factor 4.8; LM1: passes without "
     outcomes += "all, factor 1.25; 2.844 m/s² of the spectrum of the motion: 8.212 m/s², passes, "
     outcomes += "factor 2.89; "
@@ -198,8 +201,8 @@ def test_demand_and_capacity_stand_beside_their_doubts(kept, undrawn):
     assert signatures.rows == [("author", "A. Mason", "", ""), ("checked by", "", "", "")]
 
 
-@pytest.mark.parametrize(("ag", "doubted"), [(0.03, True), (0.045, False)])
-def test_a_margin_names_its_spectrum_which_may_be_another_demand(kept, undrawn, ag, doubted):
+@pytest.mark.parametrize(("ag", "noted"), [(0.03, True), (0.045, False)])
+def test_a_margin_names_its_spectrum_which_may_be_another_demand(kept, undrawn, ag, noted):
     """Motions of PGA 0.05 g beside spectra of 1.15 a_g."""
     write_stated(kept, af.Hazard.power(0.02116, 3.0))
     found = af.cases.open_results(kept)
@@ -211,11 +214,11 @@ def test_a_margin_names_its_spectrum_which_may_be_another_demand(kept, undrawn, 
     spectrum = f"the EC8 spectrum of PGA {1.15 * ag:.3g} g"
     demands = [row[1] for row in table.rows if row[0].startswith("assessment")]
     assert demands == [f"{own} of {spectrum}" for own in ("2.844 m/s²", "0.22 m")]
-    assert f"The least margin is 0.5, on {spectrum}, by a code, right and left" in pieces[0].text
-    text = " ".join(each.text for each in pieces if each.kind == "words")
-    assert " The check is one of NTC, which was not made for a spectrum of EC8." in text
-    words = f" The spectrum has a PGA of {1.15 * ag:.3g} g, and the motions have 0.05"
-    assert (words in text) == doubted
+    least = "0.5 (0.45 with one weight a body)"
+    assert f"The least margin is {least}, on {spectrum}, by a code, right" in pieces[0].text
+    (note,) = (each.text for each in pieces if getattr(each, "text", "").startswith("Note, "))
+    words = f" flat. The spectrum has a PGA of {1.15 * ag:.3g} g, and the motions have 0.05"
+    assert (words in note) == noted
 
 
 def test_a_rate_is_stated_beside_the_hazard_at_its_return_periods():
@@ -341,11 +344,14 @@ def test_a_case_without_motion_has_a_report_too(small, unplotted, tmp_path):
     with replace_run(case, folder) as draft:
         files = {"limit.txt": "it stands", "assessment.txt": "right: it moves"}
         files |= result_text.Statement(["it stands"], []).as_file("limit")
-        noted = result_text.Statement([], [], ["note: it is an upper bound; run it"])
+        noted = result_text.Statement(
+            [], [], ["note: faces slide; flat", "in doubt: it is so; run"]
+        )
         write_files(files | noted.as_file("assessment"), draft)
     words = " ".join(read_page(af.cases.open_results(folder).report().read_text()).words)
     assert "It stands." in words  # the conclusion
-    assert " It is an upper bound." in words
+    assert "Note, kinematic assessment: Faces slide; flat." in words
+    assert "In doubt, kinematic assessment: It is so." in words
     assert "blocks rigid joints dry" in " ".join(
         words.split()
     )  # of limit analysis, whatever the case's model is
@@ -621,8 +627,11 @@ def test_a_result_without_a_time_history_has_a_report(
     assert ("Over the pressure of the fill, each at its worst place: " in concluded) == (
         command == "rate"
     )
-    doubted = " Values marked as to be checked were not compared with the text" in concluded
-    assert doubted == (command == "rate")
+    noted = "note: values from memory were not compared with the text of their code"
+    assert (f"\n{noted}: look" in said) == (command == "rate")
+    assert ("Note, rating: Values from memory were not compared" in concluded) == (
+        command == "rate"
+    )
     factor = re.search(r"factor (?:of )?([\d.]+)", said)[1]
     assert f"{factor}" in words
     listed = " ".join(words.split())
@@ -648,14 +657,32 @@ def test_a_result_without_a_time_history_has_a_report(
         assert "rating: vehicle LM1 given rating: live 1.2 given rating: area load, dead" in words
 
 
-def test_a_kinematic_assessment_alone_has_a_report(unplotted, tmp_path):
+@pytest.mark.parametrize(("changed", "author"), [("1.0", "B. Wright"), ("2.0", "A. Mason")])
+def test_a_command_renews_who_signs_the_case_of_a_run(changed, author, undrawn, tmp_path):
+    """That of the same case: another load makes it another case, which is not the run's."""
+    path, folder = tmp_path / "case.toml", tmp_path / "out"
+    limit = CASE + '[limit]\nhorizontal = 1.0\n[report]\nauthor = "A. Mason"\n'
+    path.write_text(limit, encoding="utf-8")
+    with replace_run(af.Case.read(path), folder):
+        pass
+    path.write_text(limit.replace("A. Mason", "B. Wright").replace("= 1.0\n[r", f"= {changed}\n[r"))
+    assert af.commands.main(["limit", str(path), "--out", str(folder)]) == 0
+    listed = read_file_list(folder)
+    assert "case.toml" in listed["run"].files
+    assert "case.toml" not in listed["limit"].files
+    assert af.cases.open_results(folder).case.report == {"author": author}
+
+
+def test_a_kinematic_assessment_alone_has_a_report(unplotted, tmp_path, capsys):
     path, folder = tmp_path / "case.toml", tmp_path / "out"
     spectrum = BRIDGE.partition("[assessment]")[2].partition("[suite")[0]
     path.write_text(f"{CASE.partition('[suite]')[0]}[assessment]{spectrum}", encoding="utf-8")
     assert af.commands.main(["assess", str(path), "--out", str(folder)]) == 0
     assert af.commands.main(["report", str(folder)]) == 0
     concluded = words_of(folder / "report.html").split("Inputs and assumptions")[1]
-    assert re.search(r"The least margin is [\d.]+, on the NTC-2018 spectrum of PGA", concluded)
+    least = re.search(r"The least margin is ([^,]+), on the NTC-2018 spectrum of PGA", concluded)[1]
+    assert f"least margin {least}, by NTC-2018 SLV: " in capsys.readouterr().out
+    assert " with one weight a body)" in least
     assert "assessment: NTC-2018 SLV, right and left" in concluded
     words = words_of(folder / "report.html")
     assert "ag 0.25" in words.split("Norms and methods")[2]
@@ -682,16 +709,21 @@ def test_an_assessment_takes_the_fill_of_the_limit_analysis(undrawn, tmp_path, c
     assert f"assessment: spectrum, {code}, T_D 2.6 s; vertical: PGA 0.169 g" in inputs
     path.write_text(BRIDGE.replace('fill = { friction_angle = "35 degree" }', ""))
     capsys.readouterr()
-    assert af.commands.main(["assess", str(path)]) == 0
+    assert af.commands.main(["assess", str(path)]) == 3
     alone = capsys.readouterr().out
+    assert alone.count("in doubt: the fill counts as weight") == 1  # of both directions
     assert "is left out; give fill for it" in alone
     # the bridge is symmetric, and is drawn once
     pages = words_of(folder / "report.html")
     assert pages.count("the mirror image, with the same numbers") == 1
+    assert "pushed to the right" in pages
+    assert "pushed to the left" not in pages
     assert len([name for name in read_file_list(folder)["assess"].files if "png" in name]) == 2
     stated = " ".join(pages.split())
     assert re.search(
-        rf"The least margin is {least} to \S+ over what is assumed of the fill,", stated
+        rf"The least margin is {least} to \S+ over what is assumed of the fill \([\d.]+ with one "
+        "weight a body\\),",
+        stated,
     )
     assert "NTC-2018 SLV capacity 0.4 d_0*; demand the displacement spectrum, 8 % damped" in stated
     assert "T 1.68 π √(d / a*(d)) at d = 0.4 d_0*, with a* divided by FC" in stated
@@ -712,7 +744,7 @@ def test_a_fill_is_stated_as_elastic_and_not_varied(kept):
     assert words["backfill: E", "default"].startswith("6.25 MPa (table 2 of")
     assert "pga 2.94199 m/s²" in words["motion, synthetic, before matching", "default"]
     stated = ", ".join(conclusion.list_unvaried(data))
-    assert "one set of properties, stiffness and strength of the fill, one model" in stated
+    assert "friction, damping, stiffness and strength of the fill, " in stated
     concluded = build_conclusion(data).pieces
     assert " is elastic in the runs and carries tension, which soil does not. " in concluded[0].text
     assert not any("of the template" in getattr(piece, "text", "") for piece in concluded)
@@ -862,4 +894,4 @@ def test_parts_of_a_bridge_state_the_lengths_that_are_left_out():
     rows = tabulate_inputs(report_data.ReportData(af.Case.of(tomllib.loads(BRIDGE)), {})).rows
     left = {name: value for name, value, mark in rows if mark == "default"}
     assert left["sidewalls"] == "setback 0.4 m"
-    assert left["backfill"].startswith("erosion 0 m; hump 1 m")
+    assert left["backfill"].startswith("erosion 0 m; length without erosion to either")

@@ -77,7 +77,10 @@ def test_limit_analysis_in_words(ring):
     place = f"at {pushed.factor:.4g} g, pushed to the right"
     assert outcome == f"limit analysis: four-hinge mechanism, {place}"
     assert hinges.startswith("hinges, by the face in contact: joint 0 at the intrados; joint 6 at")
-    assert crushing == "joints crush at 2 MPa, the strength of the stones"
+    assert crushing == "joints crush at 2 MPa, given for limit analysis (stones: 56 MPa)"
+    own = parse_limit({"strength": 56e6, "fill": {"friction_angle": 35}})
+    words = describe_collapse(ring, pushed, own)
+    assert "\njoints crush at 56 MPa, the strength of the stones\n" in words
     assert "at most a third of the passive pressure, friction angle 35°, cohesion 0 kPa" in fill
     plastic = {"law": "plastic", "friction_angle": 30, "cohesion": "5 kPa"}
     plastic = parse_limit({"fill": plastic}).fill

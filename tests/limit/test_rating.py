@@ -350,7 +350,10 @@ def test_words_and_table(lorry_rating):
     span = f"clear span from {CLEAR_FROM:.2f} to {9.0 - CLEAR_FROM:.2f} m"
     assert f"\nevery x is that of the case and the picture; {span}\n" in words
     assert words.endswith("passive pressure, friction angle 35°, cohesion 0 kPa")
-    assert len(rows) == lorry_rating.moving.factors["factor"].size
+    # where axles stand beside the bridge there is no factor
+    factors = lorry_rating.moving.factors["factor"].values
+    assert [row.split(",")[2] for row in rows] == [f"{x:.6g}" for x in factors[factors < np.inf]]
+    assert len(rows) < factors.size
     least = min(float(row.split(",")[2]) for row in rows)
     assert least == pytest.approx(lorry_rating.factor, rel=1e-5)  # six digits
 

@@ -13,6 +13,7 @@ from archfem.statics.mechanism_assessment import spectral_acceleration
 
 G = 9.81
 SPECTRUM = af.motion.Ntc2018(ag=0.25, f0=2.4, tc_star=0.32, site="B")
+OWN = LimitState("of our own", 0.5, 2.0, 1.0, 0.05, "a test")
 RING = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17)
 STONE = af.STONE.unit_weight
 
@@ -248,10 +249,9 @@ def test_a_mechanism_that_the_ground_does_not_start_passes():
 
 
 def test_rules_of_another_code_and_motions():
-    rules = LimitState("of our own", 0.5, 2.0, 1.0, 0.05, "a test")
     block = af.column(breadth=0.6, heights=[2.4])
     motion = af.Motion.synthetic(duration=4.0, pga=2.0, seed=1)
-    check = af.kinematic_assessment(block, motion, limit_state=rules).displacement
+    check = af.kinematic_assessment(block, motion, limit_state=OWN).displacement
     assert (check.name, check.capacity) == ("of our own", pytest.approx(0.15, rel=1e-4))
     periods = check.period * np.linspace(0.0, 1.0, 41)[1:]
     spectrum = af.response_spectrum(motion, periods, 0.05) * (periods / 2 / pi) ** 2
@@ -314,7 +314,7 @@ def test_a_fill_is_weight_on_the_stones():
     fill = af.limit.Fill(friction_angle=35.0, mobilisation=0.0, active=0.0)
     expected = af.collapse_factor(bridge, live=af.BodyForce(1.0), fill=fill).factor
     assert found.path.mechanisms[0].factor == pytest.approx(expected, rel=1e-6)
-    assert "the fill counts as weight" in found.notes[0]
+    assert "the fill counts as weight" in found.doubts[0]
     with pytest.raises(af.InvalidInput, match="attached loads or a fill: use 'coulomb'"):
         af.kinematic_assessment(bridge, SPECTRUM, friction="nonassociated")
 
@@ -380,7 +380,7 @@ def test_words_table_and_a_mechanism_that_never_moves(ring):
     text = str(found)
     assert "joint 6 at the extrados" in text
     assert "NTC-2018 SLV: capacity 0.1114 m" in text
-    assert "note: beyond d* = " in text  # joints that the mechanism keeps closed
+    assert "in doubt: beyond d* = " in text  # joints that the mechanism keeps closed
     assert "d_0_star" in found.table()
     assert "alpha_0 0.4571" in repr(found)
     piers = af.arch_on_piers(
@@ -500,7 +500,7 @@ def test_a_fill_rests_on_the_stone_below_it():
     share, acceleration = oscillator(weights, heights, factor)
     assert (found.alpha_0, found.e_star) == pytest.approx((factor, share), rel=1e-6)
     assert found.a_0_star == pytest.approx(acceleration, rel=1e-6)
-    assert "the fill counts as weight" in found.notes[0]
+    assert "the fill counts as weight" in found.doubts[0]
 
 
 def test_sliding_without_dilatancy_is_searched_for_whole_structures_only():
@@ -524,8 +524,21 @@ def test_notes_tell_where_the_curve_is_an_upper_bound(ring):
     ):
         given = ring.spectrum, ring.limit_state, ring.confidence_factor
         oscillator = mechanism_assessment._Oscillator(placed, ring.path, holds, False, *given)
-        notes = oscillator.notes(share * factor)
+        notes = [*oscillator.notes(share * factor), *oscillator.doubts]
         assert all(note.startswith(start) for note, start in zip(notes, said, strict=True))
+
+
+@pytest.mark.parametrize(("limit_state", "count"), [("NTC-2018 SLV", 1), (OWN, 0)])
+def test_a_check_of_one_code_on_a_spectrum_of_another_is_in_doubt(limit_state, count):
+    """Whatever the spectrum of the check's own code, or one without a code, gives."""
+    column = af.column(breadth=0.6, heights=[2.4])
+    given = {"limit_state": limit_state}
+    european = af.kinematic_assessment(column, af.Eurocode8(ag=0.2, ground="B"), **given)
+    doubts = [text for text in european.doubts if "not made for a spectrum of EC8; give" in text]
+    assert len(doubts) == len(european.doubts) == count
+    assert str(european).count("in doubt: the check is one of NTC") == count
+    for spectrum in (SPECTRUM, af.motion.TableSpectrum([0.0, 4.0], [0.2, 0.2])):
+        assert not af.kinematic_assessment(column, spectrum, **given).doubts
 
 
 def test_courses_that_move_as_one_raise_both_ratios(verified):

@@ -166,7 +166,7 @@ def test_the_most_loaded_joint_of_a_run_is_named_but_not_a_hinge(stack):
     joints = af.joints.joint_dataset(stack, rows, np.array([0.0, 0.5, 1.0]))
     assert utilisation_text(stack, joints) == (
         "largest compression at the edge of a joint that does not hinge: 0.560 MPa, "
-        "1.00% of strength 56 MPa, in joint 1 at 0.500 s"
+        "1.00% of the stones' strength, 56 MPa, in joint 1 at 0.500 s"
     )
     still = af.joints.joint_dataset(stack, 0.0 * rows, np.array([0.0, 0.5, 1.0]))
     assert utilisation_text(stack, still).startswith("no use of strength is known")
@@ -179,7 +179,9 @@ def test_the_most_loaded_joint_of_a_long_run_is_found(stack, step, again):
     rows[..., 0] = 1e5
     rows[again, 0, 0], rows[step, 1, 0] = 4e5, 5.6e5
     text = utilisation_text(stack, af.joints.joint_dataset(stack, rows, 0.01 * np.arange(8301)))
-    assert text.endswith(f"0.560 MPa, 1.00% of strength 56 MPa, in joint 1 at {0.01 * step:.3f} s")
+    assert text.endswith(
+        f"0.560 MPa, 1.00% of the stones' strength, 56 MPa, in joint 1 at {0.01 * step:.3f} s"
+    )
 
 
 def pushed_sideways(structure, cells, eccentricity):
@@ -238,7 +240,7 @@ def test_tension_and_compression_are_reported_by_part(stack):
     assert use["compression"].values == pytest.approx([2.8 * af.units.MPa, nan], nan_ok=True)
     assert use["tension"].values == pytest.approx([0.014 * af.units.MPa, nan], nan_ok=True)
     assert strength_use_text(use) == (
-        "largest compression 2.800 MPa in column, block 1 (5.00% of strength 56 MPa), "
+        "largest compression 2.800 MPa in column, block 1 (5.00% of the stones' strength, 56 MPa), "
         "largest tension 0.014 MPa in column, block 1"
     )
     line = strength_use_table(use).splitlines()[1].split("  ")

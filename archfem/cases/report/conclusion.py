@@ -86,7 +86,7 @@ def list_facts(data: ReportData) -> list[tuple[str, str]]:
             if factor != "-" or demand == "no demand given"
         ]
         return [*signed, *([("verdict", "; ".join(factors))] if factors else []), *doubts, *blocks]
-    peak = [("PGA", f"{max(map(_peak_of_ground, runs)):.3g} g")]
+    peak = [("motions" if len(runs) > 1 else "motion", _describe_peaks(runs))]
     verdict = "; ".join([summarise_outcomes(data, runs), *_list_failed_checks(data)])
     return [*signed, ("verdict", verdict), *doubts, *blocks, *peak]
 
@@ -152,6 +152,8 @@ def build_conclusion(data: ReportData) -> Section:
         if more := len(doubts[result]) - len(shown):
             shown.append(f"{more} more stand{'s' * (more == 1)} with the result.")
         blocks.append(TextBlock(f"In doubt, {result}: {' '.join(shown)}", "doubt"))
+    for result, notes in list_notes(data).items():
+        blocks.append(TextBlock(f"Note, {result}: {' '.join(map(sentence, notes))}", "missing"))
     if rows:
         head = ("", "demand", "capacity or outcome", "factor")
         factors = _FACTORS if any(row[3] != "-" for row in rows) else ""
@@ -198,8 +200,9 @@ def _build_lead(data: ReportData, rows: Sequence[Row], doubtful: Sequence[str]) 
     if data.runs and not doubtful:
         lead.append("the checks of the numbers raise no doubt")
     lead += [f"the doubts below, on {join_names(doubtful)}, may change this"] if doubtful else []
-    single = list_unvaried(data)
-    lead += [f"not varied: {', '.join(single)}"] if single else []
+    if single := list_unvaried(data):
+        listed = " and ".join(filter(None, [", ".join(single[:-1]), single[-1]]))
+        lead.append(f"{listed} were not varied")
     if demand := data.case.report.get("demand"):
         lead[:1] = [f"for {demand}: {lead[0]}"] if lead else [f"the demand, as stated: {demand}"]
     return lead
@@ -223,7 +226,8 @@ def _describe_margin(data: ReportData, rows: Sequence[Row]) -> Iterator[str]:
         elif check:
             _, only, assumed = outcome.partition(" only with ")
             only = f", passed only with {assumed}" if only else fails
-            words = f"{factor}{over}, on {name_spectrum(data)}, by {check}{only}"
+            ratios, *bodies = factor.partition(" (")
+            words = f"{ratios}{over}{''.join(bodies)}, on {name_spectrum(data)}, by {check}{only}"
             checks.append((least, words))
     for k, (_, words) in enumerate(sorted([*others, *sorted(checks)[:1]])):
         yield f"the {'next' if k else 'least'} margin is {words}"
@@ -344,28 +348,22 @@ def list_doubts(data: ReportData) -> list[tuple[str, str]]:
             )
             doubts.append((_VARIATIONS, text))
     for name, stated in data.statements.items():
-        of_spectrum = _doubt_spectrum(data) if name == "assessment" else ()
-        doubts += [(RESULTS[name], doubt) for doubt in [*of_spectrum, *stated.doubts]]
-    if "from memory" in (data.read_text("rating.txt") or ""):
-        text = "values marked as to be checked were not compared with the text of their code"
-        doubts.append((RESULTS["rating"], text))
+        doubts += [(RESULTS[name], doubt) for doubt in stated.doubts]
     return list(dict.fromkeys(doubts))
 
 
-def _doubt_spectrum(data: ReportData) -> Iterator[str]:
-    """Yield why a margin on the spectrum may mislead: a check of another code, other motions."""
-    state = data.case.assessment.options.get("limit_state", "NTC-2018 SLV")
-    name, code = getattr(state, "name", state), read_spectrum(data).get("code", "NTC")
-    if name.startswith("NTC") and not str(code).startswith("NTC"):
-        yield f"the check is one of NTC, which was not made for a spectrum of {code}"
+def list_notes(data: ReportData) -> dict[str, list[str]]:
+    """Return the notes of each result, with that on motions of another demand."""
+    notes = {RESULTS[name]: [*each.notes] for name, each in data.statements.items() if each.notes}
     peaks = [_peak_of_ground(run) for run in data.runs.values()]
-    if peaks:
+    if peaks and "assessment" in data.statements:
         mean, other = np.mean(peaks), _peak_of_spectrum(data)
         if abs(np.log(mean / other)) > np.log(MAX_RATIO_OF_PEAKS):
-            yield (
+            notes.setdefault(RESULTS["assessment"], []).append(
                 f"the spectrum has a PGA of {other:.3g} g, and the motions have {mean:.3g} g: the "
                 "margin is not one on the demand of the time histories"
             )
+    return notes
 
 
 def list_elastic_fill(data: ReportData) -> list[str]:
@@ -381,14 +379,15 @@ def list_unvaried(data: ReportData) -> list[str]:
     """Return what was not varied, without which "no doubt" says little; nothing without a run."""
     if not data.runs:
         return []
-    single = ["one motion"] if len(data.runs) == 1 else []
-    single += [] if data.verdict_range else ["one set of properties"]
+    single = ["motion"] if len(data.runs) == 1 else []
+    single += ["lengths"] if data.verdict_range else ["lengths", "stiffness", "friction", "damping"]
     single += ["stiffness and strength of the fill"] if list_elastic_fill(data) else []
+    # the samples of a rate were scaled until they fell
+    single += [] if {"scale", "risk"} & data.statements.keys() else ["size of the motions"]
     predicted = all("predicted_error" in run.dataset.attrs for run in data.runs.values())
     if not predicted and "accuracy.txt" not in data.files:
-        single.append("one model" if "dt" in list_varied(data) else "one model and time step")
-    # the samples of a rate were scaled until they fell
-    return single if {"scale", "risk"} & data.statements.keys() else [*single, "size of motions"]
+        single += ["fidelity"] if "dt" in list_varied(data) else ["time step", "fidelity"]
+    return single
 
 
 def sentence(text: str) -> str:

@@ -37,6 +37,12 @@ _FUNCTIONS: dict[str, Callable[..., Any]] = {
 # Arguments of shapes that have rows of their own, or no influence
 _OWN_ROWS = {"width", "gravity", "name"}
 
+# Keys that say little alone, in words
+_WORDS = {
+    "hump": "length without erosion to either side of the crown",
+    "spandrels": "thickness of the spandrel walls in all",
+}
+
 _RATING_KEYS = {"live", "impact", "dead", "width", "area_load"}
 
 # Properties that limit analysis of rigid blocks does not use, beside a strength that is a default
@@ -100,10 +106,15 @@ def _list_left_out(declaration: Callable[..., Any], given: set[str]) -> str:
     kinds, found = keys_of_part(declaration), signature(declaration).parameters
     values = {key: each.default for key, each in found.items() if key not in given | _OWN_ROWS}
     return "; ".join(
-        f"{key.replace('_', ' ')} {describe_value(value, kinds.get(key))}"
+        f"{_say_key(key)} {describe_value(value, kinds.get(key))}"
         for key, value in values.items()
         if isinstance(value, int | float | str)
     )
+
+
+def _say_key(key: str) -> str:
+    """Return a key in words."""
+    return _WORDS.get(key, key.replace("_", " "))
 
 
 def describe_value(value: Any, kind: Any = None) -> str:
@@ -111,8 +122,7 @@ def describe_value(value: Any, kind: Any = None) -> str:
     if isinstance(value, Mapping):
         kinds = kind if isinstance(kind, Mapping) else {}
         own = [
-            f"{key.replace('_', ' ')} {describe_value(each, kinds.get(key))}"
-            for key, each in value.items()
+            f"{_say_key(key)} {describe_value(each, kinds.get(key))}" for key, each in value.items()
         ]
         return "; ".join(own) or "as all"
     if isinstance(value, list):

@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from archfem._display import DOUBT_MARK
 from archfem._files import check_listed, describe_deleted, group_of, path_inside, read_file_list
 from archfem.cases.case import Case
-from archfem.cases.result_text import NOTE_MARK, RESULTS, Statement, cut_remedy
+from archfem.cases.result_text import RESULTS, Statement, cut_remedy
 from archfem.cases.run import CASE_FILE, RATING_FILE
 from archfem.cases.toml_file import Table, parse_tables
 from archfem.dynamics.history import History
-from archfem.dynamics.verdict import DOUBT_MARK
 from archfem.dynamics.verdict_range import VerdictRange
 from archfem.errors import ArchfemError
 from archfem.models.builder import build
@@ -144,8 +144,8 @@ class ReportData:
         if name not in self.files:
             return None
         check_listed(self.files[name], content := self.files[name].read_bytes())
-        marks, lines = (DOUBT_MARK, NOTE_MARK), content.decode("utf-8").strip().splitlines()
-        return "\n".join(cut_remedy(x) if x.startswith(marks) else x for x in lines)
+        lines = content.decode("utf-8").strip().splitlines()
+        return "\n".join(cut_remedy(x) if x.startswith(DOUBT_MARK) else x for x in lines)
 
     def read_figure(self, name: str, caption: str) -> list[FigureBlock]:
         """Return the picture of a file of the folder, or an empty list."""

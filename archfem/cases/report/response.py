@@ -201,9 +201,12 @@ def _build_mechanism(data: ReportData, run: History) -> list[Any]:
     if any(verdict.mechanisms.values()):
         caption = "Definitions of a mechanism: failed joints that it needs, and the first one"
         rows = [
-            [name, _DEFINITIONS[name], "none" if found is None else str(found)]
+            [name, _DEFINITIONS[name], str(found)]
             for name, found in verdict.mechanisms.items()
+            if found is not None
         ]
+        without = [name for name, found in verdict.mechanisms.items() if found is None]
+        caption += f"; none by: {', '.join(without)}" if without else ""
         blocks.append(Grid((), rows, caption))
     if run.fall is not None and "fall_pose" in run.dataset:
         caption = "Blocks on their way to the ground, (a) to (d), over where they stood."
@@ -246,7 +249,7 @@ def build_check_section(data: ReportData) -> Section:
             "of the supports under dead load, by joints in their directions as built, and most "
             "Newton iterations between two records"
         )
-        blocks.append(in_words(Grid(head, rows, caption)))
+        blocks.append(Grid(head, rows, caption))
     caption = "Speed against error over fidelities, meshes and steps."
     table = "Models in the order of their errors, with times"
     blocks += data.read_result("accuracy", caption, table=table)
@@ -281,12 +284,3 @@ def supported_weight_ratio(structure: Structure, joints: xr.Dataset) -> float:
         below, above = (structure.blocks[number].fixed for number in (lower, higher))
         reaction += vertical * (int(below) - int(above))
     return float(reaction / structure.weight)
-
-
-def in_words(grid: Grid) -> Grid | TextBlock:
-    """Return a table, or that of one row as a sentence."""
-    if len(grid.rows) != 1:
-        return grid
-    cells = zip(grid.head, grid.rows[0], strict=True)
-    values = "; ".join(f"{title} {cell}" for title, cell in cells if cell not in ("–", "-"))
-    return TextBlock(sentence(f"{grid.caption}: {values}"))

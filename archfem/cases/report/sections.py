@@ -30,7 +30,6 @@ from archfem.cases.report.response import (
     build_ground_section,
     build_joint_section,
     build_run_sections,
-    in_words,
 )
 from archfem.cases.run import DRAWING_FILE
 from archfem.dynamics.history import SIGN_CONVENTION
@@ -42,7 +41,7 @@ from archfem.masonry.structure import Structure, join_names
 from archfem.statics.assessment_checks import LIMIT_STATES, LimitState
 from archfem.units import MPa, kN
 from archfem.view.pages.document import FigureBlock, Grid, Section, TextBlock
-from archfem.view.structure import draw_names, draw_structure
+from archfem.view.structure import draw_names, draw_structure, list_numbers
 from archfem.view.studies import draw_findings
 from archfem.view.style import limit_width
 
@@ -169,8 +168,12 @@ def _describe_joints(data: ReportData) -> str:
 def build_structure_section(data: ReportData) -> Section:
     """Build extent, parts, names of joints, thrust line, and joints and stress under dead load."""
     case, structure = data.case, data.case.structure
-    points = np.concatenate([block.drawn() for block in structure.blocks])
-    length, height = np.ptp(points, axis=0)
+    # the ground is no part of its size
+    moving = [structure.blocks[number] for number in structure.free]
+    (length, height), drawn = (
+        np.ptp(np.concatenate([block.drawn() for block in blocks]), axis=0)
+        for blocks in (moving, structure.blocks)
+    )
     extent = (
         f"{length:.3g} m long, {height:.3g} m high and {structure.width:g} m wide; "
         f"{len(structure.free)} blocks that can move, weighing {structure.weight / kN:.4g} kN, and "
@@ -179,11 +182,12 @@ def build_structure_section(data: ReportData) -> Section:
     blocks: list[Any] = [
         TextBlock(extent),
         *_describe_drawing(data),
-        in_words(_tabulate_parts(structure)),
+        _tabulate_parts(structure),
     ]
-    beside = data.dead is not None and length < MAX_SLENDERNESS * height
+    beside = data.dead is not None and drawn[0] < MAX_SLENDERNESS * drawn[1]
     with limit_width(HALF_WIDTH) if beside else nullcontext():
-        figures = [(draw_names(structure), "The structure, with its assessed joints.")]
+        named = "; ".join(["The structure, with its assessed joints", *list_numbers(structure)])
+        figures = [(draw_names(structure), f"{named}.")]
         if data.dead is not None:
             criteria = case.analysis.failure_criteria
             figures.append((draw_structure(structure, data.dead, criteria=criteria), _THRUST))
@@ -195,7 +199,7 @@ def build_structure_section(data: ReportData) -> Section:
     if data.dead is None:
         blocks += data.read_figure("dead.png", _THRUST)
     else:
-        blocks.append(in_words(_tabulate_dead_load(data.dead)))
+        blocks.append(_tabulate_dead_load(data.dead))
     caption = "Principal compression under dead load."
     blocks += data.read_result("dead_stress", caption, table="Largest stresses of each part")
     caption = "A block cut free: forces on it, and their closing."
@@ -217,12 +221,14 @@ def _tabulate_parts(structure: Structure) -> Grid:
         if not free:
             fixed.append(part or "–")
             continue
-        depths = [joint.depth for joint in structure.joints if joint.part == part]
+        assessed = zip(structure.joints, structure.judged, strict=True)
+        depths = [joint.depth for joint, own in assessed if own and joint.part == part]
         weight = structure.width * sum(block.area * block.material.unit_weight for block in free)
         row = [part or "–", blocks[0].role or "–", str(len(blocks)), str(len(blocks) - len(free))]
         row.append(", ".join(dict.fromkeys(block.material.name for block in blocks)))
         row.append(f"{weight / kN:.4g}")
-        row.append(f"{min(depths):.3g} – {max(depths):.3g}" if depths else "–")
+        ends = dict.fromkeys(f"{choose(depths):.3g}" for choose in (min, max) if depths)
+        row.append(" – ".join(ends) or "–")
         rows.append(row)
     head = [
         "part",
@@ -256,9 +262,6 @@ def _build_rating(data: ReportData) -> list[Any]:
     """Build text and picture of a rating, below the table of several vehicles."""
     caption = "(a) Factor along the bridge, and (b) mechanism at the worst place"
     blocks = data.read_result("rating", caption)
-    if blocks:
-        # where a value can be looked up, for whoever signs
-        blocks[0] = replace(blocks[0], text=blocks[0].text.replace("from memory", "to be checked"))
     if (table := data.read_text("rating_variations.csv")) is not None:
         head, *rows = reader(table.splitlines())
         blocks.insert(1, Grid(head, rows, "Factor with one property changed at a time", "words"))
@@ -303,7 +306,8 @@ def _build_assessment(data: ReportData) -> list[Any]:
     stated = data.statements.get("assessment")
     if stated and len(names) == 2 and all(x.endswith("right and left") for x, *_ in stated.rows):
         names = names[:1]
-        texts = [f"{texts[0]}\nleft: the mirror image, with the same numbers", *texts[2:]]
+        mirrored = "\nleft: the mirror image, with the same numbers"
+        texts = [texts[0], texts[1] + mirrored, *texts[3:]]
         caption = f"{caption[:-1]}, to the right."
     if "all else is under one assumption: " in text:
         caption = f"{caption[:-1]}, under the assumption on the fill that has the least margin."

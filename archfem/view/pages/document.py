@@ -24,6 +24,9 @@ from archfem._validation import validate_methods
 from archfem.errors import InvalidInput, NotInstalled
 from archfem.view.style import disable_math
 
+# Margins of figures, which have those of the page
+_WITHOUT_MARGIN: dict[str, Any] = {"bbox_inches": "tight", "pad_inches": 0.02}
+
 
 @dataclass(frozen=True)
 class TextBlock:
@@ -69,8 +72,11 @@ class FigureBlock:
         disable_math(figure)
         buffer = BytesIO()
         with matplotlib.rc_context({"svg.fonttype": "path", "path.simplify_threshold": 0.5}):
-            figure.savefig(buffer, format="svg", transparent=True, metadata={"Date": None})
-        width = float(figure.get_figwidth())
+            figure.savefig(
+                buffer, format="svg", transparent=True, metadata={"Date": None}, **_WITHOUT_MARGIN
+            )
+        # without the room above and below drawings that are true to scale
+        width = float(figure.get_tightbbox().width) + 2.0 * _WITHOUT_MARGIN["pad_inches"]
         # upright rectangles are printed at least a pixel wide: letters such as l would be smudged
         content = buffer.getvalue().replace(b") scale(", b") skewX(0.1) scale(")
         return cls(_uri("image/svg+xml", content), caption, width, figure)
@@ -80,7 +86,7 @@ class FigureBlock:
         if self.figure is None:
             return b64decode(self.source.partition(",")[2])
         buffer = BytesIO()
-        self.figure.savefig(buffer, format="png", dpi=300)
+        self.figure.savefig(buffer, format="png", dpi=300, **_WITHOUT_MARGIN)
         return buffer.getvalue()
 
     @classmethod

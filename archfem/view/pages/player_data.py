@@ -303,7 +303,6 @@ class Scene:
             "level": None if falls is None else falls.level,
             "mechanism": None if mechanism is None else mechanism.time,
             "note": self.note,
-            "hint": self.hint,
             "pack": pack.head,
             "bytes": pack.text,
         }
@@ -314,13 +313,6 @@ class Scene:
         note = "" if self.moved is not None else self.missing_reason or _default_note(self.run)
         assessed = describe_assessed_joints(self.run.joints)
         return f"{assessed[:1].upper()}{assessed[1:]}. {note}" if assessed else note
-
-    @property
-    def hint(self) -> str:
-        """How displacements are recorded, which is of use on a screen alone."""
-        if self.moved is not None or self.missing_reason:
-            return ""
-        return "Set fields_every = 8 in [record] of its case to record them."
 
     @property
     def text(self) -> str:
@@ -336,7 +328,8 @@ def _thin_out(count: int, every: int) -> NDArray[np.intp]:
 def _default_note(run: History) -> str:
     """Return the note in a page without displacements."""
     opening = ", with the openings of the joints between them" if "opening" in run.joints else ""
-    return f"The run contains no displacements: blocks are drawn undeformed{opening}."
+    remedy = "fields_every = 8 in [record] of its case records them"
+    return f"The run contains no displacements: blocks are drawn undeformed{opening}; {remedy}."
 
 
 def _bounds(points: Array, margin: float) -> tuple[Array, Array]:

@@ -26,7 +26,14 @@ def test_words_of_users_are_escaped_and_numbers_typeset():
     assert read.words.count(evil) >= 10
     assert {"−0.5", "–", "a-b", "a < b"} <= set(read.words)
     assert page.count("data:image/svg+xml;base64,") == 1
-    assert "width:2.0in" in page
+    assert "width:2.04in" in page
+
+
+def test_figures_have_no_room_around_their_drawings():
+    """Axes of half the width of a figure, without words."""
+    figure = Figure(figsize=(4.0, 2.0))
+    figure.add_axes((0.25, 0.25, 0.5, 0.5)).tick_params(labelbottom=False, labelleft=False)
+    assert 2.0 < FigureBlock.of(figure, "").inches < 2.2
 
 
 def test_a_short_text_stays_with_its_figure():

@@ -41,7 +41,8 @@ def test_a_document_has_its_headings_tables_captions_and_pictures(ring, tmp_path
     assert facts == [["verdict", "stands"]]
     assert grid == [["joint", "e"], *TABLE]
     (picture,) = found.inline_shapes
-    assert picture.width.inches == pytest.approx(min(figure.get_figwidth(), TEXT_WIDTH), abs=1e-3)
+    drawn = figure.get_tightbbox().width + 0.04
+    assert picture.width.inches == pytest.approx(min(drawn, TEXT_WIDTH), abs=0.01)
     assert 300 * figure.get_figwidth() == pytest.approx(_pixels(found), abs=1.0)
 
 

@@ -215,12 +215,8 @@
         this.show(this.time);
       });
       const thinned = scene.every > 1 ? `Of the recorded steps, one in ${scene.every} is shown here.` : "";
-      note.hidden = !(scene.note || scene.hint || thinned);
-      note.textContent = `${scene.note} `;
-      // what the reader can do on a screen is of no use on paper
-      const hints = note.appendChild(document.createElement("span"));
-      hints.className = "screen";
-      hints.textContent = `${scene.hint} ${thinned}`;
+      note.hidden = !(scene.note || thinned);
+      note.textContent = `${scene.note} ${thinned}`;
     }
 
     /** The ground's acceleration. */
