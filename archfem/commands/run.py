@@ -241,6 +241,7 @@ def assess(options: argparse.Namespace) -> int:
             f"given {case.limit.strength / MPa:.3g} MPa would lower alpha_0; `archfem limit` with "
             "horizontal = 1 or -1 in [limit] computes it so"
         )
+    doubts += result_text.note_band(case, found.values())
     texts = [result_text.describe_margin(found.values())]
     texts += [f"{name}: {result}" for name, result in found.items()]
     of_fill = describe_fill(case.assessment.options.get("fill"), case.structure)

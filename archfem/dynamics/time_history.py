@@ -147,7 +147,8 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
     history.dataset.attrs["slip_error"] = float(adaptive.slip_error.total.max(initial=0.0))
     if dt is None:
         history = _state_tolerance(history, tolerance, adaptive.unmet_share)
-    elif doubt := _doubt_steps_of_sliding(history, adaptive.slip_error, dt):
+    elif found := _doubt_steps_of_sliding(history, adaptive.slip_error, dt):
+        history.dataset.attrs["admissible_step"], doubt = found
         history = history.with_doubts((*history.doubts, doubt))
     if not model.large_displacements or ending is Ending.INTERRUPTED:
         return history
@@ -185,8 +186,10 @@ def _state_tolerance(history: History, tolerance: float, share: float) -> Histor
     return history.with_doubts((*history.doubts, doubt)) if share > 0.02 else history
 
 
-def _doubt_steps_of_sliding(history: History, slip_error: SlipError, dt: float) -> Doubt | None:
-    """Doubt a constant step [s] where the error of the slip is large.
+def _doubt_steps_of_sliding(
+    history: History, slip_error: SlipError, dt: float
+) -> tuple[float, Doubt] | None:
+    """Doubt a constant step where the error of the slip is large; return a shorter one first [s].
 
     In sliding blocks and rings the error was up to 1.5 times its sum over the steps, a third on
     average.
@@ -209,7 +212,7 @@ def _doubt_steps_of_sliding(history: History, slip_error: SlipError, dt: float) 
     shorter = dt * (limit / error) ** 0.5
     unit = 10.0 ** floor(log10(shorter))
     shorter = floor(shorter / unit) * unit
-    return Doubt(
+    return shorter, Doubt(
         f"steps of {1e3 * dt:g} ms are long for sliding: of '{dataset['name'].values[worst]}' the "
         f"slip may be wrong by {format_mm(error)}, where the largest slip is {format_mm(largest)}",
         f"take {1e3 * shorter:g} ms or less, `--set analysis.dt={shorter:g}`, or leave dt out",
