@@ -92,8 +92,9 @@ def test_a_suite_has_a_report_with_a_player_for_each_pair(kept, capsys):
     assert "Not computed" not in words
     assert "The structure forms no mechanism under all 2 motions of PGA 0.05 g." in words
     assert "Measures of the motions as applied, at their own samples" in words
-    assert "The checks of the numbers raise no doubt. Not varied: one set of" in words
-    assert "ot varied: one set of properties, one model and time step, size of motions." in words
+    assert "The checks of the numbers raise no doubt. Not varied: properties and dis" in words
+    unvaried = "properties and displacements, lengths, fidelity and time step, size of motions."
+    assert f"ot varied: {unvaried}" in words
     assert "another case" not in words
     case = af.Case.read(kept / "case.toml")
     assert sha256(case.text().encode()).hexdigest() in words
@@ -178,7 +179,7 @@ def test_demand_and_capacity_stand_beside_their_doubts(kept, undrawn):
         "For 0.25 g, 475 years: the structure forms no mechanism under all 2 motions of PGA "
         "0.05 g. The least margin is 0.5, on the spectrum of the motion, by a code, right and "
         "left, which it fails. The doubts below, on limit analysis, kinematic assessment, may "
-        "change this. Not varied: one set of properties, one model and time step."
+        "change this. Not varied: properties and displacements, lengths, fidelity and time step."
     )
     assert texts[1:] == [
         "In doubt, limit analysis: A made one.",
@@ -712,7 +713,7 @@ def test_a_fill_is_stated_as_elastic_and_not_varied(kept):
     assert words["backfill: E", "default"].startswith("6.25 MPa (table 2 of")
     assert "pga 2.94199 m/s²" in words["motion, synthetic, before matching", "default"]
     stated = ", ".join(conclusion.list_unvaried(data))
-    assert "one set of properties, stiffness and strength of the fill, one model" in stated
+    assert "properties and displacements, stiffness and strength of the fill, lengths" in stated
     concluded = build_conclusion(data).pieces
     assert " is elastic in the runs and carries tension, which soil does not. " in concluded[0].text
     assert not any("of the template" in getattr(piece, "text", "") for piece in concluded)

@@ -451,7 +451,7 @@ def list_unvaried(data: ReportData) -> list[str]:
         return []
     single = ["the motion"] if len(data.runs) == 1 else []
     if data.verdict_range is None:
-        single.append("properties, nor with them any displacement")
+        single.append("properties and displacements")
     elif (motion := data.verdict_range.dataset.attrs.get("motion", "")) and len(data.runs) > 1:
         single.append(f"displacements under other motions than '{motion}'")
     single += ["stiffness and strength of the fill"] if list_elastic_fill(data) else []
