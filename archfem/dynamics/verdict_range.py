@@ -195,9 +195,9 @@ class VerdictRange(ResultDisplay):
             conditions.append(self._condition_text(best))
             chosen &= best.holds(rows)
         if not conditions:
-            return "no property separates them from the others by more than chance"
+            return "no property separates falls from the others by more than chance"
         inside, where = int(falls[chosen].sum()), " and ".join(conditions)
-        which = "all" if inside == falls.sum() else f"{inside} of them"
+        which = "all falls" if inside == falls.sum() else f"{inside} of the falls"
         return f"{which} with {where}, where {inside} of {int(chosen.sum())} fall"
 
     def _condition_text(self, condition: "Condition") -> str:

@@ -141,7 +141,7 @@ def test_falls_of_nearly_all_runs_are_not_explained():
     falls = np.ones(12, bool)
     falls[3] = False
     found = made_up(falls, scale=np.tile([0.5, 1.0, 2.0], 4))
-    assert "no property separates them from the others" in found.sentence
+    assert "no property separates falls from the others" in found.sentence
 
 
 def test_runs_that_all_fail_are_reported():
@@ -189,22 +189,22 @@ def test_a_deciding_property_explains_all_and_a_constant_one_nothing():
         (
             {"k_n": np.array([0.5, 0.8, 1.5, 2.5]), "sign": list("abab")},
             [True, True, False, False],
-            "all with k_n below 2.3 MPa/mm, where 16 of 16 fall",
+            "all falls with k_n below 2.3 MPa/mm, where 16 of 16 fall",
         ),
         (
             {"friction": np.array([-0.1, 0.0, 0.05, 0.1])},
             [False, False, True, True],
-            "all with friction above that given +0.025, where 16 of 16 fall",
+            "all falls with friction above that given +0.025, where 16 of 16 fall",
         ),
         (
             {"damping_ratio": np.array([0.5, 1.0, 1.5, 2.0])},
             [True, False, False, False],
-            "all with damping ratio below × 0.75, where 8 of 8 fall",
+            "all falls with damping ratio below × 0.75, where 8 of 8 fall",
         ),
         (
             {"joint_rule": ["exact", "rigid", "rigid", "exact"], "dt": list("hhgh")},
             [False, True, False, False],
-            "all with joint rule 'rigid' and dt 'h', where 8 of 8 fall",
+            "all falls with joint rule 'rigid' and dt 'h', where 8 of 8 fall",
         ),
     ],
 )
@@ -213,7 +213,7 @@ def test_the_sentence_names_the_properties_that_separate_falls(columns, falls, w
     assert made_up(np.tile(falls, 8), **columns).sentence.split(": ")[1].split(";")[0] == where
 
 
-CHANCE = "no property separates them from the others by more than chance"
+CHANCE = "no property separates falls from the others by more than chance"
 
 
 @pytest.mark.parametrize(("falls", "chance"), [(4, True), (5, False)])
@@ -254,7 +254,7 @@ def test_a_rule_of_all_falls_separates_better_than_one_run():
     soft[40] = 0.4
     falls = np.isin(np.arange(250), (5, 23, 40, 61, 88))
     sentence = made_up(falls, k_s=soft, joint_rule=rule).sentence
-    assert "all with joint rule 'exact'" in sentence
+    assert "all falls with joint rule 'exact'" in sentence
 
 
 def test_without_a_difference_no_condition_is_named():
