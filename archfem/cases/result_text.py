@@ -34,7 +34,7 @@ from archfem.limit.mechanism_count import Mechanism, duration_text
 from archfem.limit.rating import Rating
 from archfem.masonry.structure import Structure, describe_spans, join_joint_names, join_names
 from archfem.motion.hazard import DESIGN_PERIOD, MEASURES
-from archfem.motion.matching import Match
+from archfem.motion.matching import DEFAULT_BAND, Match
 from archfem.motion.motion import Motion
 from archfem.motion.response_spectra import measure_intensity
 from archfem.statics.assessment_checks import AssessmentCheck
@@ -155,7 +155,8 @@ def count_outcomes(verdicts: Sequence[Verdict]) -> str:
 
 def describe_pairs(runs: Mapping[str, History]) -> str:
     """Describe the runs of a suite: table, joints that are not assessed, and runs in doubt."""
-    lines = list(dict.fromkeys(run.verdict.assessed for run in runs.values()))
+    lines = ["displacements are of each motion as it is, and were not varied"]
+    lines += dict.fromkeys(run.verdict.assessed for run in runs.values())
     if doubtful := [name for name, run in runs.items() if run.doubts]:
         lines.append(f"in doubt, as their summaries say: {', '.join(doubtful)}")
     return "\n\n".join([tabulate_runs(runs).text, *filter(None, lines)])
@@ -553,6 +554,19 @@ def describe_margin(found: Iterable[KinematicAssessment]) -> str:
         ratios = ratios.replace(check.ratios, over.describe(digits=3))
         return f"least margin {ratios}, by {check.name}: {over.outcome}"
     return f"least margin {ratios}, by {check.name}: {check.outcome}"
+
+
+def note_band(case: Case, found: Iterable[KinematicAssessment]) -> list[str]:
+    """Return a note where motions are matched up to a shorter period than that of a check."""
+    longest = max((each.checks[-1].period for each in found), default=np.nan)
+    if not (case.suite or {}).get("matched", False) or not longest > DEFAULT_BAND[1]:
+        return []
+    low, high = DEFAULT_BAND
+    return [
+        f"{NOTE_MARK}the motions of the suite are matched from {low:g} to {high:g} s, and T = "
+        f"{longest:.2f} s is longer: there they may be weaker than the spectrum; judge their "
+        "displacements by the figure of spectra"
+    ]
 
 
 def state_risk(found: Any) -> Statement:  # of `archfem.studies`, a room to the right

@@ -239,6 +239,7 @@ def assess(options: argparse.Namespace) -> int:
     with _record_doubts(case.structure):  # which are those of the assessment
         doubts += _compare_crushing(case, found.values())
     doubts += [f"{DOUBT_MARK}{doubt}" for result in found.values() for doubt in result.doubts]
+    doubts += result_text.note_band(case, found.values())
     texts = [result_text.describe_margin(found.values())]
     for name, result in found.items():
         # doubts follow at the end, once

@@ -24,6 +24,7 @@ from archfem.dynamics.verdict_range import VerdictRange
 from archfem.errors import InvalidInput
 from archfem.joints.criteria import Criteria
 from archfem.masonry.construction import Stage, resolve_stages
+from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import Structure
 from archfem.models.builder import build
 from archfem.models.discretisation import Discretisation
@@ -316,6 +317,31 @@ class Analysis:
                 name it.
         """
         return call_late_bound("Analysis.write", self, path)
+
+
+def with_one_facet(analysis: Analysis) -> Analysis:
+    """Return an analysis whose fill in one piece has one facet on each stone.
+
+    Stones slide past shorter facets, which ends a run of large displacements without an answer.
+    """
+    stones = analysis.structure
+    if analysis.mesh_file is not None or all(
+        stones.blocks[number].grain for number in find_yielding_blocks(stones)
+    ):
+        return analysis
+    return replace(analysis, cells=(1, 1), cell="triangle")
+
+
+def takes_falling_analysis(function: Function) -> Function:
+    """Decorate a function as by `takes_analysis`, for which stones may slide far."""
+    inner: Any = takes_analysis(function)
+
+    @wraps(function)
+    def wrapper(model: Any, motion: Any, **given: Any) -> Any:
+        is_analysis = isinstance(model, Analysis)
+        return inner(with_one_facet(model) if is_analysis else model, motion, **given)
+
+    return wrapper  # type: ignore[return-value]
 
 
 def takes_analysis(function: Function) -> Function:

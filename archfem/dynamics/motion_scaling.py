@@ -19,7 +19,7 @@ import numpy as np
 from archfem._display import ProgressReport, call_late_bound
 from archfem._files import align_columns
 from archfem._validation import validate_arguments, validate_methods
-from archfem.dynamics.analysis import Analysis, takes_analysis
+from archfem.dynamics.analysis import Analysis, takes_analysis, takes_falling_analysis
 from archfem.dynamics.collapse_state import FALLEN_STATES, CollapseState, doubt_soft_blocks
 from archfem.dynamics.events import EveryMechanism, applicable_definitions
 from archfem.dynamics.history import Ending, History, first_mechanisms, partial_history
@@ -42,6 +42,9 @@ from archfem.units import STANDARD_GRAVITY
 # Limit state of large displacements, in place of a definition of mechanisms
 COLLAPSE_DEFINITION = "collapse"
 
+# Step of a search that is given none, and the least to which it is shortened for sliding [s]
+OWN_STEP, LEAST_STEP = 0.005, 0.0005
+
 # Gaps between scales are filled down to a ratio, from a share of the smallest fall on [-]
 FILLED_SHARE, FILLED_RATIO = 0.5, 1.1
 NEAR_SHARE, NEAR_RATIO = 0.7, 1.05  # where windows of falls are most frequent
@@ -57,6 +60,7 @@ class ScaledRun:
     outcome: str  # ending in words
     fall: CollapseState | None = None  # state of collapse; None for small displacements
     doubts: tuple[str, ...] = ()  # reasons why the run may be wrong
+    admissible_step: float = inf  # that follows sliding, where that of the run does not [s]
 
     @property
     def is_interrupted(self) -> bool:
@@ -237,7 +241,10 @@ def _run_as_far(model: Model | Analysis, motion: Motion, **options: Any) -> Hist
     try:
         return time_history(model, motion, **options)
     except DidNotConverge as error:
-        return partial_history(error)
+        history = partial_history(error)
+        if history.ending is not Ending.FAILED:  # the fall of loose blocks did
+            history.dataset.attrs["outcome"] += f", and {str(error).partition(':')[0]}"
+        return history
 
 
 def _say_scale(scale: float, pga: float | None) -> str:
@@ -271,6 +278,9 @@ def _doubts_of_searches(
             if values:
                 at = ", ".join(f"{value:#.3g}" for value in values)
                 doubts.append(f"{note} at {at} × the motion{settings}")
+        if bracket.unanswered:
+            broken = next(run for run in scales.runs if run.scale == bracket.unanswered[0])
+            doubts[-1] += f": the first {broken.outcome}" if broken.outcome else ""
         if scales.interrupted:
             doubts.append(f"the search was interrupted after {len(scales.runs)} runs{settings}")
         for run in scales.runs:
@@ -398,7 +408,7 @@ class CollapseScale:
     of_model: tuple[Doubt, ...] = ()
 
     def __repr__(self) -> str:
-        """Return the scales around the fall in one line; a dislocated structure has not fallen."""
+        """Return scales around the fall, and from which it is dislocated, which is no fall."""
         made = [(at, fall.kind) for dt in self.searches for at, fall in self.falls(dt) if fall]
         least = min(self.bracket(dt).upper for dt in self.searches)
         met = "falls at no scale that was tried"
@@ -411,11 +421,14 @@ class CollapseScale:
             at = f"first falls at {self.upper:#.3g} ×" if self.upper < inf else "falls at no scale"
             met = f"{met}, {'the other' if len(self.searches) == 2 else 'the last'} time step {at}"
         state, first = "stands", self.lower
+        parted = min((at for at, kind in made if kind == "dislocated"), default=inf)
         if (self.lower, "dislocated") in made:
-            first = min(at for at, kind in made if kind == "dislocated")
+            first = parted
             below = max((at for at, kind in made if kind == "stands" and at < first), default=0.0)
             state = f"stands at {below:#.3g} ×, " * bool(below) + "dislocated, not fallen,"
             met = f"and up to {self.lower:#.3g} ×, {met}" if first < self.lower else met
+        elif parted < self.lower:
+            state = f"dislocated from {parted:#.3g} ×, stands again"
         return _say_bracket(state, first, self.pga, met) + self._say_tested()
 
     def _say_tested(self) -> str:
@@ -426,8 +439,9 @@ class CollapseScale:
         if not gaps:
             return ""
         ratio = max(high / low for low, high in gaps)
-        first = min((at for at, kind in made if kind == "dislocated"), default=inf)
-        parted = f", or is dislocated (first at {first:#.3g} ×)," if first < self.lower else ""
+        parted = " or is dislocated" * any(
+            kind == "dislocated" and at < self.lower for at, kind in made
+        )
         return (
             f"; stands{parted} at every smaller scale that was run, from {gaps[0][0]:#.3g} × on up "
             f"to a factor of {ratio:.2f} apart; those between were not run"
@@ -534,6 +548,42 @@ class CollapseScale:
         return align_columns(*self.rows())
 
 
+# Searches with a time step [s] from scales on, with what was found before
+SearchStep = Callable[[float, Sequence[float], MechanismScales | None], MechanismScales]
+
+
+def _search_steps(search: SearchStep, steps: Sequence[float]) -> dict[float, MechanismScales]:
+    """Search with each time step, and again around a fall that another one has jumped over."""
+    searches: dict[float, MechanismScales] = {}
+    first = 1.0
+    for step in steps:
+        searches[step] = search(step, [first], None)
+        if searches[step].interrupted:
+            return searches
+        # the next search begins near this fall, and its scales lie between those of this one
+        least = searches[step][COLLAPSE_DEFINITION].upper
+        first = least / NEAR_RATIO**0.5 if least < inf else first
+    while not searches[step].interrupted and (pair := _disagreeing(searches)):
+        step, weakest = pair
+        made = searches[step]
+        searches[step] = search(step, [weakest.lower, weakest.upper], made)
+        if searches[step].runs == made.runs:
+            break
+    return searches
+
+
+def _admissible_step(searches: Mapping[float, MechanismScales]) -> float:
+    """Return the step that follows sliding in all runs that bound a fall [s]; infinite if any."""
+    bounds = [
+        run
+        for search in searches.values()
+        for run in search.runs
+        if run.scale in (search[COLLAPSE_DEFINITION].lower, search[COLLAPSE_DEFINITION].upper)
+        and not search.interrupted
+    ]
+    return max(LEAST_STEP, min((run.admissible_step for run in bounds), default=inf))
+
+
 def _disagreeing(searches: dict[float, MechanismScales]) -> tuple[float, Bracket] | None:
     """Return a time step that stands where another one falls, and the bracket of that, or None."""
     brackets = {dt: search[COLLAPSE_DEFINITION] for dt, search in searches.items()}
@@ -542,7 +592,7 @@ def _disagreeing(searches: dict[float, MechanismScales]) -> tuple[float, Bracket
     return (step, weakest) if brackets[step].lower >= weakest.upper else None
 
 
-@takes_analysis
+@takes_falling_analysis
 @validate_arguments
 def collapse_scale(
     model: Model | Analysis,
@@ -550,7 +600,7 @@ def collapse_scale(
     *,
     start: Equilibrium | None = None,
     damping: Viscous | EffectiveDamping | str | None = None,
-    dt: float | Sequence[float] = 0.005,
+    dt: float | Sequence[float] | None = None,
     precision: float = 0.05,
     between: tuple[float, float] = (0.1, 10.0),
 ) -> CollapseScale:
@@ -566,11 +616,13 @@ def collapse_scale(
 
     Args:
         model: model of large displacements, `build(…, displacements="large")`, or such an
-            `Analysis`, whose settings are then the defaults.
+            `Analysis`, whose settings are then the defaults, but that fill in one piece has one
+            facet on each stone.
         motion: motion to scale, vertical component included.
         start: dead load, computed if not given.
         damping: as for `time_history`.
-        dt: time steps, or one that is tried with its half too [s].
+        dt: time steps, or one that is tried with its half too [s]; by default 5 ms, or shorter down
+            to 0.5 ms where the runs that bound the fall slide farther than such steps follow.
         precision: relative width of the final brackets [-].
         between: smallest and largest scale [-]; no ground motion may exceed 5 g.
 
@@ -587,35 +639,24 @@ def collapse_scale(
             f"model '{begin.model.fidelity}' has small displacements: build it with "
             "displacements='large'"
         )
-    steps = (dt, 0.5 * dt) if isinstance(dt, int | float) else tuple(dt)
+    dt, shortens = OWN_STEP if dt is None else dt, dt is None
+    steps = [dt, 0.5 * dt] if isinstance(dt, int | float) else [*dt]
     check_search(precision, between)
     if not steps:
         raise InvalidInput("dt = () has no step: give one or two")
 
     def run_scaled(step: float, scale: float) -> ScaledRun:
         run = _run_as_far(model, motion.scaled(scale), start=begin, damping=damping, dt=step)
-        doubts = tuple(map(str, run.doubts))
-        return ScaledRun(scale, {}, run.ending, run.outcome, run.fall, doubts)
+        doubts, follows = tuple(map(str, run.doubts)), run.dataset.attrs.get("admissible_step", inf)
+        return ScaledRun(scale, {}, run.ending, run.outcome, run.fall, doubts, follows)
 
-    limits, first = admissible_range(between, motion), 1.0
-    searches: dict[float, MechanismScales] = {}
+    limits, limit = admissible_range(between, motion), (COLLAPSE_DEFINITION,)
 
-    def search(step: float, *at: float) -> None:
-        run_at, limit, made = partial(run_scaled, step), (COLLAPSE_DEFINITION,), searches.get(step)
-        searches[step] = search_scales(run_at, limit, precision, limits, at, made)
+    def search(step: float, at: Sequence[float], made: MechanismScales | None) -> MechanismScales:
+        return search_scales(partial(run_scaled, step), limit, precision, limits, at, made)
 
-    for step in steps:
-        search(step, first)
-        if searches[step].interrupted:
-            break
-        # the next search begins near this fall, and its scales lie between those of this one
-        least = searches[step][COLLAPSE_DEFINITION].upper
-        first = least / NEAR_RATIO**0.5 if least < inf else first
-    # a step may jump over the fall of another one: it is run there too before they disagree
-    while not searches[step].interrupted and (pair := _disagreeing(searches)):
-        step, weakest = pair
-        made = searches[step].runs
-        search(step, weakest.lower, weakest.upper)
-        if searches[step].runs == made:
-            break
+    searches = _search_steps(search, steps)
+    while shortens and (shorter := _admissible_step(searches)) < steps[0]:
+        steps = [shorter, 0.5 * shorter]
+        searches = _search_steps(search, steps)
     return CollapseScale(searches, motion.pga, doubt_soft_blocks(begin.model.structure))

@@ -147,8 +147,8 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
     history.dataset.attrs["slip_error"] = float(adaptive.slip_error.total.max(initial=0.0))
     if dt is None:
         history = _state_tolerance(history, tolerance, adaptive.unmet_share)
-    elif doubt := _doubt_steps_of_sliding(history, adaptive.slip_error, dt):
-        history = history.with_doubts((*history.doubts, doubt))
+    else:
+        history = _doubt_steps_of_sliding(history, adaptive.slip_error, dt)
     if not model.large_displacements or ending is Ending.INTERRUPTED:
         return history
     whole = recorder.record.whole_fall
@@ -185,35 +185,37 @@ def _state_tolerance(history: History, tolerance: float, share: float) -> Histor
     return history.with_doubts((*history.doubts, doubt)) if share > 0.02 else history
 
 
-def _doubt_steps_of_sliding(history: History, slip_error: SlipError, dt: float) -> Doubt | None:
-    """Doubt a constant step [s] where the error of the slip is large.
+def _doubt_steps_of_sliding(history: History, slip_error: SlipError, dt: float) -> History:
+    """Doubt a constant step [s] where the error of the slip is large; state a shorter one.
 
     In sliding blocks and rings the error was up to 1.5 times its sum over the steps, a third on
     average.
     """
     if not len(slip_error.joints):
-        return None
+        return history
     dataset, joints = history.dataset, slip_error.joints
     worst, error = int(joints[slip_error.total.argmax()]), float(slip_error.total.max())
     # a thousandth of the depth, by which |e| errs by a fifth of the default tolerance
     limit = 1e-3 * float(dataset["depth"].values[worst])
     if error <= limit:
-        return None
+        return history
     slip = dataset["slip"].transpose("time", "joint").values[:, joints]
     # a tenth of the largest slip on average
     largest = float(np.abs(slip - slip[0]).max())
     limit = max(limit, 0.3 * largest)
     if error <= limit:
-        return None
+        return history
     # the error varies with the square of the step, and faster where steps miss peaks
     shorter = dt * (limit / error) ** 0.5
     unit = 10.0 ** floor(log10(shorter))
     shorter = floor(shorter / unit) * unit
-    return Doubt(
+    history.dataset.attrs["admissible_step"] = shorter
+    doubt = Doubt(
         f"steps of {1e3 * dt:g} ms are long for sliding: of '{dataset['name'].values[worst]}' the "
         f"slip may be wrong by {format_mm(error)}, where the largest slip is {format_mm(largest)}",
         f"take {1e3 * shorter:g} ms or less, `--set analysis.dt={shorter:g}`, or leave dt out",
     )
+    return history.with_doubts((*history.doubts, doubt))
 
 
 def _resolve_steps(

@@ -114,7 +114,7 @@ class Verdict:
         if not np.isnan(self.displacement):
             lines.append(
                 f"largest displacement of a corner {format_mm(self.displacement)}, residual "
-                f"{format_mm(self.residual)}"
+                f"{format_mm(self.residual)}; not varied"
             )
         # definitions with the same mechanism share a line
         groups: dict[str, list[str]] = {}

@@ -18,6 +18,7 @@ from archfem._typing import Array
 from archfem._validation import validate_methods
 from archfem.dynamics.collapse_state import COLLAPSE_STATES, FALLEN_STATES
 from archfem.models.model import Doubt, read_doubts
+from archfem.units import format_mm
 
 # A condition is named if at most this share of random permutations of the outcomes has one that
 # separates them as well [-], and the number of permutations
@@ -46,6 +47,11 @@ class VerdictRange(ResultDisplay):
     def falls(self) -> NDArray[np.bool_]:
         """Whether the structure partly or wholly falls, by run (runs,)."""
         return np.isin(self.dataset["outcome"].values, FALLEN_STATES)
+
+    @property
+    def dislocated(self) -> NDArray[np.bool_]:
+        """Whether the structure is dislocated, and has not fallen, by run (runs,)."""
+        return np.asarray(self.dataset["outcome"].values == COLLAPSE_STATES[1])
 
     @property
     def answered(self) -> NDArray[np.bool_]:
@@ -119,8 +125,28 @@ class VerdictRange(ResultDisplay):
 
     @property
     def count(self) -> str:
-        """How often the structure falls."""
-        return f"falls in {int(self.falls[self.answered].sum())} of {int(self.answered.sum())}"
+        """How often the structure falls, and is dislocated."""
+        falls, parted = (each[self.answered].sum() for each in (self.falls, self.dislocated))
+        also = f", dislocated in {parted}" if parted else ""
+        return f"falls in {falls}{also} of {self.answered.sum()}"
+
+    @property
+    def displacements(self) -> str:
+        """Range of the largest displacements of the runs that do not fall; empty without such."""
+        rows = self.answers
+        sizes = rows["displacement"].values[~self.falls[self.answered]]
+        if not np.isfinite(sizes).any():
+            return ""
+        least, usual, largest = np.quantile(sizes, (0.0, 0.95, 1.0), method="inverted_cdf")
+        ends, hardly = (
+            " to ".join(map(format_mm, (least, largest))),
+            int(sum(sizes < largest / 100)),
+        )
+        text = (
+            f"largest displacements {ends}, in 95 % of {len(sizes)} runs {format_mm(usual)} or less"
+        )
+        # runs that rest, as under a joint rule without a mechanism, say little of the others
+        return f"{text}, in {hardly} below 1 % of the largest" if hardly else text
 
     @property
     def unanswered(self) -> str:
@@ -168,9 +194,9 @@ class VerdictRange(ResultDisplay):
             conditions.append(self._condition_text(best))
             chosen &= best.holds(rows)
         if not conditions:
-            return "no property separates them from the others by more than chance"
+            return "no property separates falls from the others by more than chance"
         inside, where = int(falls[chosen].sum()), " and ".join(conditions)
-        which = "all" if inside == falls.sum() else f"{inside} of them"
+        which = "all falls" if inside == falls.sum() else f"{inside} of the falls"
         return f"{which} with {where}, where {inside} of {int(chosen.sum())} fall"
 
     def _condition_text(self, condition: "Condition") -> str:
@@ -221,9 +247,10 @@ class VerdictRange(ResultDisplay):
         return align_columns(["property", *head, "falls"], rows)
 
     def __str__(self) -> str:
-        """Sentence, doubts, and a line for each property."""
+        """Sentence, doubts, displacements, and a line for each property."""
         doubts = [f"{DOUBT_MARK}{doubt}" for doubt in self.doubts]
-        return "\n".join([self.sentence, *doubts, self.table()])
+        moved = filter(None, [self.displacements])
+        return "\n".join([self.sentence, *doubts, *moved, self.table()])
 
     def _summary(self) -> str:
         return f"VerdictRange: {self.sentence}"

@@ -21,7 +21,7 @@ from archfem._validation import check_choice, validate_arguments, validate_metho
 from archfem.cases.case import Case, case_of
 from archfem.cases.motion_keys import write_motion
 from archfem.cases.run import DeadLoadResult
-from archfem.dynamics.analysis import Analysis
+from archfem.dynamics.analysis import Analysis, with_one_facet
 from archfem.dynamics.collapse_state import CollapseState, doubt_soft_blocks
 from archfem.dynamics.events import applicable_definitions
 from archfem.dynamics.history import Ending, partial_history
@@ -321,7 +321,7 @@ def ida(
 
     Args:
         subject: analysis, or case of the structure; with `displacements="large"` collapse is a
-            limit state.
+            limit state, for which fill in one piece has one facet on each stone.
         motions: motions by name or in a sequence, each a `Motion`, the file of a record, relative
             to the case's folder, or a table as [motion]; a single `Motion` or file; by default the
             pairs of the suite, scaled and reduced as the case says.
@@ -351,13 +351,16 @@ def ida(
     options: Findings = {"limits": None if limits is None else list(limits), "precision": precision}
     options["between"] = [float(scale) for scale in between]
     case = case_of(subject)
+    large = case.analysis.displacements == "large"
+    falls = large and COLLAPSE_DEFINITION in (limits or LIMIT_STATES)
+    if falls and (coarse := with_one_facet(case.analysis)) is not case.analysis:
+        facets = ("model.cells", [*coarse.cells]), ("model.cell", coarse.cell)
+        case = Point.of(case, facets).case
     names, points = _points(case, motions)
     axis = Axis("motion", ("motion",), tuple((name,) for name in names))
     evaluator = Evaluator(search_limit_states, options)
     study = Study.of_points(f"{case.title}: IDA", evaluator, (axis,), points)
     table = study.run(folder, workers=workers, client=client)
-    large = case.analysis.displacements == "large"
-    falls = large and COLLAPSE_DEFINITION in (limits or LIMIT_STATES)
     return Ida(table, doubt_soft_blocks(case.structure) if falls else ())
 
 

@@ -21,7 +21,7 @@ from archfem._validation import check_integer, check_number, validate_arguments
 from archfem.cases.case import Case
 from archfem.cases.result_text import ResultTable
 from archfem.cases.toml_file import format_key
-from archfem.dynamics.analysis import Analysis
+from archfem.dynamics.analysis import Analysis, with_one_facet
 from archfem.dynamics.collapse_state import CollapseState, classify_collapse, doubt_soft_blocks
 from archfem.dynamics.damping import damping_kind, resolve_effective_damping, vary_damping
 from archfem.dynamics.loose_fill import loosen_fill
@@ -35,7 +35,6 @@ from archfem.errors import DidNotConverge, InvalidInput, InvalidStructure, logge
 from archfem.limit.fill_strength import PlasticFill
 from archfem.limit.rating import ASSUMED_STRENGTH, Rating, rate_again
 from archfem.masonry.joint_closing import FINISHES, with_finish
-from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import Structure
 from archfem.models.model import Doubt, write_doubts
 from archfem.motion.motion import Motion
@@ -188,12 +187,7 @@ def as_falling(
     """Return an analysis with large displacements, which keeps nothing but the outcome of a run."""
     if isinstance(structure, Structure):
         structure = Analysis(structure, fidelity="rigid", damping="effective")
-    stones = structure.structure
-    if structure.mesh_file is None and any(
-        not stones.blocks[number].grain for number in find_yielding_blocks(stones)
-    ):
-        # stones slide past shorter facets of fill in one piece, which ends a run without an answer
-        structure = replace(structure, cells=(1, 1), cell="triangle")
+    structure = with_one_facet(structure)
     return replace(
         structure,
         fidelity=fidelity or ("rigid" if structure.selects_model else structure.fidelity),

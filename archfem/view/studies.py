@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
-from archfem._typing import Array
+from archfem._typing import Array, Flags
 from archfem._validation import validate_arguments
 from archfem.dynamics.accuracy import Accuracy
 from archfem.dynamics.verdict_range import VerdictRange
@@ -501,7 +501,8 @@ def draw_verdict_range(verdicts: VerdictRange) -> Figure:
         The figure, with panels of the properties that explain most of the damage, the first most.
     """
     rows, max_panels = verdicts.answers, 6
-    falls, residual = verdicts.falls[verdicts.answered], 1e3 * rows["residual"].values
+    falls, parted = (x[verdicts.answered] for x in (verdicts.falls, verdicts.dislocated))
+    residual = 1e3 * rows["residual"].values
     standing = residual[~falls]
     top = 3.0 * float(standing.max(initial=1.0))
     heights = np.where(falls, 2.0 * top, np.maximum(residual, 1e-3 * top))
@@ -529,11 +530,11 @@ def draw_verdict_range(verdicts: VerdictRange) -> Figure:
         style_axes(axes, label, "residual\ndisplacement [mm]" if first else "")
         if falls.any():
             set_title(axes, f"{share:.0%} of the damage")
-        _draw_property(axes, rows[name].values, heights, falls)
+        _draw_property(axes, rows[name].values, heights, falls, parted)
         axes.axhline(top, color=Colour.GREY, lw=0.9, ls="--")
         axes.set_yscale("log")
         axes.set_ylim(0.7e-3 * top, 4.0 * top)
-    add_legend_below(figure, 2, handles=panels[0].get_legend_handles_labels()[0])
+    add_legend_below(figure, 3, handles=panels[0].get_legend_handles_labels()[0])
     text = verdicts.sentence
     if others and falls.any():
         text += f"\neach other property explains {max(others):.0%} of it at most"
@@ -541,7 +542,7 @@ def draw_verdict_range(verdicts: VerdictRange) -> Figure:
     return figure
 
 
-def _draw_property(axes: Axes, values: Array, heights: Array, falls: Array) -> None:
+def _draw_property(axes: Axes, values: Array, heights: Array, falls: Flags, parted: Flags) -> None:
     """Draw a dot for each run over a property, labels side by side."""
     if values.dtype.kind == "f":
         places = values
@@ -553,10 +554,15 @@ def _draw_property(axes: Axes, values: Array, heights: Array, falls: Array) -> N
         words = [str(label).replace(" and ", "\nand ") for label in labels]
         axes.set_xticks(range(len(labels)), words)
         axes.set_xlim(-0.5, len(labels) - 0.5)
-    groups = ((~falls, Colour.LINES[0], "stands"), (falls, Colour.HINGE, "falls, above the line"))
-    for chosen, colour, label in groups:
-        style = {"ms": 4, "alpha": 0.8, "label": label}
-        axes.plot(places[chosen], heights[chosen], "o", color=colour, **style)
+    groups = (
+        (~(falls | parted), "o", Colour.LINES[0], "stands"),
+        (parted, "D", Colour.LINES[1], "dislocated"),
+        (falls, "^", Colour.HINGE, "falls, above the line"),
+    )
+    for chosen, marker, colour, label in groups:
+        if chosen.any() or marker != "D":
+            style = {"ms": 4, "alpha": 0.8, "label": label}
+            axes.plot(places[chosen], heights[chosen], marker, color=colour, **style)
 
 
 def draw_convergence(

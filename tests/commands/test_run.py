@@ -211,7 +211,7 @@ def test_a_range_is_of_one_motion_of_a_suite(small, unplotted, capsys):
         (
             "large",
             "step",
-            r"tap: (stands|dislocated, not fallen,) at \S+ g \(\S+ × the motion\), falls",
+            r"tap: dislocated from \S+ ×, stands again at \S+ g \(\S+ × the motion\), falls",
         ),
         ("small", "mechanism", r"tap: no mechanism at \S+ g \(.*, first mechanism at .*, by "),
     ],

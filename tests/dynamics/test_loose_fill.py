@@ -5,13 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapely
+import xarray as xr
 
 import archfem as af
+from archfem.dynamics.analysis import with_one_facet
 from archfem.dynamics.collapse_state import doubt_soft_blocks
+from archfem.dynamics.history import History
 from archfem.dynamics.loose_fill import _cut_off, interpolate_field, loosen_fill
 from archfem.dynamics.recorder import Record
 from archfem.dynamics.rigid_body.bodies import LooseBlocks
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
+from archfem.studies.study import Study
 from archfem.studies.variations import as_falling, prepare_runs
 
 SQUARE = np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)])
@@ -115,6 +119,43 @@ def test_a_structure_without_fill_is_returned_as_it_is(ring):
     loose = loosen_fill(ring, start, {})
     assert loose.structure is ring
     assert loose.start is start
+
+
+def test_a_search_of_a_fall_has_one_facet_of_fill_on_each_stone(footbridge, monkeypatch):
+    """Default cells end a run as stones slide by a facet; why it has no answer is said."""
+    analysis = af.Analysis(
+        footbridge, fidelity={"backfill": "full", "rest": "rigid"}, displacements="large"
+    )
+    motion, seen = af.Motion(np.array([0.0, 1.0, 0.0]), dt=0.01), []
+    monkeypatch.setattr(History, "doubts", ())
+
+    def slide(model, *_, **__):
+        seen.append(model.size)
+        lost = af.DidNotConverge("loose blocks were lost: why", last=None)
+        attrs = {"outcome": "ended by loose blocks", "ended": "parted"}
+        lost.history = History(xr.Dataset(attrs=attrs), footbridge)
+        raise lost
+
+    monkeypatch.setattr("archfem.dynamics.motion_scaling.time_history", slide)
+    found = analysis.scale(motion, dt=[0.01], between=(1.0, 1.0))
+    one = with_one_facet(analysis)
+    assert set(seen) == {one.model.size} != {analysis.model.size}
+    assert found.doubts[-1].endswith(
+        "at 1.00 × the motion by 10 ms: the first ended by loose blocks, and loose blocks were lost"
+    )
+    coarse = ida_cells(analysis, monkeypatch, motion)
+    assert coarse == {"cells": [1, 1], "cell": "triangle"}
+    dry = af.Analysis(af.column(breadth=1.0, heights=[1.0]))
+    assert with_one_facet(dry) is dry
+
+
+def ida_cells(analysis, monkeypatch, motion):
+    """Return the cells of the case that an IDA takes."""
+    taken = []
+    monkeypatch.setattr(Study, "run", lambda study, *_, **__: taken.append(study))
+    af.ida(analysis, [motion], limits=["collapse"])
+    model = taken[0].points[0].case.settings["model"]
+    return {name: model[name] for name in ("cells", "cell")}
 
 
 @pytest.mark.parametrize("rule", ["exact", "rigid"])

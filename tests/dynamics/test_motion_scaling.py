@@ -266,17 +266,27 @@ def test_gaps_below_the_largest_scale_are_filled_where_nothing_falls_there():
     assert len(found.runs) == 4
 
 
-def searched_by_steps(monkeypatch, windows, made):
-    """Search the fall of a block that falls within given windows of scales by each time step."""
+def searched_by_steps(monkeypatch, windows, made, follows=inf):
+    """Search the fall of a block that falls within given windows of scales by each time step.
+
+    Longer steps than a given one do not follow sliding.
+    """
 
     def shake(model, motion, *, dt, **_):
-        run = shaken_down(*windows[dt], made=made.setdefault(dt, []))(motion.pga)
-        return SimpleNamespace(ending=run.ending, outcome="", fall=run.fall, doubts=())
+        run = shaken_down(
+            *(windows[dt] if isinstance(windows, dict) else windows), made=made.setdefault(dt, [])
+        )(motion.pga)
+        attrs = {"admissible_step": 0.6 * dt} if dt > follows else {}
+        dataset = SimpleNamespace(attrs=attrs)
+        return SimpleNamespace(
+            ending=run.ending, outcome="", fall=run.fall, doubts=(), dataset=dataset
+        )
 
     monkeypatch.setattr("archfem.dynamics.motion_scaling.time_history", shake)
     block = af.column(breadth=1.0, heights=[1.0])
     model = af.build(block, fidelity="rigid", displacements="large")
-    return af.collapse_scale(model, af.Motion(np.array([0.0, 1.0, 0.0]), dt=0.01), dt=(*windows,))
+    given = (*windows,) if isinstance(windows, dict) else None
+    return af.collapse_scale(model, af.Motion(np.array([0.0, 1.0, 0.0]), dt=0.01), dt=given)
 
 
 @pytest.mark.parametrize("agree", [True, False])
@@ -291,6 +301,21 @@ def test_steps_disagree_at_equal_scales_only(monkeypatch, window, finds, agree):
     assert all({bracket.lower, bracket.upper} <= set(scales) for scales in made.values())
     assert any("time steps disagree" in doubt for doubt in found.doubts) != agree
     assert all(len(set(scales)) == len(scales) for scales in made.values())
+
+
+@pytest.mark.parametrize(
+    ("follows", "steps"),
+    [(inf, (5.0, 2.5)), (0.004, (3.0, 1.5)), (0.002, (1.5, 0.75)), (0.0, (0.5, 0.25))],
+)
+def test_a_search_without_a_step_shortens_its_own_until_sliding_follows(
+    monkeypatch, follows, steps
+):
+    """By 0.6 of the longest at a time, down to 0.5 ms; a step that is given is kept."""
+    found = searched_by_steps(monkeypatch, ((2.9, inf),), {}, follows)
+    assert [1e3 * dt for dt in found.searches] == pytest.approx(steps)
+    assert found.lower < 2.9 < found.upper
+    kept = searched_by_steps(monkeypatch, {0.005: ((2.9, inf),)}, {}, follows)
+    assert [*kept.searches] == [0.005]
 
 
 def test_the_second_step_begins_near_the_fall_of_the_first(monkeypatch):
@@ -352,7 +377,8 @@ def test_smaller_scales_at_which_it_is_dislocated_are_said():
         for run in found.runs
     ]
     said = str(CollapseScale({0.005: replace(found, runs=tuple(runs))}))
-    assert "; stands, or is dislocated (first at 1.10 ×), at every smaller scale that was" in said
+    assert said.startswith("dislocated from 1.10 ×, stands again at 1.30 × the motion, falls at 1")
+    assert "; stands or is dislocated at every smaller scale that was" in said
     bound = CollapseScale({0.005: replace(found, runs=(*runs[:1], runs[1], found.runs[-1]))})
     assert "; stands at every smaller scale that was run" in str(bound)
 
@@ -364,11 +390,14 @@ def test_scales_without_an_answer_bound_what_is_known():
         replace(run, fall=replace(run.fall, kind=kind))
         for run, kind in zip(found.runs, kinds, strict=False)
     ]
-    runs.append(replace(found.runs[-1], fall=None))
+    runs.append(replace(found.runs[-1], fall=None, outcome="came loose"))
     part = [replace(run, fall=None) if run.scale == 5.0 else run for run in runs]
     both = {dt: replace(found, runs=tuple(own)) for dt, own in ((0.01, runs), (0.005, part))}
     said = CollapseScale(both, pga=0.5 * 9.80665)
     assert (said.lower, said.upper, said.unanswered) == (4.0, inf, (5.0, 7.0))
+    assert "runs without an answer were at 7.00 × the motion by 10 ms: the first came loose" in (
+        " | ".join(said.doubts)
+    )
     assert str(said).partition(";")[0] == (
         "stands at 2.00 ×, dislocated, not fallen, at 1.50 g (3.00 × the motion), and up to 4.00 "
         "×, falls in no run that has an answer (3 have none, the first at 5.00 ×)"

@@ -6,18 +6,21 @@ from math import comb
 import numpy as np
 import pytest
 import xarray as xr
+from matplotlib.colors import to_rgb
 from scipy.stats import beta, rankdata
 
 import archfem as af
 from archfem.dynamics import VerdictRange
 
 
-def made_up(falls, sampled=None, error=None, residual=None, **columns):
+def made_up(falls, sampled=None, error=None, residual=None, parted=None, **columns):
     """Runs that fall or stand, with the properties of the columns."""
     falls = np.asarray(falls)
     count = len(falls)
     data = {name: ("run", np.asarray(values)) for name, values in columns.items()}
-    data["outcome"] = "run", np.where(falls, "fallen", "stands")
+    data["outcome"] = "run", np.where(falls, "fallen", "stands").astype("U12")
+    if parted is not None:
+        data["outcome"][1][parted] = "dislocated"
     residual = np.zeros(count) if residual is None else residual
     data["displacement"] = data["residual"] = "run", np.asarray(residual, float)
     data["time"] = "run", np.where(falls, 1.0, np.nan)
@@ -71,6 +74,42 @@ def test_doubts_follow_the_sentence_and_are_kept(tmp_path):
     assert str(kept).splitlines()[1].endswith("fill is rigid; cut it")
 
 
+def test_dislocated_runs_are_counted_and_drawn_apart():
+    names = {"sign": list("aabbb"), "error": ["", "", "", "", "broken"]}
+    found = made_up([True, False, False, False, False], parted=[1, 4], **names)
+    assert found.count == "falls in 1, dislocated in 1 of 4"
+    assert found.sentence.startswith(found.count)
+    assert found.dislocated.tolist() == [False, True, False, False, True]
+    (axes, *_) = found.plot().axes
+    drawn = {line.get_label(): line for line in axes.get_lines() if line.get_marker() != "None"}
+    sizes = [len(line.get_xdata()) for line in drawn.values()]
+    assert dict(zip(drawn, sizes, strict=True)) == {
+        "stands": 2,
+        "dislocated": 1,
+        "falls, above the line": 1,
+    }
+    # apart in grey, and by their marks
+    greys = [np.dot(to_rgb(line.get_color()), (0.299, 0.587, 0.114)) for line in drawn.values()]
+    assert np.diff(np.sort(greys)).min() > 0.1
+    assert len({line.get_marker() for line in drawn.values()}) == 3
+    upright = made_up([False] * 2, sign=list("ab"))
+    assert "dislocated" not in upright.sentence
+    assert len(upright.plot().axes[0].get_lines()) == 3
+
+
+def test_displacements_of_the_runs_that_hold_are_a_range():
+    """Of a hundred from 1 to 100 mm; that of a fall, and of a run without an answer, is none."""
+    sizes = np.append(np.linspace(0.001, 0.1, 100), [5.0, 9.0])
+    error, falls = [""] * 101 + ["broken"], np.arange(102) == 100
+    found = made_up(falls, residual=sizes, error=error, sign=["a"] * 102)
+    usual = "largest displacements 1 mm to 100 mm, in 95 % of 100 runs 95 mm or less"
+    assert found.displacements == usual
+    sizes[:7] = 1e-6
+    few = made_up(falls, residual=sizes, error=error, sign=["a"] * 102).displacements
+    assert few.endswith("95 mm or less, in 7 below 1 % of the largest")
+    assert made_up([True], sign=["a"]).displacements == ""
+
+
 def test_the_sentence_names_the_only_motion():
     """An interval of one motion holds for that motion; without a name motions are varied."""
     found = made_up([False] * 4, sign=list("aabb"))
@@ -102,7 +141,7 @@ def test_falls_of_nearly_all_runs_are_not_explained():
     falls = np.ones(12, bool)
     falls[3] = False
     found = made_up(falls, scale=np.tile([0.5, 1.0, 2.0], 4))
-    assert "no property separates them from the others" in found.sentence
+    assert "no property separates falls from the others" in found.sentence
 
 
 def test_runs_that_all_fail_are_reported():
@@ -150,22 +189,22 @@ def test_a_deciding_property_explains_all_and_a_constant_one_nothing():
         (
             {"k_n": np.array([0.5, 0.8, 1.5, 2.5]), "sign": list("abab")},
             [True, True, False, False],
-            "all with k_n below 2.3 MPa/mm, where 16 of 16 fall",
+            "all falls with k_n below 2.3 MPa/mm, where 16 of 16 fall",
         ),
         (
             {"friction": np.array([-0.1, 0.0, 0.05, 0.1])},
             [False, False, True, True],
-            "all with friction above that given +0.025, where 16 of 16 fall",
+            "all falls with friction above that given +0.025, where 16 of 16 fall",
         ),
         (
             {"damping_ratio": np.array([0.5, 1.0, 1.5, 2.0])},
             [True, False, False, False],
-            "all with damping ratio below × 0.75, where 8 of 8 fall",
+            "all falls with damping ratio below × 0.75, where 8 of 8 fall",
         ),
         (
             {"joint_rule": ["exact", "rigid", "rigid", "exact"], "dt": list("hhgh")},
             [False, True, False, False],
-            "all with joint rule 'rigid' and dt 'h', where 8 of 8 fall",
+            "all falls with joint rule 'rigid' and dt 'h', where 8 of 8 fall",
         ),
     ],
 )
@@ -174,7 +213,7 @@ def test_the_sentence_names_the_properties_that_separate_falls(columns, falls, w
     assert made_up(np.tile(falls, 8), **columns).sentence.split(": ")[1].split(";")[0] == where
 
 
-CHANCE = "no property separates them from the others by more than chance"
+CHANCE = "no property separates falls from the others by more than chance"
 
 
 @pytest.mark.parametrize(("falls", "chance"), [(4, True), (5, False)])
@@ -215,7 +254,7 @@ def test_a_rule_of_all_falls_separates_better_than_one_run():
     soft[40] = 0.4
     falls = np.isin(np.arange(250), (5, 23, 40, 61, 88))
     sentence = made_up(falls, k_s=soft, joint_rule=rule).sentence
-    assert "all with joint rule 'exact'" in sentence
+    assert "all falls with joint rule 'exact'" in sentence
 
 
 def test_without_a_difference_no_condition_is_named():
@@ -230,7 +269,7 @@ def test_the_table_counts_falls_by_value():
         "a: 1 of 2, b: 2 of 2",
         "0.5: 1 of 2, 2: 2 of 2",
     }
-    assert str(found) == f"{found.sentence}\n{found.table()}"
+    assert str(found) == f"{found.sentence}\n{found.displacements}\n{found.table()}"
     assert found.sentence in repr(found)
 
 

@@ -1,6 +1,6 @@
 """Head and conclusion of a report: who signs what, outcome with margin and range, doubts."""
 
-from collections import Counter
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from hashlib import sha256
@@ -14,11 +14,13 @@ from archfem.cases import result_text
 from archfem.cases.case import REPORT_KEYS
 from archfem.cases.report.report_data import SHOWN_RESULTS, ReportData
 from archfem.cases.result_text import RESULTS, Row
-from archfem.dynamics.collapse_state import CollapseState
+from archfem.dynamics.collapse_state import COLLAPSE_STATES, FALLEN_STATES, CollapseState
 from archfem.dynamics.history import History
 from archfem.dynamics.verdict import NO_RANGE
+from archfem.dynamics.verdict_range import VerdictRange
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
-from archfem.masonry.structure import join_names
+from archfem.masonry.structure import join_names, join_words
+from archfem.models.model import Doubt
 from archfem.units import STANDARD_GRAVITY, format_mm
 from archfem.view.pages.document import Grid, Section, TextBlock
 
@@ -46,6 +48,15 @@ MAX_RATIO_OF_PEAKS = 1.25
 
 # Doubts of a result that the conclusion states; the others stand with the result
 MAX_DOUBTS = 3
+
+# Displacements of a run and of the unvaried one of its variations differ by chance up to here [-]
+MAX_RATIO_OF_DISPLACEMENTS = 1.5
+
+# Doubts that outweigh others, the first most: a conclusion states these before others
+_WEIGHTY = ("as rigid blocks none falls", "fall", "displace")
+
+# Numbers of a doubt that differ from run to run: names of joints end in whole ones
+_NUMBER = re.compile(r"(\d+\.\d+(?:e[-+]?\d+)?|\d+(?= (?:mm|m|ms|s|g|%)\b)|\d+(?=%))")
 
 # Results of runs: histories, and their variations
 _HISTORIES, _VARIATIONS = "time histories", "variations"
@@ -148,7 +159,8 @@ def build_conclusion(data: ReportData) -> Section:
     texts = filter(None, [lead, " ".join(_describe_ends(data))])
     blocks: list[Any] = [*map(TextBlock, texts)]
     for result in filter(doubts.get, doubtful):
-        shown = [sentence(text) for text in doubts[result][:MAX_DOUBTS]]
+        ordered = sorted(doubts[result], key=_weigh)
+        shown = [sentence(text) for text in ordered[:MAX_DOUBTS]]
         if more := len(doubts[result]) - len(shown):
             shown.append(f"{more} more stand{'s' * (more == 1)} with the result.")
         blocks.append(TextBlock(f"In doubt, {result}: {' '.join(shown)}", "doubt"))
@@ -193,6 +205,7 @@ def _build_lead(data: ReportData, rows: Sequence[Row], doubtful: Sequence[str]) 
         lead = [*stated[0]] if len(data.statements) == 1 and stated else [x for x, *_ in stated]
     if data.verdict_range is not None:
         lead.append(f"in variations of its properties it {data.verdict_range.sentence}")
+        lead += filter(None, [data.verdict_range.displacements])
     if fill := list_elastic_fill(data):
         carries = "is elastic in the runs and carries tension, which soil does not"
         lead.append(f"{join_names(fill)} {carries}")
@@ -201,8 +214,7 @@ def _build_lead(data: ReportData, rows: Sequence[Row], doubtful: Sequence[str]) 
         lead.append("the checks of the numbers raise no doubt")
     lead += [f"the doubts below, on {join_names(doubtful)}, may change this"] if doubtful else []
     if single := list_unvaried(data):
-        listed = " and ".join(filter(None, [", ".join(single[:-1]), single[-1]]))
-        lead.append(f"{listed} were not varied")
+        lead.append(f"{join_words(single)} {'were' if single[1:] else 'was'} not varied")
     if demand := data.case.report.get("demand"):
         lead[:1] = [f"for {demand}: {lead[0]}"] if lead else [f"the demand, as stated: {demand}"]
     return lead
@@ -220,9 +232,12 @@ def _describe_margin(data: ReportData, rows: Sequence[Row]) -> Iterator[str]:
         if name == RESULTS["scale"]:
             met = "forms a mechanism" if "mechanism" in outcome else "falls"
             words = f"{factor} on {demand}{fails}: up to there it {met} in no run"
+            if parted := re.search(r"dislocated.*?([\d.]+ ×)", outcome):
+                words += f", and is dislocated from {parted[1]} on"
             others.append((least, words))
         elif name == RESULTS["limit"] and demand.startswith("the site"):
-            others.append((least, f"{factor}{over}, for a push by {demand} to begin to move it"))
+            words = f"{factor}{over}, for a push by {demand} to begin to move it"
+            others.append((least, words + _say_motion(data)))
         elif check:
             _, only, assumed = outcome.partition(" only with ")
             only = f", passed only with {assumed}" if only else fails
@@ -230,7 +245,15 @@ def _describe_margin(data: ReportData, rows: Sequence[Row]) -> Iterator[str]:
             words = f"{ratios}{over}{''.join(bodies)}, on {name_spectrum(data)}, by {check}{only}"
             checks.append((least, words))
     for k, (_, words) in enumerate(sorted([*others, *sorted(checks)[:1]])):
-        yield f"the {'next' if k else 'least'} margin is {words}"
+        yield f"{('the least margin is', 'the next is', 'then follows')[min(k, 2)]} {words}"
+
+
+def _say_motion(data: ReportData) -> str:
+    """Say that a structure that begins to move in a run does not fall; empty if neither is so."""
+    verdicts = [run.verdict for run in data.runs.values()]
+    moves = any(verdict.mechanisms.get("verified") for verdict in verdicts)
+    held = all(verdict.outcome in COLLAPSE_STATES[:2] for verdict in verdicts)
+    return "; in the runs it begins to move, and falls in none" if moves and held else ""
 
 
 def name_spectrum(data: ReportData) -> str:
@@ -276,7 +299,8 @@ def _capacity_rows(data: ReportData) -> Iterator[tuple[str, Row]]:
     if (computed := data.verdict_range) is not None:
         motion = computed.dataset.attrs.get("motion")
         name = f"{_VARIATIONS} under '{motion}'" if motion else _VARIATIONS
-        yield _VARIATIONS, (name, "the same motion", computed.count + computed.unanswered, "-")
+        outcome = "; ".join(filter(None, [computed.count, computed.displacements]))
+        yield _VARIATIONS, (name, "the same motion", outcome + computed.unanswered, "-")
     for result, statement in data.statements.items():
         of = f" of {name_spectrum(data)}" if result == "assessment" else ""
         for name, demand, *others in statement.rows:
@@ -336,11 +360,9 @@ def list_varied(data: ReportData) -> tuple[str, ...]:
 def list_doubts(data: ReportData) -> list[tuple[str, str]]:
     """Return each result in doubt with its doubt, once; of runs with the number that have it."""
     verdicts = [run.verdict for run in data.runs.values()]
-    reasons = Counter(doubt.cause for verdict in verdicts for doubt in verdict.doubts)
-    count = len(verdicts)
-    of_runs = [f"{n} of {count} runs: {text}" if count > 1 else text for text, n in reasons.items()]
-    doubts = [(_HISTORIES, text) for text in of_runs]
+    doubts = [(_HISTORIES, text) for text in _merge_doubts([v.doubts for v in verdicts])]
     if data.verdict_range is not None:
+        doubts += [(_VARIATIONS, text) for text in _doubt_displacement(data, data.verdict_range)]
         doubts += [(_VARIATIONS, doubt.cause) for doubt in data.verdict_range.doubts]
         if fill := list_elastic_fill(data):
             text = (
@@ -350,6 +372,51 @@ def list_doubts(data: ReportData) -> list[tuple[str, str]]:
     for name, stated in data.statements.items():
         doubts += [(RESULTS[name], doubt) for doubt in stated.doubts]
     return list(dict.fromkeys(doubts))
+
+
+def _merge_doubts(runs: Sequence[Iterable[Doubt]]) -> Iterator[str]:
+    """Yield each doubt of some runs once, with how many have it, and numbers that differ as ranges.
+
+    A doubt of one run alone is as it is.
+    """
+    found: dict[tuple[str, ...], list[list[str]]] = {}
+    for cause in (cause for doubts in runs for cause in dict.fromkeys(x.cause for x in doubts)):
+        texts = _NUMBER.split(cause)
+        found.setdefault(tuple(texts[::2]), []).append(texts[1::2])
+    for (first, *texts), rows in found.items():
+        columns = [sorted(set(column), key=float) for column in zip(*rows, strict=True)]
+        ranges = (f"{column[0]} to {column[-1]}" if column[1:] else column[0] for column in columns)
+        merged = first + "".join(map("".join, zip(ranges, texts, strict=True)))
+        yield f"{len(rows)} of {len(runs)} runs: {merged}" if len(runs) > 1 else merged
+
+
+def _weigh(doubt: str) -> int:
+    """Return the place of a doubt among others, by its words."""
+    return next((k for k, words in enumerate(_WEIGHTY) if words in doubt), len(_WEIGHTY))
+
+
+def _doubt_displacement(data: ReportData, found: VerdictRange) -> Iterator[str]:
+    """Yield how the unvaried run of the variations differs from the run under that motion."""
+    motion, base = found.dataset.attrs.get("motion"), found.dataset.isel(run=0)
+    if not motion or base["sampled"] or base["error"].item():
+        return
+    for run in data.runs.values():
+        verdict = run.verdict
+        if run.dataset.attrs.get("motion") != motion or verdict.outcome not in COLLAPSE_STATES:
+            continue
+        sizes = verdict.displacement, float(base["displacement"])
+        fallen = [each in FALLEN_STATES for each in (verdict.outcome, base["outcome"].item())]
+        own, other = (
+            "fallen" if falls else f"displaced by up to {format_mm(size)}"
+            for falls, size in zip(fallen, sizes, strict=True)
+        )
+        if fallen[0] != fallen[1] or (
+            not fallen[0] and max(sizes) > MAX_RATIO_OF_DISPLACEMENTS * min(sizes)
+        ):
+            yield (
+                f"the run under '{motion}' is {own}, the unvaried one of its variations, of "
+                f"other time steps or another fidelity, {other}"
+            )
 
 
 def list_notes(data: ReportData) -> dict[str, list[str]]:
@@ -380,7 +447,13 @@ def list_unvaried(data: ReportData) -> list[str]:
     if not data.runs:
         return []
     single = ["motion"] if len(data.runs) == 1 else []
-    single += ["lengths"] if data.verdict_range else ["lengths", "stiffness", "friction", "damping"]
+    if data.verdict_range is None:
+        single += ["lengths", "stiffness", "friction", "damping"]
+    else:
+        single.append("lengths")
+        motion = data.verdict_range.dataset.attrs.get("motion", "")
+        others = f"displacements under other motions than '{motion}'"
+        single += [others] if motion and len(data.runs) > 1 else []
     single += ["stiffness and strength of the fill"] if list_elastic_fill(data) else []
     # the samples of a rate were scaled until they fell
     single += [] if {"scale", "risk"} & data.statements.keys() else ["size of the motions"]

@@ -398,7 +398,8 @@ def _build_range(data: ReportData) -> list[Any]:
     )
     blocks, found = data.read_result("verdict_range", caption, table=table), data.verdict_range
     if found is not None and not found.falls.any():
-        words = f"{found.sentence}; varied: {', '.join(found.properties)}"
+        told = filter(None, [found.sentence, found.displacements])
+        words = f"{'; '.join(told)}; varied: {', '.join(found.properties)}"
         return [TextBlock(sentence(words.replace("_", " "))), *blocks[1:]]
     return blocks
 
