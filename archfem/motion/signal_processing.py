@@ -34,9 +34,13 @@ def validate_samples(samples: Array | None, component: str) -> Array:
         row = np.array(samples, dtype=float)
     except (TypeError, ValueError, OverflowError) as error:
         raise InvalidInput(f"{component} acceleration is not a row of numbers: {error}") from error
-    if row.ndim != 1 or row.size == 0 or not np.all(np.isfinite(row)):
+    remedy = "give one row of finite numbers"
+    if row.ndim != 1 or row.size == 0:
+        raise InvalidInput(f"{component} acceleration of shape {row.shape}: {remedy}")
+    if len(bad := np.flatnonzero(~np.isfinite(row))):
         raise InvalidInput(
-            f"{component} acceleration of shape {row.shape}: expected one row of finite numbers"
+            f"{component} acceleration has {len(bad)} of {row.size} samples that are not finite, "
+            f"the first {row[bad[0]]} in place {bad[0]}: {remedy}"
         )
     peak = np.abs(row).max()
     if peak > MAX_PEAK_ACCELERATION:

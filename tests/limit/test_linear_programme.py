@@ -129,8 +129,9 @@ def test_the_strength_of_a_material_is_that_of_its_stones_and_no_default_is():
     brittle = ring(material=replace(weak, strength=0.1 * af.units.MPa))
     assert not af.stands(brittle)
     assert af.stands(brittle, strength=np.inf)
-    with pytest.raises(af.InvalidInput, match="is not above 0: leave it out for no limit"):
-        af.collapse_factor(stones, live=SIDEWAYS, strength=-1.0)
+    for wrong in (-1.0, 0.0, 5.0):  # the last in MPa
+        with pytest.raises(af.InvalidInput, match=f"{wrong} is not above 1000: give it in Pa"):
+            af.collapse_factor(stones, live=SIDEWAYS, strength=wrong)
 
 
 def test_strong_joints_respect_the_stress_block():
