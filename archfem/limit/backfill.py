@@ -576,8 +576,8 @@ def check_options(structure: Structure, friction: str | None, strength: float | 
         own = {block.material.strength for block in stones} - {None, STONE.strength}
         return min(filter(None, own), default=np.inf)
     if strength != np.inf:
-        remedy = "give it in Pa, 5 MPa is 5e6; or leave it out for that of the materials"
-        check_between(strength, "strength [Pa]", 1e3, ends="[)", remedy=remedy)
+        check_between(strength, "strength [Pa]", 0.0, remedy="leave it out for no limit")
+        check_number(strength, "strength [Pa], of which 5 MPa are 5e6,", minimum=1e3)
     return strength
 
 

@@ -129,8 +129,11 @@ def test_the_strength_of_a_material_is_that_of_its_stones_and_no_default_is():
     brittle = ring(material=replace(weak, strength=0.1 * af.units.MPa))
     assert not af.stands(brittle)
     assert af.stands(brittle, strength=np.inf)
-    for wrong in (-1.0, 0.0, 5.0):  # the last in MPa
-        with pytest.raises(af.InvalidInput, match=f"{wrong} is not above 1000: give it in Pa"):
+    for wrong, says in (
+        (-1.0, "is not above 0: leave it out for no limit"),
+        (5.0, r"strength \[Pa\], of which 5 MPa are 5e6, = 5.0 is below 1000"),
+    ):
+        with pytest.raises(af.InvalidInput, match=says):
             af.collapse_factor(stones, live=SIDEWAYS, strength=wrong)
 
 
