@@ -65,6 +65,11 @@ MADE = [
         "seed of a synthetic motion = 1.5 is not a whole number",
     ),
     (lambda: af.Motion(np.zeros(5), 1e-300), "dt 1e-300 s"),
+    (lambda: af.Motion([[1.0, 2.0], [3.0]], 0.01), "is not a row of numbers: setting an array"),
+    (
+        lambda: af.dead_load(af.Analysis(RING), stages=af.masonry.usual_stages(RING)),
+        "an analysis has newton and stages of its own: change them there",
+    ),
     (
         lambda: af.Motion([0.0, 1.0, np.nan], 0.01),
         "1 of 3 samples .* the first nan in place 2: give",
