@@ -126,6 +126,8 @@ def atomic_write(path: Path, *, flush: bool = True) -> Iterator[Path]:
     failure of the machine within seconds may damage the file.
     """
     _refuse_null(path)
+    if not path.name:
+        raise InvalidInput(f"{path} is a folder: name a file in it")
     begin, end = f".{path.stem}.{platform.node()}.", f".part{path.suffix}"
     draft = path.with_name(f"{begin}{os.getpid()}{end}")
     try:

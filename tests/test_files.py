@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 from contextlib import nullcontext
+from pathlib import Path
 
 import pytest
 
@@ -36,6 +37,14 @@ def test_an_interrupted_write_leaves_the_old_file(tmp_path):
         broken_off()
     assert path.read_text() == "old"
     assert list(tmp_path.iterdir()) == [path]
+
+
+def test_the_current_folder_is_no_file_to_write():
+    with (
+        pytest.raises(af.InvalidInput, match=r"\. is a folder: name a file in it"),
+        _files.atomic_write(Path()),
+    ):
+        pass
 
 
 @pytest.fixture

@@ -65,6 +65,22 @@ MADE = [
         "seed of a synthetic motion = 1.5 is not a whole number",
     ),
     (lambda: af.Motion(np.zeros(5), 1e-300), "dt 1e-300 s"),
+    (lambda: af.Motion([[1.0, 2.0], [3.0]], 0.01), "is not a row of numbers: setting an array"),
+    (
+        lambda: af.dead_load(af.Analysis(RING), stages=af.masonry.usual_stages(RING)),
+        "an analysis has newton and stages of its own: change them there",
+    ),
+    (
+        lambda: af.Motion([0.0, 1.0, np.nan], 0.01),
+        "1 of 3 samples .* the first nan in place 2: give",
+    ),
+    (
+        lambda: af.Analysis(RING, fidelity="rigid").run(af.Motion([1.0], 0.01)),
+        "motion '' is one sample, .*: give two or more",
+    ),
+    (lambda: af.Contact(1e9, 1e9, closure=0.05), "between 1e-07 and 0.02: give the .* in m"),
+    (lambda: af.masonry.fit_closing([1e5, 5e5, 1e6], [0.015, 0.05, 0.075]), "limit of 0.132 m"),
+    (lambda: af.moving_load(RING, 1e5, area_load=9.0), "area_load 9 Pa looks like kPa"),
     (lambda: af.Motion(MASKED, 0.01), "horizontal acceleration has 1 values masked: fill them in"),
     (lambda: af.response_spectrum(QUAKE, MASKED), r"periods \[s\] has 1 values masked"),
     (

@@ -38,7 +38,11 @@ def select(options: argparse.Namespace) -> None:
     from archfem.cases.toml_file import parse_tables
     from archfem.motion.record_selection import select_records
 
-    target = parse_tables(f"target = {options.spectrum}")["target"]
+    try:
+        target = parse_tables(f"target = {options.spectrum}")["target"]
+    except InvalidInput as error:
+        error.args = (f"--spectrum {options.spectrum} is no table of TOML: {error}",)
+        raise
     spectrum = build_spectrum(target, "--spectrum")
     names = ("count", "rule", "scales", "measure")
     settings = {name: getattr(options, name) for name in names}

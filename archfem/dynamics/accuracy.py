@@ -188,7 +188,7 @@ def candidate_settings(
 def time_run(model: Model, motion: Motion, dt: float, **options: Any) -> TimedRun:
     """Run a model and measure the processor time; options are those of `time_history`."""
     # two steps beforehand, so that compilation is not measured
-    time_history(model, motion.cut(0.0, 2.0 * dt), dt=dt, **options)
+    time_history(model, motion.cut(0.0, max(2.0 * dt, motion.dt)), dt=dt, **options)
     begin = process_time()
     try:
         run = time_history(model, motion, dt=dt, **options)

@@ -230,7 +230,7 @@ def _try_settings(
         window, viscous, share = excitation
         if trials and trials[0].run.peaks is not None:
             parts = error_estimation.parts_about_peaks(trials[0].run)
-            window = window.cut(0.0, min(parts[-1][1], window.duration))
+            window = window.cut(0.0, min(max(parts[-1][1], window.dt), window.duration))
         run = error_estimation.run_peaks(model, window, viscous, step, parts if same else None)
         trials.append(_Trial(discretisation, step, model, run, share))
         runs = [trial.run for trial in trials]

@@ -308,8 +308,9 @@ def admissible_range(between: Sequence[float], motion: Motion) -> tuple[float, f
     """Return a range of scales cut off at the scale at which a motion has a peak of 5 g."""
     smallest, largest = between
     peak = max(float(np.abs(motion.component(name)).max()) for name in motion.components)
-    allowed = MAX_PEAK_ACCELERATION / peak if peak > 0.0 else inf
-    return smallest, max(smallest, min(largest, allowed))
+    if peak == 0.0:
+        raise InvalidInput(f"motion '{motion.name}' is at rest: no factor on it moves anything")
+    return smallest, max(smallest, min(largest, MAX_PEAK_ACCELERATION / peak))
 
 
 def search_scales(

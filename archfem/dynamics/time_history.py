@@ -113,7 +113,7 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
         InvalidInput: an argument is out of range, or run and event have different criteria.
         DidNotConverge: a step failed; `history` is the record up to it, `last` the state.
     """
-    check_type(motion, Motion, "motion", "give a Motion, e.g. Motion.read(path)")
+    _check_motion(motion)
     _check_types(start=start, scheme=scheme, record=record, criteria=criteria, newton=newton)
     assert not isinstance(model, Analysis)  # by the decorator
     check_model(model)
@@ -230,6 +230,14 @@ def _resolve_steps(
     if dt is None and model.prediction:
         return model.prediction.dt, default
     return None if dt is None else check_time_step(dt), default
+
+
+def _check_motion(motion: Motion) -> None:
+    """Refuse all but a motion that lasts."""
+    check_type(motion, Motion, "motion", "give a Motion, e.g. Motion.read(path)")
+    if motion.duration == 0.0:
+        words = f"motion '{motion.name}' is one sample, of which no history can be computed"
+        raise InvalidInput(f"{words}: give two or more, or add rest by .with_rest(…)")
 
 
 def _check_types(**arguments: Any) -> None:

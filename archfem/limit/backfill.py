@@ -577,6 +577,7 @@ def check_options(structure: Structure, friction: str | None, strength: float | 
         return min(filter(None, own), default=np.inf)
     if strength != np.inf:
         check_between(strength, "strength [Pa]", 0.0, remedy="leave it out for no limit")
+        check_number(strength, "strength [Pa], of which 5 MPa are 5e6,", minimum=1e3)
     return strength
 
 

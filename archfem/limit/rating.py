@@ -29,6 +29,7 @@ from archfem.limit.vehicles import (
     MovingLoad,
     Vehicle,
     axles_on_structure,
+    check_area_load,
     check_factor,
     collapse_factors,
     cut_road,
@@ -464,7 +465,7 @@ def rate(  # noqa: PLR0913  (factors of the check, and the strength of the bridg
     check_factor(dead, "dead, factor on the weights")
     rule = driven.spread_over(structure)
     width = rule if width is None else width
-    area_load = driven.area_load if area_load is None else area_load
+    area_load = driven.area_load if area_load is None else check_area_load(area_load)
     _check_width(width, structure)
     weighted, rows = _scale_weights(structure, dead), driven.factored(live, impact)
     strength, fill = check_options(structure, friction, strength), place_backing(fill, structure)

@@ -25,6 +25,9 @@ from archfem.masonry.structure import HasStructure, Structure, structure_of
 
 DRIVING_DIRECTIONS = ("right", "left")
 
+# Least load on a road [Pa], below which it is in kPa
+MIN_AREA_LOAD = 100.0
+
 
 # Axles that stand on the structure, from left to right, or these and a distributed load
 AxleRow = tuple[PointLoad, ...]
@@ -79,7 +82,7 @@ class Vehicle:
             check_number(getattr(self, key), f"{key} of {self.name}", minimum=0.0)
         longest = max(self.spacings, default=0.0)
         light = min(self.axles) < 1e3 and max(self.axles) != 1.0  # the factor of 1 N is a load
-        if light or longest > 100.0 or 0.0 < self.area_load < 100.0:
+        if light or longest > 100.0 or 0.0 < self.area_load < MIN_AREA_LOAD:
             raise InvalidInput(
                 f"vehicle '{self.name}' has axles of {self.axles} N, spacings of {self.spacings} m "
                 f"and {self.area_load} Pa: that can only be a wrong unit"
@@ -240,7 +243,7 @@ def moving_load(
         )
     options: dict[str, Any] = {"friction": friction, "strength": strength, "fill": fill}
     distinct = tuple(dict.fromkeys((*rows[0], *rows[1])))
-    strips = cut_road(structure, check_number(area_load, "area_load [Pa]", minimum=0.0))
+    strips = cut_road(structure, check_area_load(area_load))
     laid, factor_of, bounds = _solve_rows(structure, distinct, strips, options)
     factors = np.array([[factor_of[row] for row in rows_one_way] for rows_one_way in rows])
     direction, place = _find_worst(factors, on_bridge)
@@ -317,6 +320,16 @@ def axles_on_structure(
         for x, weight in axles
         if any(np.ptp(np.sign(places - x)) > 0 for places in corners)
     )
+
+
+def check_area_load(area_load: float) -> float:
+    """Return a distributed load that can be in Pa, or refuse it."""
+    check_number(area_load, "area_load [Pa]", minimum=0.0)
+    if 0.0 < area_load < MIN_AREA_LOAD:
+        raise InvalidInput(
+            f"area_load {area_load:g} Pa looks like kPa: give it in Pa, 9 kPa is 9e3"
+        )
+    return area_load
 
 
 def cut_road(structure: Structure, area_load: float, count: int = 40) -> AxleRow:

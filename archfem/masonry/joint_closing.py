@@ -41,7 +41,7 @@ from archfem._validation import (
     validate_methods,
 )
 from archfem.errors import InvalidInput
-from archfem.masonry.materials import Contact, Material
+from archfem.masonry.materials import MAX_CLOSURE, Contact, Material
 from archfem.masonry.structure import Joint, Structure, join_names
 from archfem.units import GPa, MPa, mm
 
@@ -472,6 +472,10 @@ def fit_closing(
         )
     stiffness = float(start**2 if name == "tangents" else start)
     closure = float(1.0 / (start * slope) if name == "tangents" else 1.0 / slope)
+    if name == "closings" and closure > MAX_CLOSURE:
+        raise InvalidInput(
+            f"closings have a limit of {closure:.3g} m: give them in m, stress in Pa"
+        )
     ratio = rows @ (start, slope)
     if name != "secants":
         ratio = 1.0 / ratio if name == "closings" else ratio**2

@@ -17,6 +17,9 @@ from archfem._validation import check_between, check_number, check_words, is_one
 from archfem.errors import InvalidInput
 from archfem.units import G, GPa, MPa, kN
 
+# Largest closing of a joint [m]: those measured are below 1 mm, so that more is in millimetres
+MAX_CLOSURE = 0.02
+
 
 def _check_range(item: Any, key: str, low: float, high: float, remedy: str) -> None:
     """Check that a field is a number between two values."""
@@ -158,7 +161,7 @@ class Contact:
         _check_range(self, "tension", 0.0, apex, remedy)
         if self.closure is not None:
             remedy = "give the largest closing in m, e.g. 0.1e-3, or None for a linear joint"
-            _check_range(self, "closure", 1e-7, 1.0, remedy)
+            _check_range(self, "closure", 1e-7, MAX_CLOSURE, remedy)
             if self.tension > 0.0:
                 raise InvalidInput(
                     f"tension {self.tension:.3g} Pa of '{self.name}' beside a closure: a bonded "

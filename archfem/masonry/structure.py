@@ -205,7 +205,10 @@ class Structure(ResultDisplay):
         check_fields(self)
         object.__setattr__(self, "blocks", assign_roles(self.blocks, self.joints))
         object.__setattr__(self, "joints", assign_roles(self.joints, self.blocks))
-        check_between(self.width, "width [m]", 1e-3, 1e4, ends="[)", error=InvalidStructure)
+        remedy = "give metres; a longer vault is computed by a strip of 1 m"
+        check_between(
+            self.width, "width [m]", 1e-3, 300.0, ends="[)", remedy=remedy, error=InvalidStructure
+        )
         check_between(self.gravity, "gravity [m/s²]", 0.1, 1e3, ends="[)", error=InvalidStructure)
         for kind, things in (("block", self.blocks), ("joint", self.joints)):
             counts = Counter(thing.name for thing in things)

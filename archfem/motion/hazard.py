@@ -110,7 +110,9 @@ class Hazard:
             options: `measure`, `period` and `source`.
         """
         if not (factor > 0.0 and exponent > 0.0):
-            raise InvalidInput(f"hazard {factor} · a^-{exponent}: give two numbers above 0")
+            raise InvalidInput(
+                f"hazard with factor {factor} and exponent {exponent}: give two numbers above 0"
+            )
         periods = np.array([DESIGN_PERIOD, LONGEST_PERIOD])
         with np.errstate(over="ignore"):  # an infinite intensity is refused
             points = (factor * periods) ** (1.0 / exponent)

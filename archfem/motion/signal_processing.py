@@ -28,15 +28,20 @@ MAX_SAMPLES = 10_000_000
 def validate_samples(samples: Array | None, component: str) -> Array:
     """Copy a component into a read-only array of finite numbers below 5 g."""
     check_unmasked(samples, f"{component} acceleration")
-    if np.iscomplexobj(np.asarray(samples)):  # a conversion would drop the imaginary part
-        raise InvalidInput(f"{component} acceleration is complex: give its real samples")
     try:
-        row = np.array(samples, dtype=float)
+        is_complex = np.iscomplexobj(np.asarray(samples))
+        row = np.array([] if is_complex else samples, dtype=float)
     except (TypeError, ValueError, OverflowError) as error:
         raise InvalidInput(f"{component} acceleration is not a row of numbers: {error}") from error
-    if row.ndim != 1 or row.size == 0 or not np.all(np.isfinite(row)):
+    if is_complex:  # a conversion would drop the imaginary part
+        raise InvalidInput(f"{component} acceleration is complex: give its real samples")
+    remedy = "give one row of finite numbers"
+    if row.ndim != 1 or row.size == 0:
+        raise InvalidInput(f"{component} acceleration of shape {row.shape}: {remedy}")
+    if len(bad := np.flatnonzero(~np.isfinite(row))):
         raise InvalidInput(
-            f"{component} acceleration of shape {row.shape}: expected one row of finite numbers"
+            f"{component} acceleration has {len(bad)} of {row.size} samples that are not finite, "
+            f"the first {row[bad[0]]} in place {bad[0]}: {remedy}"
         )
     peak = np.abs(row).max()
     if peak > MAX_PEAK_ACCELERATION:

@@ -207,6 +207,8 @@ def dead_load(
         [28800.0, 14400.0]
     """
     if isinstance(model, Subject):
+        if newton is not None or stages is not None:
+            raise InvalidInput("an analysis has newton and stages of its own: change them there")
         return model.dead_load()
     check_model(model)
     if stages is None:

@@ -505,7 +505,7 @@ def test_collapse_is_not_sought_beyond_five_g(between, limits, monkeypatch):
 
 
 def test_motions_are_scaled_to_five_g_at_most_by_their_strongest_component():
-    """However weak they are; one that is none may be multiplied by anything."""
+    """However weak they are; one that is none is refused."""
     weak, strong = np.array([0.0, 0.01, -0.02]), np.array([0.0, 0.03, -0.05])
     five_g, between = 5.0 * 9.80665, (0.1, inf)
     allowed = pytest.approx((0.1, five_g / 0.02))
@@ -513,4 +513,5 @@ def test_motions_are_scaled_to_five_g_at_most_by_their_strongest_component():
     for others in ({"vertical": strong}, {"transverse": strong}):
         allowed = pytest.approx((0.1, five_g / 0.05))
         assert admissible_range(between, af.Motion(weak, 0.01, **others)) == allowed
-    assert admissible_range(between, af.Motion(0.0 * weak, 0.01)) == between
+    with pytest.raises(af.InvalidInput, match="motion 'still' is at rest: no factor on it moves"):
+        admissible_range(between, af.Motion(0.0 * weak, 0.01, name="still"))

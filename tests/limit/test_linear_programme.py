@@ -129,8 +129,12 @@ def test_the_strength_of_a_material_is_that_of_its_stones_and_no_default_is():
     brittle = ring(material=replace(weak, strength=0.1 * af.units.MPa))
     assert not af.stands(brittle)
     assert af.stands(brittle, strength=np.inf)
-    with pytest.raises(af.InvalidInput, match="is not above 0: leave it out for no limit"):
-        af.collapse_factor(stones, live=SIDEWAYS, strength=-1.0)
+    for wrong, says in (
+        (-1.0, "is not above 0: leave it out for no limit"),
+        (5.0, r"strength \[Pa\], of which 5 MPa are 5e6, = 5.0 is below 1000"),
+    ):
+        with pytest.raises(af.InvalidInput, match=says):
+            af.collapse_factor(stones, live=SIDEWAYS, strength=wrong)
 
 
 def test_strong_joints_respect_the_stress_block():

@@ -264,6 +264,8 @@ def test_invalid_analyses_are_refused(small_ring):
     with pytest.raises(af.InvalidInput, match="a motion is a int"):
         ida(small_ring, [3])
     found = ida(small_ring, made(1), limits=["collapse"], workers=1)
+    words = "1 without an answer, as InvalidInput: limit state 'collapse' cannot be met: collapse "
+    assert f"{words}needs displacements = 'large'" in str(found)
     assert "collapse needs displacements = 'large'" in found.table["error"].item()
 
 

@@ -188,7 +188,7 @@ class Backfill:
 
     def __post_init__(self) -> None:
         """Check the lengths."""
-        _check_lengths(self, "cover", "erosion", "hump", "spandrels", zero=True)
+        _check_lengths(self, "cover", "erosion", "hump", "spandrels", zero=True, high=100.0)
 
     def surface(self, left: float, right: float, crown: Point) -> list[Point]:
         """Return points of the surface, from left to right [m].
@@ -244,8 +244,8 @@ class Paving:
         _check_lengths(self, "thickness", "length")
 
 
-def _check_lengths(part: Any, *keys: str, zero: bool = False) -> None:
-    """Check that lengths are positive, or also zero, and below 1000 m."""
+def _check_lengths(part: Any, *keys: str, zero: bool = False, high: float = 1e3) -> None:
+    """Check that lengths are positive, or also zero, and below a limit [m]."""
     options: Any = {"ends": "[)" if zero else "()", "error": InvalidStructure}
-    for key in keys:  # more than a kilometre is a mistake of units
-        check_between(getattr(part, key), f"'{part.name}': {key} [m]", 0.0, 1e3, **options)
+    for key in keys:  # more is a mistake of units
+        check_between(getattr(part, key), f"'{part.name}': {key} [m]", 0.0, high, **options)
