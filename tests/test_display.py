@@ -70,6 +70,7 @@ def one_of_each():
                     "pga": ("motion", [2.0]),
                     "verified": ("motion", [1.5]),
                     "verified, survives": ("motion", [1.0]),
+                    "error": ("motion", [""]),
                     "scale": (("motion", "entry"), [[1.0, 1.5]]),
                     "rotation": (("motion", "entry"), [[0.01, 0.02]]),
                 },
