@@ -116,6 +116,7 @@ def test_constant_steps_that_are_long_for_sliding_are_doubted():
     assert f"wrong by {1e3 * stated:.3g} mm" in doubt.cause
     remedy = 1e-3 * float(doubt.remedy.split("take ")[1].split(" ms")[0])
     assert remedy < 0.02
+    assert run.dataset.attrs["admissible_step"] == pytest.approx(remedy)
     assert f"--set analysis.dt={remedy:g}`" in doubt.remedy
     shorter, slip, _, _ = slid(block(0.1), motion, dt=0.8 * remedy)
     assert abs(slip - expected) < 0.05 * way
