@@ -558,13 +558,13 @@ def describe_margin(found: Iterable[KinematicAssessment]) -> str:
 
 def note_band(case: Case, found: Iterable[KinematicAssessment]) -> list[str]:
     """Return a note where motions are matched up to a shorter period than that of a check."""
-    longest = max((each.checks[-1].period for each in found), default=np.nan)
-    if not (case.suite or {}).get("matched", False) or not longest > DEFAULT_BAND[1]:
-        return []
     low, high = DEFAULT_BAND
+    longer = [each.checks[-1].period for each in found if each.checks[-1].period > high]
+    if not longer or not (case.suite or {}).get("matched", False):
+        return []
     return [
         f"{NOTE_MARK}the motions of the suite are matched from {low:g} to {high:g} s, and T = "
-        f"{longest:.2f} s is longer: there they may be weaker than the spectrum; judge their "
+        f"{max(longer):.2f} s is longer: there they may be weaker than the spectrum; judge their "
         "displacements by the figure of spectra"
     ]
 

@@ -149,19 +149,17 @@ def test_a_run_and_its_unvaried_variation_may_differ_by_half(case, found, says):
 
 def test_what_was_not_varied_names_displacements(case):
     """Of one motion of several, those under the others; without variations, all."""
-    one, both = ({name: verdict_of() for name in names} for names in (["a"], ["a", "b"]))
-    unvaried = "lengths and fidelity, size of motions"
-    for found, verdicts, says in (
-        (None, one, "the motion, properties and displacements, lengths, fidelity and time step"),
-        (range_of(0.1, motion="a"), one, f"the motion, {unvaried}"),
-        (
-            range_of(0.1, motion="a"),
-            both,
-            f"displacements under other motions than 'a', {unvaried}",
-        ),
+    none, range_ = ", and displacements have no range", range_of(0.1, 0.1, motion="a")
+    for found, names, first, last in (
+        (None, "a", "Motion, lengths, stiffness,", f" not varied{none}."),
+        (range_, "a", "Motion, lengths, size of the motions", " not varied."),
+        (range_, "ab", "Lengths, displacements under other motions than 'a', size", " not varied."),
     ):
-        stated = ", ".join(conclusion.list_unvaried(data_of(case, found, **verdicts)))
-        assert stated.startswith(says)
+        data = data_of(case, found, **{name: verdict_of() for name in names})
+        lead = conclusion.build_conclusion(data).pieces[0].text
+        assert lead.partition("raise no doubt. ")[2].startswith(first)
+        assert lead.endswith(last)
+        assert (none in lead) == (found is None)
 
 
 @pytest.mark.parametrize(
@@ -171,7 +169,8 @@ def test_what_was_not_varied_names_displacements(case):
 def test_motions_matched_to_shorter_periods_than_that_of_a_check_are_noted(period, matched, noted):
     case = SimpleNamespace(suite={"matched": matched})
     found = SimpleNamespace(checks=[SimpleNamespace(period=3.0), SimpleNamespace(period=period)])
-    notes = result_text.note_band(case, [found])
+    still = SimpleNamespace(checks=[SimpleNamespace(period=np.nan)])
+    notes = result_text.note_band(case, [still, found])
     assert len(notes) == noted
     assert all(
         note.startswith("note: the motions of the suite are matched from 0.05 to 2 s, and T = 2.04")

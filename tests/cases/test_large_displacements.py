@@ -122,7 +122,10 @@ def test_a_range_in_the_folder_stands_in_place_of_what_a_run_cannot_know(held):
     data = ReportData(af.Case.of(tomllib.loads(CASE)), {"shake": held})
     without = sentences_of(data)
     varied = "motion, lengths, stiffness, friction, damping, size of the motions, time step"
-    assert f" M{varied[1:]} and fidelity were not varied." in without[0]
+    assert (
+        f" M{varied[1:]} and fidelity were not varied, and displacements have no range."
+        in without[0]
+    )
     data = ReportData(data.case, data.runs)
     vars(data)["verdict_range"] = af.dynamics.VerdictRange(xr.Dataset(rows, attrs=attrs))
     assert summarise_outcomes(data, [held]) == "stands; falls in 1 of 4 variations"

@@ -93,7 +93,9 @@ def test_a_suite_has_a_report_with_a_player_for_each_pair(kept, capsys):
     assert "The structure forms no mechanism under all 2 motions of PGA 0.05 g." in words
     assert "Measures of the motions as applied, at their own samples" in words
     assert "The checks of the numbers raise no doubt. Lengths, stiffness, friction" in words
-    assert ", damping, size of the motions, time step and fidelity were not varied." in words
+    assert (
+        ", damping, size of the motions, time step and fidelity were not varied, and displ" in words
+    )
     assert "another case" not in words
     case = af.Case.read(kept / "case.toml")
     assert sha256(case.text().encode()).hexdigest() in words
@@ -180,7 +182,7 @@ def test_demand_and_capacity_stand_beside_their_doubts(kept, undrawn):
         "0.05 g. The least margin is 0.5 (0.45 with one weight a body), on the spectrum of the "
         "motion, by a code, right and left, which it fails. The doubts below, on limit analysis, "
         "kinematic assessment, may change this. Lengths, stiffness, friction, damping, time step "
-        "and fidelity were not varied."
+        "and fidelity were not varied, and displacements have no range."
     )
     assert texts[1:] == [
         "In doubt, limit analysis: A made one.",
