@@ -61,6 +61,7 @@ def test_a_part_without_a_name_has_a_dash():
     structure = af.masonry.assembled(bare, stack.joints[0].contact)
     (row,) = sections._tabulate_parts(structure).rows
     assert row[:4] == ["–", "ring", "2", "1"]
+    assert row[-1] == "1"  # one depth is no range
     case = case_of(af.Analysis(structure, fidelity="rigid"))
     text, *_ = sections.build_structure_section(report_data.ReportData(case, {})).pieces
     # without the foundation, which does not move

@@ -59,6 +59,45 @@ def test_names_of_a_ring_are_legible(voussoirs):
     assert all(-91.0 <= (note.get_rotation() + 180.0) % 360.0 - 180.0 <= 91.0 for note in notes)
 
 
+# a ring without anything above it
+PIERS = af.Case.of(
+    {
+        "structure": {
+            "shape": "bridge",
+            "arches": {"arch": {"span": 4.0, "rise": 1.5, "thickness": 0.5, "voussoirs": 9}},
+        }
+    }
+).structure
+
+
+def test_long_names_are_numbered_and_the_name_of_a_ring_keeps_off_a_deck(bridge):
+    """Two posts and a lintel: names of both stones would be written over each other."""
+    rows = (("left upper drum", 0.0, 0.6, 0.0, 2.4), ("right upper drum", 2.2, 2.8, 0.0, 2.4))
+    rows += (("lintel", 0.0, 2.8, 2.4, 2.9), ("ground", -1.0, 3.8, -0.5, 0.0))
+    blocks = [
+        af.Block(
+            ((a, c), (b, c), (b, d), (a, d)),
+            *(af.STONE, name, name == "ground"),
+            part=name,
+            role="ring" if name == "lintel" else "other" if name == "ground" else "pier",
+        )
+        for name, a, b, c, d in rows
+    ]
+    portal = af.masonry.assembled(blocks, af.Contact(1.48e9, 0.3e9, friction=0.6))
+    figure = draw_names(portal)
+    words = [word for word, _ in written(figure)]
+    assert {"0", "1"} <= set(words)
+    assert not any("to lintel" in word for word in words)
+    note = " ".join(figure.get_suptitle().split())
+    assert "lintel: 0 left upper drum to lintel, 1 right upper drum to lintel" in note
+    names = {word: note.xy[1] for word, note in written(draw_names(bridge))}
+    for ring in {block.part for block in bridge.blocks if block.role == "ring"}:
+        ends = [y for joint in bridge.joints if joint.part == ring for _, y in joint.ends]
+        assert names[ring] < min(ends) + 0.02
+    names = {word: note.xy[1] for word, note in written(draw_names(PIERS))}
+    assert names["arch"] > max(joint.ends[0][1] for joint in PIERS.joints)
+
+
 def bonded(courses=6):
     """A wall in running bond, whose joints are named after both stones."""
     blocks = [

@@ -4,6 +4,7 @@ import re
 from base64 import b64decode
 from pathlib import Path
 
+import pytest
 from matplotlib.figure import Figure
 from pages import read_page
 
@@ -36,18 +37,6 @@ def test_figures_have_no_room_around_their_drawings():
     assert 2.0 < FigureBlock.of(figure, "").inches < 2.2
 
 
-def test_a_short_text_stays_with_its_figure():
-    """And a long one leaves it the next page, for the room before both would be half a page."""
-    figure = FigureBlock.of(Figure(figsize=(2.0, 1.0)), "of it")
-    long = TextBlock("a line\n" * 13, "lines")
-    pieces = [TextBlock("one", "lines"), figure, long, figure, TextBlock("no figure", "lines")]
-    page = Document("", "", [], [Section("", pieces)]).page
-    kept = re.findall(r'<div class="kept">(.*?)</div>', page, re.DOTALL)
-    assert len(kept) == page.count('<div class="kept">') == 1
-    assert "one" in kept[0]
-    assert kept[0].count("<figure") == 1
-
-
 def test_no_letter_is_an_upright_rectangle():
     """Printers draw those at least a pixel wide: l and I looked smudged."""
     figure = Figure(figsize=(2.0, 1.0))
@@ -76,3 +65,12 @@ def test_text_contrasts_with_its_ground_in_both_colour_schemes():
             for ground in ("paper", "wash"):
                 low, high = sorted(luminance(colours[name]) for name in (text, ground))
                 assert (high + 0.05) / (low + 0.05) >= 4.5, (text, ground)
+
+
+@pytest.mark.parametrize(("lines", "kept"), [(4, 1), (40, 0)])
+def test_text_in_columns_breaks_anywhere(lines, kept):
+    """What looks like a table is kept whole, but not beside others in columns."""
+    table = "\n".join(["a  b"] * lines)
+    page = Document("", "", [], [Section("", [TextBlock(f"title\n\n{table}", "lines")])]).page
+    assert page.count('<span class="table">') == kept
+    assert page.count('<pre class="long">') == 1 - kept

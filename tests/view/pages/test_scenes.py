@@ -125,6 +125,7 @@ def test_without_displacements_blocks_stand_still(rocked):
     model, run = rocked
     data, found = arrays(Scene(model.structure, af.History(run.dataset.drop_vars("q"))))
     assert "contains no displacements" in data["note"]
+    assert "fields_every = 8 in [record] of its case records them." in data["note"]
     assert "frame_points" not in found
 
 
