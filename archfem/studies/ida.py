@@ -172,7 +172,8 @@ class Ida(ResultDisplay):
         for limit in self.limits:
             high = self.capacities(limit)[1]
             words.append(f"{limit} at {high.min():.3g} to {high.max():.3g} m/s²")
-        errors = [str(error) for error in self.table["error"].values if error]
+        found = self.table["error"].values if "error" in self.table else ()
+        errors = [str(error) for error in found if error]
         without = f"; {len(errors)} without an answer, as {errors[0]}" if errors else ""
         return f"Ida: {self.table.sizes['motion']} motions, by PGA: {', '.join(words)}{without}"
 
