@@ -42,7 +42,7 @@ from archfem.view.style import (
 )
 
 # Letters of a line in the corner of a pushover's picture
-MAX_LISTED_LETTERS = 40
+MAX_LISTED_LETTERS = 48
 
 
 @validate_arguments
