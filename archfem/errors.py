@@ -52,7 +52,7 @@ class DidNotConverge(ArchfemError):
     """No equilibrium was found; results up to that point are attached.
 
     Attributes:
-        last: the last equilibrium found (`Equilibrium` or `State`), or None.
+        last: the last equilibrium found (`Equilibrium` or `State`), frames of a fall, or None.
         history: the `History` up to that point, for a time history, or None.
     """
 

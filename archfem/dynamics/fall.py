@@ -89,7 +89,8 @@ def follow_fall(
     """Add the fall of loose or overturning blocks, and the state of collapse, to a history.
 
     The states are those at the start, from which displacements count, and at the end of the run.
-    Not whole, the fall ends with the first lost block, and is not compared with rigid blocks.
+    Not whole, the fall ends with the first lost block, and is not compared with rigid blocks. Where
+    the fall could not be followed to its end and no block was lost, there is no state of collapse.
     """
     (start, state), structure, ending = states, model.structure, history.ending
     rocking_ratio = damping.restitution if isinstance(damping, StiffnessDamping) else None
@@ -97,17 +98,19 @@ def follow_fall(
     tilts = ending is Ending.FINISHED and is_overturning(model, state)
     doubts: list[Doubt] = []
     if tilts or ending in (Ending.PARTED, Ending.MET):
-        try:
-            dataset, frames = simulate_fall(model, state, motion, rocking_ratio, whole)
-        except DidNotConverge as error:
-            error.history = history
-            raise
+        dataset, frames = simulate_fall(model, state, motion, rocking_ratio, whole)
         fall = classify_collapse(structure, frames, origin)
         until_lost = [each for each in frames if fall.time is None or each.time <= fall.time]
         dataset.attrs["fall_unsettled_early"] = until_lost[-1].settling.unsettled_share
         attrs = history.dataset.attrs | dataset.attrs
         history = replace(history, dataset=history.dataset.merge(dataset).assign_attrs(attrs))
         doubts += _doubt_fall(structure, dataset)
+        if failure := dataset.attrs["fall_failure"]:
+            cause = f"loose blocks were followed until {frames[-1].time:.2f} s alone, and what "
+            remedy = "compare with another dt, or with archfem.dynamics.RigidBlockSimulation"
+            doubts.append(Doubt(f"{cause}comes after is not known: {failure}", remedy))
+            if fall.time is None:
+                return history.with_doubts((*history.doubts, *doubts))
     else:
         frame = LooseBlocks(state.time, *model.rigid_motions(state.q, state.velocity))
         resting = is_resting(model, state, shaken=ending is not Ending.FINISHED)
@@ -129,7 +132,8 @@ def simulate_fall(
     """Follow loose blocks until they rest, or until 20 s after the motion has ended.
 
     Not whole, they are followed by one length of step until the first block is lost. The ratio is
-    that of `RigidBlockSimulation`.
+    that of `RigidBlockSimulation`. Where they cannot be followed to the end, the frames until then
+    are returned, and `fall_failure` has the reason.
     """
     released = release_blocks(model, state)
     end = max(motion.duration, state.time) + 20.0
@@ -139,19 +143,18 @@ def simulate_fall(
     # grains are many, and where each of them goes depends on the step anyhow
     dt = None if whole and loose.structure is structure else TRIED_STEPS[0]
     simulation = RigidBlockSimulation(loose.structure, dt=dt, rocking_ratio=rocking_ratio)
+    frames, failure = list[FallFrame](), ""
     try:
-        frames = []
         for each in simulation.frames(loose.start, end, motion, spacing=0.02):
             frame = loose.restore(each)
             frames.append(frame)
             if not whole and find_lost(frame.poses).any():
                 break
     except DidNotConverge as error:
-        raise DidNotConverge(
-            f"{error}; compare with another dt of time_history, or with "
-            "archfem.dynamics.RigidBlockSimulation from the start"
-        ) from error
-    return _fall_dataset(frames, motion, released), frames
+        failure = str(error)
+        frames = frames or [loose.restore(each) for each in error.last]
+    dataset = _fall_dataset(frames, motion, released)
+    return dataset.assign_attrs(fall_failure=failure), frames
 
 
 def _deformed_bodies(model: Model, state: State) -> dict[int, Field]:

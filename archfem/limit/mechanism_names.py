@@ -203,6 +203,8 @@ class NamedMotion:
         slip, reach = (np.hypot(*self.contacts[toe] - place) for place in places)
         # the slip of the toe over the motion of the centroid
         if slip > 0.33 * reach:
+            if is_low and len(self.moving) > 1 and not is_whole:
+                return f"toe wedge of {count(len(self.moving), 'stone')}, turning and sliding"
             return f"combined overturning and sliding of {subject}"
         about = f"about the toe of {self._label([mover])}"
         if is_low:

@@ -56,9 +56,9 @@ def draw_envelope(
     """Draw the least and largest eccentricity of each joint over runs, between the joint's faces.
 
     Each ring and pier has its own panel, with short names of its joints at the axis; piers of
-    structures that differ have the heights of their joints there, walls in bond those of beds.
-    Crosses above the upper face mark joints that opened at some time. Where runs have different
-    criteria, the least |e| of a hinge is shown.
+    structures that differ have the heights of their joints there. A wall in bond has one joint of
+    each bed, that of the largest |e|. Crosses above the upper face mark joints that opened at some
+    time. Where runs have different criteria, the least |e| of a hinge is shown.
 
     Args:
         runs: the label of each run, and the run, or runs under several motions, which share a
@@ -192,13 +192,20 @@ class PartPanel:
     axes: Axes
     part: str
     by_height: bool
-    is_wall: bool  # in bond, whose joints are sorted by beds
+    is_wall: bool  # in bond, which has a joint of each bed here
 
     def select(self, joints: xr.Dataset) -> tuple[Array, xr.Dataset]:
-        """Return the joints of the part, and their places along the axis (n,)."""
+        """Return the joints of the part, and their places along the axis (n,).
+
+        Of each bed of a wall it is the joint of the largest |e|: hundreds are unreadable.
+        """
         own = _joints_of_part(assessed_joints(joints), self.part)
         if self.is_wall:
-            own = own.isel(joint=np.argsort(own["height"].values.round(6), kind="stable"))
+            e = abs(own["eccentricity"])
+            e = (e.max("time") if "time" in e.dims else e).fillna(0.5)  # of an open joint
+            order = np.argsort(-e.values, kind="stable")
+            heights = own["height"].values.round(6)
+            own = own.isel(joint=order[np.unique(heights[order], return_index=True)[1]])
         places = own["height"].values if self.by_height else np.arange(own.sizes["joint"])
         return places.astype(float), own
 
@@ -243,11 +250,12 @@ def _make_panels(
     parts = sorted(names, key=lambda part: roles[part] != "ring")
     if axes is not None and len(parts) > 1:
         raise InvalidInput(f"parts {parts} do not fit one pair of axes: leave axes out")
-    sizes = {part: len(names[part]) for part in parts}
+    walls = {part: all(_is_wall(joints, part) for joints in every) for part in parts}
+    sizes = {part: 0 if walls[part] else len(names[part]) for part in parts}
     drawn = _lay_out_panels(sizes) if axes is None else {parts[0]: axes}
     hinge = min(Criteria.of(joints).hinge for joints in every)
     panels = [
-        PartPanel(each, part, _heights_differ(every, part), all(_is_wall(j, part) for j in every))
+        PartPanel(each, part, _heights_differ(every, part), walls[part])
         for part, each in drawn.items()
     ]
     for panel in panels:
@@ -259,7 +267,7 @@ def _make_panels(
         _label_places(panel, [short_name(name, part) for name in names[part]], every[0])
         if len(parts) > 1:
             own.set_title(part, fontsize=Size.LABEL, color=Colour.TEXT)
-            if not panel.by_height:
+            if not (panel.by_height or panel.is_wall):
                 own.set_xlim(-0.7, sizes[part] - 0.3)
     return panels
 
@@ -284,18 +292,11 @@ def _label_joints(axes: Axes, names: Sequence[str]) -> None:
     axes.xaxis.set_major_formatter(lambda place, _: labels.get(round(place, 6), ""))
 
 
-def _label_beds(axes: Axes, heights: Array, most: int = 12) -> None:
-    """Write the heights of the beds of a wall where each begins, as far as there is room."""
-    begins = np.flatnonzero(np.diff(heights, prepend=-np.inf) > 1e-6)
-    axes.set_xlabel("joints from bed to bed, by the height of the bed [m]")
-    for begin in begins[1:] if len(begins) < 40 else ():
-        axes.axvline(begin - 0.5, color=Colour.UNDEFORMED, lw=0.6, zorder=0)
-    # higher beds have fewer joints: labels at least a share of the axis apart
-    kept = [0]
-    for begin in begins:
-        if begin - kept[-1] >= len(heights) / most:
-            kept.append(int(begin))
-    axes.set_xticks(kept, [f"{heights[k]:.3g}" for k in kept])
+def _label_beds(axes: Axes, heights: Array) -> None:
+    """Write the heights of the beds of a wall, as far as there is room."""
+    axes.set_xlabel("height of the bed, with its joint of the largest |e| [m]")
+    shown = range(0, len(heights), -(-len(heights) // 8))
+    axes.set_xticks(shown, [f"{heights[k]:.3g}" for k in shown])
 
 
 def _lay_out_panels(

@@ -8,7 +8,7 @@ import numpy as np
 from archfem._typing import Array, Numbers
 from archfem.dynamics.history import History
 from archfem.dynamics.rigid_body.bodies import make_bodies
-from archfem.joints.criteria import assessed_joints
+from archfem.joints.criteria import Criteria, assessed_joints
 from archfem.masonry.block import rotate
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import Structure
@@ -31,13 +31,18 @@ def decisive_instant(run: History) -> float:
 
 
 def first_motion_instant(run: History) -> float:
-    """Return the time of the first mechanism, else of the largest |e| of a joint [s]."""
+    """Return the time of the first mechanism, else of the largest |e| of a joint [s].
+
+    Joints that are hinges at the start, such as a stone's on two others of unequal height, say
+    nothing of the motion, and do not count.
+    """
     # enough joints may fail while no block can move: a verified motion comes first
     verified = run.verified if run.structure is not None else None
     found = run.mechanism if verified is None else verified.moved
     if found is not None and found.time is not None:
         return found.time
-    e = abs(assessed_joints(run.joints)["eccentricity"]).max("joint")
+    e = abs(assessed_joints(run.joints)["eccentricity"])
+    e = e.where(e.isel(time=0) < Criteria.of(run.joints).hinge).max("joint")
     return float(run.time[int(e.fillna(0.0).argmax("time"))])
 
 

@@ -41,6 +41,9 @@ from archfem.view.style import (
     white_halo,
 )
 
+# Letters of a line in the corner of a pushover's picture
+MAX_LISTED_LETTERS = 48
+
 
 @validate_arguments
 def draw_dead_load(dead: Equilibrium, *, criteria: Criteria | None = None) -> Figure:
@@ -336,7 +339,7 @@ def draw_pushover(
     """Draw pushover curves, load factor over displacement, with discs at the first hinges.
 
     The discs of a single curve are numbered; the names of their joints and the faces in contact are
-    listed beside the curve.
+    listed beside the curve, or, the first six of them, in the legend if they are long.
 
     Args:
         pushes: a pushover analysis, or the label of each one and the analysis.
@@ -415,12 +418,18 @@ def _merge_close_discs(
     return merged
 
 
-def _list_hinges(axes: Axes, hinges: Mapping[tuple[float, float], str], *, at_top: bool) -> None:
-    """Number the discs of a curve, and list their joints in a corner at the right."""
+def _list_hinges(
+    axes: Axes, hinges: Mapping[tuple[float, float], str], *, at_top: bool, most: int = 6
+) -> None:
+    """Number the discs of a curve, and list their joints at the right, long names in the legend."""
     for first, last, place in _merge_close_discs(list(hinges), axes):
         number = f"{first}" if first == last else f"{first}–{last}"
         annotate(axes, number, place, (4, -11), path_effects=white_halo(2.5))
     lines = [f"{number}  {joints}" for number, joints in enumerate(hinges.values(), start=1)]
+    if len(max(lines, key=len)) > MAX_LISTED_LETTERS:
+        rest = [f"… ({len(lines)} in all)"] if len(lines) > most else []
+        axes.plot([], [], " ", label="\n".join([*lines[:most], *rest]))
+        return
     place, alignment = ((0.97, 0.95), "top") if at_top else ((0.97, 0.05), "bottom")
     style = {"ha": "right", "va": alignment, "multialignment": "left"}
     annotate(axes, "\n".join(lines), place, xycoords="axes fraction", **style)

@@ -11,6 +11,7 @@ from loose_blocks import G
 
 import archfem as af
 from archfem.dynamics import RigidBlockSimulation, State, fall, release_blocks
+from archfem.dynamics.rigid_body import simulation
 
 # Attributes of a fall without doubts of energy and step
 BALANCED = {"fall_unsettled_early": 0.0, "fall_gained_share": 0.0, "fall_step_change": 0.0}
@@ -89,16 +90,6 @@ def test_a_block_handed_over_rocks_on_with_the_restitution_of_its_damping(ratio)
     assert np.sqrt(energies[1:] / energies[:-1]) == pytest.approx(np.full(2, wanted), rel=0.01)
 
 
-def test_a_fall_that_cannot_be_followed_says_what_to_compare(tower, monkeypatch):
-    def fail(*_):
-        raise af.DidNotConverge("made to fail")
-
-    monkeypatch.setattr(RigidBlockSimulation, "_take_steps", fail)
-    rest = State(1.0, *np.zeros((3, tower.size)))
-    with pytest.raises(af.DidNotConverge, match=r"made to fail.*another dt of time_history, or"):
-        fall.simulate_fall(tower, rest, af.Motion(np.zeros(3), 1.0))
-
-
 @pytest.mark.parametrize(("stiffness", "push", "doubted"), [(1e7, 0.24, True), (1e9, 0.4, False)])
 def test_a_fall_of_which_rigid_blocks_know_nothing_is_doubted(stiffness, push, doubted):
     """A column of breadth to height 1 to 4 rocks under 0.24 g at most by its softness."""
@@ -112,21 +103,30 @@ def test_a_fall_of_which_rigid_blocks_know_nothing_is_doubted(stiffness, push, d
     assert any("as rigid blocks none falls" in cause for cause in causes) == doubted
 
 
-def test_a_fall_that_cannot_be_followed_keeps_the_history_up_to_it(monkeypatch):
-    """A column that topples under 0.4 g for 1 s comes loose before the motion ends."""
+@pytest.mark.parametrize(("followed", "outcome"), [(0.2, "unknown"), (0.6, "fallen")])
+@pytest.mark.parametrize("whole", [True, False])
+def test_a_fall_that_cannot_be_followed_keeps_what_is_known(followed, outcome, whole, monkeypatch):
+    """A column that topples under 0.4 g comes loose at 0.67 s, and is lost at 0.99 s."""
+    check = simulation._Run._check
 
-    def refuse(model, state, motion, ratio, whole):
-        raise af.DidNotConverge("made to fail")
+    def fail_late(run, time):
+        check(run, time)
+        if time > 0.67 + followed:
+            raise af.DidNotConverge("made to fail")
 
-    monkeypatch.setattr(fall, "simulate_fall", refuse)
+    monkeypatch.setattr(simulation._Run, "_check", fail_late)
     column = af.column(breadth=0.6, heights=[2.4], contact=af.Contact(1e9, 4e8, 0.6))
-    model = af.build(column, fidelity="rigid", displacements="large")
-    with pytest.raises(af.DidNotConverge, match="made to fail") as caught:
-        af.time_history(model, af.Motion(np.full(100, 0.4 * G), 0.01), dt=2e-3)
-    held = af.dynamics.partial_history(caught.value)
-    assert held.ending is af.dynamics.Ending.PARTED
-    assert held.fall is None
-    assert np.abs(held.joints["rotation"].values[-1]).max() > 0.3
+    analysis = af.Analysis(column, fidelity="rigid", displacements="large", dt=2e-3)
+    push = af.Motion(np.full(100, 0.4 * G), 0.01)
+    run = replace(analysis, record=af.Record(whole_fall=whole)).run(push)
+    assert run.verdict.outcome == outcome
+    assert run.ending is af.dynamics.Ending.PARTED
+    last = run.dataset["fall_time"].values[-1]
+    expected = 0.67 + followed if whole or outcome == "unknown" else run.fall.time
+    assert expected - 0.021 < last <= expected
+    broken_off = f"followed until {last:.2f} s alone, .*: .*made to fail"
+    doubted = any(re.search(broken_off, doubt.cause) for doubt in run.doubts)
+    assert doubted == (whole or outcome == "unknown")
 
 
 def test_loose_stones_rub_as_their_joints_did_or_by_six_tenths():

@@ -96,6 +96,15 @@ def test_a_wall_in_bond_loses_a_wedge_at_its_toe(friction):
     assert found.mechanism_name == "toe wedge overturning about the toe of course 1"
 
 
+def test_a_wedge_at_the_toe_may_slide_and_turn():
+    wall = bonded_wall(courses=12)
+    found = af.collapse_factor(wall, live=PUSH, friction="coulomb")
+    motion, moves = found.motion.copy(), np.abs(found.motion).max(axis=1) > 1e-9
+    motion[moves, 0] += 0.6 * np.sign(motion[:, 0].sum()) * np.abs(motion[:, 0]).max()
+    words = name_mechanism(wall, motion)
+    assert words == f"toe wedge of {moves.sum()} stones, turning and sliding"
+
+
 def test_one_motion_may_slide_and_turn():
     block = af.column(breadth=1.0, heights=[1.0])
     motion = np.zeros((2, 3))

@@ -139,3 +139,12 @@ def test_the_instant_that_decides_is_the_fall_or_else_a_motion(toppled, ring):
     assert decisive_instant(af.History(dataset, ring)) == 2.0
     assert decisive_instant(af.History(dataset)) == 1.0  # by count alone
     assert decisive_instant(af.History(dataset.isel(time=[0, 3]), ring)) == 0.0
+
+
+def test_a_joint_that_is_open_at_rest_does_not_decide(ring):
+    """The second joint has |e| = 0.49 from the start, the others up to 0.3 at 2 s."""
+    resultants = np.tile([1e4, 0.0, 0.0], (4, 18, 1))
+    resultants[:, 1, 2] = 0.49e4 * 0.55
+    resultants[2, 6, 2] = 0.3e4 * 0.55
+    dataset = af.joints.joint_dataset(ring, resultants, np.arange(4.0))
+    assert decisive_instant(af.History(dataset, ring)) == 2.0

@@ -1,5 +1,7 @@
 """The picture of a pushover: curves, hinges in order, limits."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
@@ -31,6 +33,16 @@ def test_curve_hinges_and_limit_are_drawn(push):
     assert label.splitlines()[0] == "1  joint 6, extrados"
     assert len(label.splitlines()) == len(set(push.hinge_steps))
     figure.draw_without_rendering()
+
+
+def test_long_names_of_joints_are_listed_below_the_curve(push):
+    names = [f"course {k}, stone {k} to course {k}, stone {k + 1}" for k in range(18)]
+    joints = push.joints.assign_coords(name=("joint", names))
+    axes = draw_pushover(replace(push, joints=joints)).axes[0]
+    words = [text.get_text() for text in axes.texts]
+    assert not any("extrados" in word for word in words)
+    (label,) = [each for each in axes.get_legend_handles_labels()[1] if "extrados" in each]
+    assert label.splitlines()[0] == f"1  {names[6]}, extrados"
 
 
 def test_several_curves_keep_their_discs_and_lose_the_words(push):

@@ -3,8 +3,9 @@
 Pieces are sorted along x, so that only pairs with overlapping intervals are tested. The axis of
 largest separation, or of smallest overlap, of two convex polygons is normal to an edge of one of
 them, the reference edge. The edge of the other that faces it most, the incident edge, is clipped to
-its length, and up to two points remain. Cuts between the pieces of a body separate too, but are
-never reference edges. (Separating axes: Gottschalk, Lin and Manocha, SIGGRAPH 1996.)
+its length, and up to two points remain. Where that is a cut between two pieces of a body, the other
+piece bears, and this pair has no contact: what overlaps it has come through the cut. (Separating
+axes: Gottschalk, Lin and Manocha, SIGGRAPH 1996.)
 
 Impulses of a step are stored by the pair of pieces in a hash table, as initial guess of the next.
 Rows of relative velocity, effective masses and the residual of impulses belong to contacts too.
@@ -247,10 +248,10 @@ def _separation(bodies, world, one, two, margin):  # type: ignore
     best, edge = -np.inf, -1
     for k in range(bodies.piece_starts[one], bodies.piece_starts[one + 1]):
         nearest = _edge_distance(bodies, world, k, two)
-        # any separating edge ends the test, but only outer edges can be the reference
+        # any separating edge ends the test
         if nearest > margin:
             return nearest, k
-        if bodies.outer[k] and nearest > best:
+        if nearest > best:
             best, edge = nearest, k
     return best, edge
 
@@ -265,10 +266,11 @@ def _touch(bodies, world, pieces, margin, contacts, count):  # type: ignore
     there, other = _separation(bodies, world, two, one, margin)
     if there > margin:
         return count
-    # the reference edge is that of the larger separation
-    if there > here:
-        return _clip(bodies, world, (two, other, one, -1.0), margin, contacts, count)
-    return _clip(bodies, world, (one, edge, two, 1.0), margin, contacts, count)
+    # the reference edge is that of the larger separation; through a cut, another piece bears
+    reference = (two, other, one, -1.0) if there > here else (one, edge, two, 1.0)
+    if not bodies.outer[reference[1]]:
+        return count
+    return _clip(bodies, world, reference, margin, contacts, count)
 
 
 @kernel
@@ -289,7 +291,7 @@ def _clip(bodies, world, reference, margin, contacts, count):  # type: ignore
     incident, lowest = -1, np.inf
     for k in range(bodies.piece_starts[two], bodies.piece_starts[two + 1]):
         facing = n[0] * world.normals[k, 0] + n[1] * world.normals[k, 1]
-        if bodies.outer[k] and facing < lowest:
+        if facing < lowest:
             incident, lowest = k, facing
     # its ends in coordinates along (x) and away from (y) the reference edge
     a, b = world.points[incident], world.points[_next_vertex(bodies, two, incident)]
@@ -528,10 +530,7 @@ def _widest_gap(bodies, world, one, two):  # type: ignore
     widest = -np.inf
     for first, second in ((one, two), (two, one)):
         for k in range(bodies.piece_starts[first], bodies.piece_starts[first + 1]):
-            nearest = _edge_distance(bodies, world, k, second)
-            # cuts separate pieces too, but do not measure how deep they are in each other
-            if nearest > widest and (bodies.outer[k] or nearest > 0.0):
-                widest = nearest
+            widest = max(widest, _edge_distance(bodies, world, k, second))
     return widest
 
 

@@ -127,7 +127,8 @@ class RigidBlockSimulation:
 
         Raises:
             InvalidInput: the start has other blocks, or the times do not fit.
-            DidNotConverge: the energy increases without work, or there are too many contacts.
+            DidNotConverge: blocks pass through each other, the energy increases without work, or
+                there are too many contacts. Where no step is given, `last` has the frames before.
         """
         self._check(start, end, spacing)
         if self.dt is not None:
@@ -141,14 +142,16 @@ class RigidBlockSimulation:
         self, start: LooseBlocks, end: float, motion: Motion | None, spacing: float
     ) -> list[FallFrame]:
         """Return the frames by steps the half of which change little, or by the shortest ones."""
-        frames: list[FallFrame] = []
+        frames, followed = list[FallFrame](), list[FallFrame]()
         failure, change = None, float("nan")
         for dt in TRIED_STEPS:
+            finer: list[FallFrame] = []
             try:
-                finer = list(self._take_steps(dt, start, end, motion, spacing))
+                # frames before an error are kept
+                finer.extend(self._take_steps(dt, start, end, motion, spacing))
             except DidNotConverge as error:
                 logger.info("the fall is repeated with shorter steps: %s", error)
-                failure = error
+                failure, followed = error, finer
                 continue
             change = self._step_change(frames, finer) if frames else float("nan")
             frames = finer
@@ -158,7 +161,8 @@ class RigidBlockSimulation:
         if not frames:
             raise DidNotConverge(
                 f"loose blocks could not be followed from {start.time:.4g} s on, by steps of "
-                f"{1e3 * TRIED_STEPS[0]:g} to {1e3 * TRIED_STEPS[-1]:g} ms: {failure}"
+                f"{1e3 * TRIED_STEPS[0]:g} to {1e3 * TRIED_STEPS[-1]:g} ms: {failure}",
+                last=followed,
             ) from failure
         return [*frames[:-1], replace(frames[-1], step_change=change)]
 

@@ -1,11 +1,14 @@
 """Where convex pieces touch."""
 
+from itertools import pairwise, product
+
 import numpy as np
 import pytest
 import shapely
 from loose_blocks import floor
 
 import archfem as af
+from archfem.dynamics.loose_fill import LooseStructure
 from archfem.dynamics.rigid_body.bodies import make_bodies
 from archfem.dynamics.rigid_body.contact_detection import (
     allocate_contacts,
@@ -103,3 +106,45 @@ def moved(block, pose):
     c, s = np.cos(pose[2]), np.sin(pose[2])
     arms = block.points - block.centroid
     return shapely.Polygon(arms @ np.array([[c, s], [-s, c]]) + block.centroid + pose[:2])
+
+
+def test_no_contact_with_concave_ground_is_deeper_than_the_overlap():
+    """A block lies flat on a face of the ground, with a corner at most 3 mm from its end."""
+    rng = np.random.default_rng(1)
+    deepest, overlap, missed = 0.0, 0.0, 0
+    for _ in range(20):
+        structure = rough_ground(rng)
+        ground = shapely.Polygon(structure.blocks[0].points)
+        top = structure.blocks[0].points[2:]
+        for (right, left), end in product(pairwise(top), (0, 1)):
+            along = (right - left) / np.linalg.norm(right - left)
+            shift = (1 - 2 * end) * 10.0 ** rng.uniform(-5.0, -2.5) * rng.uniform(-1.0, 1.0)
+            into = shift * along + 10.0 ** rng.uniform(-5.0, -3.0) * np.array([along[1], -along[0]])
+            turn = np.arctan2(along[1], along[0])
+            arm = structure.blocks[1].points[1 - end] - structure.blocks[1].centroid
+            turned = np.array([along, [-along[1], along[0]]]).T @ arm
+            corner = (left if end else right) + into
+            pose = [*(corner - turned - structure.blocks[1].centroid), turn]
+            common = moved(structure.blocks[1], pose).intersection(ground)
+            points = map(shapely.Point, shapely.get_coordinates(common))
+            depth = max((ground.exterior.distance(point) for point in points), default=0.0)
+            if 0.0 < depth < 5e-3:  # else another part of the ground is in the way
+                *_, gaps = touching(structure, [[0, 0, 0], pose], level=-10.0)
+                missed += not len(gaps)
+                deepest, overlap = max(deepest, -gaps.min(initial=0.0)), max(overlap, depth)
+    assert missed == 0
+    assert overlap > 1e-3  # there are such corners
+    assert deepest < 5e-3
+
+
+def rough_ground(rng):
+    """A ground with six corners at random heights in its top, and a block, built below it."""
+    places = np.linspace(3.0, -3.0, 6) + rng.uniform(-0.4, 0.4, 6)
+    top = [(float(x), float(rng.uniform(-1.0, 1.0))) for x in (4.0, *places, -4.0)]
+    slab = af.Block([(-4.0, -1.5), (4.0, -1.5), *top], af.STONE, "ground", fixed=True)
+    breadth, height = rng.uniform(0.3, 1.0, 2)
+    left, right, foot = -0.5 * breadth, 0.5 * breadth, -1.5 - height
+    box = af.Block([(left, foot), (right, foot), (right, -1.5), (left, -1.5)], af.STONE, "box")
+    ends = (left, -1.5), (right, -1.5)
+    joint = af.Joint((0, 1), *ends, af.Contact(1e9, 1e9, 0.6), "joint")
+    return LooseStructure((slab, box), (joint,))
