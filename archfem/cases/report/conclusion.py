@@ -215,7 +215,7 @@ def _build_lead(data: ReportData, rows: Sequence[Row], doubtful: Sequence[str]) 
     lead += [f"the doubts below, on {join_names(doubtful)}, may change this"] if doubtful else []
     if single := list_unvaried(data):
         none = ", and displacements have no range" * (data.verdict_range is None)
-        lead.append(f"{join_words(single)} {'were' if single[1:] else 'was'} not varied{none}")
+        lead.append(f"{join_words(single)} were not varied{none}")
     if demand := data.case.report.get("demand"):
         lead[:1] = [f"for {demand}: {lead[0]}"] if lead else [f"the demand, as stated: {demand}"]
     return lead
