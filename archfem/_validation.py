@@ -171,8 +171,8 @@ def check_choice(value: Any, name: str, choices: Collection[Any], remedy: str = 
     """Return a value that must be one of some strings or numbers."""
     if is_one_of(value, choices):
         return value
-    known = f"use one of {list(choices)}"
-    raise InvalidInput(f"{name} = {short_repr(value)} is not known: {known}{remedy}")
+    cause = "is missing" if value is None else f"= {short_repr(value)} is not known"
+    raise InvalidInput(f"{name} {cause}: use one of {list(choices)}{remedy}")
 
 
 def is_number(value: Any) -> bool:

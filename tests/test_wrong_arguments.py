@@ -47,7 +47,7 @@ MADE = [
     (lambda: af.Rayleigh("5 %", (8.0, 16.0)), "damping ratio .* = '5 %' is not a finite number"),
     (lambda: af.Rayleigh(0.05, 8.0), r"damping frequencies \[Hz\] = 8.0 is not a row of values"),
     (lambda: af.Rayleigh(0.05, (8.0, 16.0, 24.0)), "has 3 values"),
-    (lambda: af.Rayleigh(0.05, (8.0, 16.0), joints=None), "damping joints = None is not known"),
+    (lambda: af.Rayleigh(0.05, (8.0, 16.0), joints=None), "damping joints is missing"),
     (lambda: af.HHT("x"), "HHT alpha .* = 'x' is not a finite number"),
     (lambda: af.dynamics.Newmark(None), "Newmark beta .* = None is not a finite number"),
     (lambda: af.statics.Newton(tolerance="x"), "tolerance of a solve .* = 'x'"),

@@ -28,6 +28,9 @@ DRIVING_DIRECTIONS = ("right", "left")
 # Least load on a road [Pa], below which it is in kPa
 MIN_AREA_LOAD = 100.0
 
+# Largest spacing of axles and width of wheels [m], above which they are in mm
+MAX_SPACING, MAX_WHEELS = 100.0, 10.0
+
 
 # Axles that stand on the structure, from left to right, or these and a distributed load
 AxleRow = tuple[PointLoad, ...]
@@ -82,10 +85,12 @@ class Vehicle:
             check_number(getattr(self, key), f"{key} of {self.name}", minimum=0.0)
         longest = max(self.spacings, default=0.0)
         light = min(self.axles) < 1e3 and max(self.axles) != 1.0  # the factor of 1 N is a load
-        if light or longest > 100.0 or 0.0 < self.area_load < MIN_AREA_LOAD:
+        weak = 0.0 < self.area_load < MIN_AREA_LOAD
+        if light or weak or longest > MAX_SPACING or self.wheels > MAX_WHEELS:
             raise InvalidInput(
-                f"vehicle '{self.name}' has axles of {self.axles} N, spacings of {self.spacings} m "
-                f"and {self.area_load} Pa: that can only be a wrong unit"
+                f"vehicle '{self.name}' has axles of {self.axles} N, spacings of {self.spacings} "
+                f"m, wheels over {self.wheels:g} m and {self.area_load} Pa: that can only be a "
+                "wrong unit"
             )
         check_factor(self.live, f"partial factor on the live load of {self.name}")
         check_factor(self.impact, f"dynamic factor of {self.name}")

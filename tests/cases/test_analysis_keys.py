@@ -331,7 +331,7 @@ def test_assessment_of_a_case_has_the_arguments_of_python():
 @pytest.mark.parametrize(
     ("table", "message"),
     [
-        ({"spectrum": {"ag": 0.2}}, "assessment.spectrum.code = None is not known"),
+        ({"spectrum": {"ag": 0.2}}, "assessment.spectrum.code is missing"),
         ({"direction": 2}, "assessment.direction = 2: give 1 for right or -1 for left"),
         ({"loads": [{"block": 1}]}, "assessment.loads = .*missing.*its keys are"),
         ({"limit_state": {"share": 0.5}}, "assessment.limit_state = .*missing"),

@@ -644,6 +644,7 @@ def test_a_vehicle_needs_weights_and_spacings():
         {"axles": (60.0, 115.0), "spacings": (3.2,)},  # kN
         {"axles": (60e3, 115e3), "spacings": (3200.0,)},  # mm
         {"axles": (60e3,), "area_load": 9.0},  # kPa
+        {"axles": (60e3,), "wheels": 1500.0},  # mm
     ],
 )
 def test_vehicles_of_wrong_units_are_refused(given):

@@ -25,7 +25,7 @@ FREQUENCIES = (8.0, 16.0)
 def ring(weight, width, length, cohesion=0.0, tension=0.0):
     """Seven stones with plane faces."""
     stress = weight * length
-    stone = af.Material(30e9 * stress, 0.2, 20e3 * weight, 56e6 * stress)
+    stone = af.Material(30e9 * stress, 0.2, 20e3 * weight, 50e6 * stress)
     held = {"cohesion": cohesion * stress, "tension": tension * stress}
     contact = af.Contact(1.48e9 * weight, 0.3e9 * weight, 0.6, **held)
     lengths = {"radius": 2.95 * length, "thickness": 0.45 * length, "width": width}
