@@ -75,7 +75,7 @@ def at_the_limit(weight, width, length):
     """Factors of limit analysis."""
     force, found = weight * width * length**2, {}
     dry, push = ring(weight, width, length), af.BodyForce(1.0)
-    strength = 1e6 * weight * length
+    strength = 2e7 * weight * length
     for name, given in (
         ("associated", {}),
         ("flat", {"friction": "nonassociated"}),
