@@ -29,7 +29,7 @@ DRIVING_DIRECTIONS = ("right", "left")
 MIN_AREA_LOAD = 100.0
 
 # Largest spacing of axles and width of wheels [m], above which they are in mm
-MAX_SPACING, MAX_WHEELS = 100.0, 10.0
+MAX_LENGTH = 100.0
 
 
 # Axles that stand on the structure, from left to right, or these and a distributed load
@@ -83,10 +83,10 @@ class Vehicle:
         check_choice(self.impact_on, f"impact_on of {self.name}", ("all axles", "worst axle"))
         for key in ("area_load", "wheels", "lane"):
             check_number(getattr(self, key), f"{key} of {self.name}", minimum=0.0)
-        longest = max(self.spacings, default=0.0)
+        longest = max([*self.spacings, self.wheels])
         light = min(self.axles) < 1e3 and max(self.axles) != 1.0  # the factor of 1 N is a load
         weak = 0.0 < self.area_load < MIN_AREA_LOAD
-        if light or weak or longest > MAX_SPACING or self.wheels > MAX_WHEELS:
+        if light or weak or longest > MAX_LENGTH:
             raise InvalidInput(
                 f"vehicle '{self.name}' has axles of {self.axles} N, spacings of {self.spacings} "
                 f"m, wheels over {self.wheels:g} m and {self.area_load} Pa: that can only be a "

@@ -70,8 +70,8 @@ def test_an_invalid_quantity_is_refused(value, says):
 
 def test_a_choice_must_be_one_of_the_known_words():
     assert check_choice("a", "section.key", {"a": 1, "b": 2}) == "a"
-    for wrong in ("c", None, ["a"]):
-        with pytest.raises(af.InvalidInput, match=r"section.key = .* is not known: use one of"):
+    for wrong, why in (("c", "= 'c' is not known"), (None, "is missing"), (["a"], "= .* known")):
+        with pytest.raises(af.InvalidInput, match=rf"section.key {why}: use one of"):
             check_choice(wrong, "section.key", ("a", "b"))
 
 

@@ -96,7 +96,7 @@ BLOCKS = {
 }
 
 SHAKEN = {
-    "motion_scaling.collapse_scale": {**{"dt": 0.005, "precision": 0.05, "between": (0.1, 10.0)}},
+    "motion_scaling.collapse_scale": {"precision": 0.05, "between": (0.1, 10.0)},
     "damping.effective_mode_range": {"mass_share": 0.9, "initial_count": 32, "max_count": 1024},
     "damping.effective_damping": {"ratio": 0.05, "mass_share": 0.9},
     "model_selection.build": {"cells": (4, 4), "degree": 1, "tolerance": 0.005},
