@@ -9,7 +9,7 @@ tables are read once and compared, so that a file has every bit of it.
 
 import inspect
 import json
-from collections import Counter, OrderedDict
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from math import inf
@@ -18,6 +18,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from archfem._recent import RecentResults
 from archfem._validation import check_choice, declared_keys, given_fields
 from archfem.cases.provenance import hash_file, list_input_files
 from archfem.cases.toml_file import Table, check_table
@@ -50,10 +51,11 @@ _PRESETS: Mapping[str, Mapping[str, Any]] = {
 # Joint.contact and Block.material of most parts stand once, above the lists
 _SHARED = ("material", "contact")
 
-_recent_structures: OrderedDict[str, Structure] = OrderedDict()
+# studies alternate between few structures
+_recent_structures = RecentResults[Structure](8)
 
 
-def cached_structure(settings: Table, folder: Path = Path(), max_cached: int = 8) -> Structure:
+def cached_structure(settings: Table, folder: Path = Path()) -> Structure:
     """Return the structure of a case under the case's title; recent ones are cached."""
     # structures are immutable: cases with the same tables and drawing share one
     # Only these sections describe the structure; the title is its name.
@@ -61,14 +63,12 @@ def cached_structure(settings: Table, folder: Path = Path(), max_cached: int = 8
     tables = {name: settings[name] for name in sections if name in settings}
     drawings = list_input_files({"structure": tables.get("structure")}, folder)
     key = json.dumps([tables, [(str(path), hash_file(path)) for path in drawings]], default=repr)
-    if key not in _recent_structures:
+
+    def build() -> Structure:
         structure = build_structure(settings, folder)
-        _recent_structures[key] = replace(structure, name=settings.get("title", structure.name))
-        # Studies alternate between few structures: the least recently used one is dropped.
-        while len(_recent_structures) > max_cached:
-            _recent_structures.popitem(last=False)
-    _recent_structures.move_to_end(key)
-    return _recent_structures[key]
+        return replace(structure, name=settings.get("title", structure.name))
+
+    return _recent_structures.look_up(key, build)
 
 
 def list_shapes() -> dict[str, Callable[..., Structure]]:
@@ -229,13 +229,13 @@ def _outline_arguments(values: dict[str, Any], settings: Table, folder: Path) ->
 
 def find_drawing(settings: Table, folder: Path) -> dict[str, Any] | None:
     """Return path, unit, snap and ignored layers of the drawing of a case, None without one."""
-    table = settings.get("structure", {})
-    if table.get("shape") != "outlines" or "file" not in table:
+    table = settings.get("structure")
+    if not isinstance(table, dict) or table.get("shape") != "outlines" or "file" not in table:
         return None
     values = check_table(table, shape_keys("outlines"), "structure")
     layers = values.get("layers", {}).items()
     given = {key: values[key] for key in ("unit", "snap") if key in values}
-    ignored = [name for name, layer in layers if layer.get("ignore")]
+    ignored = [name for name, layer in layers if isinstance(layer, dict) and layer.get("ignore")]
     return given | {"path": folder / values["file"], "ignored": ignored}
 
 

@@ -121,7 +121,7 @@ class AssessmentCheck:
     @property
     def least(self) -> float:
         """The ratio, or the least of all assumptions on a fill [-]."""
-        return self.ratio if self.over_fill is None else min(self.over_fill.values.values())
+        return self.ratio if self.over_fill is None else self.over_fill.ends[0]
 
     @property
     def at_rest(self) -> bool:

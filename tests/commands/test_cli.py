@@ -99,6 +99,23 @@ def test_check_command(capsys):
     assert "did you mean 'radius'" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    ("words", "name"),
+    [
+        ('structure = "arch"', "structure"),
+        (
+            "structure = {shape = 'outlines', file = 'a.dxf', layers = {a = 'arch'}}",
+            "structure.layers.a",
+        ),
+    ],
+)
+def test_a_word_in_place_of_a_table_is_refused(words, name, tmp_path, capsys):
+    """The drawing of a refused case is looked for: that meets the word again."""
+    (tmp_path / "case.toml").write_text(words)
+    assert af.commands.main(["check", str(tmp_path / "case.toml")]) == 1
+    assert f"{name} = 'arch' is not a table" in capsys.readouterr().err
+
+
 def test_run_of_a_ring_that_falls(tmp_path, capsys):
     given = ["--set", "structure.thickness=0.15", "--set", "model.fidelity=rigid"]
     assert af.commands.main(["run", str(RING), "--out", str(tmp_path), *given]) == 1

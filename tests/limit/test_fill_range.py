@@ -135,6 +135,7 @@ def test_what_does_not_stand_without_pressure_says_so():
     assert found.factor > 0.0
     assert found.range == (0.0, found.factor)
     assert found.describe_range().startswith(f"at 0 g ({CENTROIDS}, {NONE}; it does not stand) to")
+    assert found.describe_range().endswith(f"({FEET}, all of its passive pressure)")
     checks = af.kinematic_assessment(structure, SITE, friction=None, fill=fill).checks
     assert [check.over_fill.ends[0] for check in checks] == [0.0, 0.0]
 

@@ -157,6 +157,10 @@ def test_a_semicircle_by_any_shape_has_its_least_thickness(shape):
         ),
         (lambda: shapes.flat_arch(span=2, thickness=0.4, voussoirs=7, skewback=0.35), "radians"),
         (lambda: shapes.flat_arch(span=2, thickness=0.4, voussoirs=7, skewback=80), "try 20"),
+        (
+            lambda: shapes.flat_arch(span=5e-324, thickness=0.4, voussoirs=7, skewback=20),
+            "two corners beside each other",
+        ),
         (lambda: shapes.arch_along([(0, 0), (1, 1)], thickness=0.1, voussoirs=3), "at least three"),
         (lambda: shapes.arch_along("abc", thickness=0.1, voussoirs=3), "not a row of values"),
     ],

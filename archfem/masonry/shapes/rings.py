@@ -479,13 +479,12 @@ def flat_arch(
     angle = in_degrees(skewback, "skewback")
     options: Any = {"remedy": "try 20°", "error": InvalidStructure}
     check_between(angle, "skewback [°]", 0.0, 60.0, **options)
-    # All joints meet in one point below, so that the top is the soffit enlarged from there.
-    growth = 1.0 + thickness * tan(np.radians(angle)) / (span / 2.0)
+    # all joints meet in one point below, so that top and soffit are divided into equal shares
+    top = span + 2.0 * thickness * tan(np.radians(angle))
 
     def section(share: Array) -> Faces:
-        x = span * (share - 0.5)
-        low = np.column_stack([x, np.zeros_like(x)])
-        return low, np.column_stack([growth * x, np.full_like(x, thickness)])
+        x, height = share - 0.5, np.full_like(share, thickness)
+        return np.column_stack([span * x, np.zeros_like(x)]), np.column_stack([top * x, height])
 
     return ring.assemble(ring.divide(section), "flat arch")
 
