@@ -271,6 +271,25 @@ def describe_changes(point: StudyPoint) -> str:
     return changes or "no change"
 
 
+def list_varied_keys(points: Iterable[StudyPoint]) -> list[str]:
+    """Return the keys of cases, "section.key", in which points differ."""
+    cases = [point for point in points if isinstance(point, Point)]
+    # most points share their case
+    tables = [flatten_tables(each) for each in {id(p.base): p.base for p in cases}.values()]
+    keys = {key for point in cases for key, _ in point.changes}
+    keys |= {key for each in tables for key in each if any(each[key] != t.get(key) for t in tables)}
+    return sorted(keys)
+
+
+def flatten_tables(tables: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    """Join the names of nested tables and keys by dots."""
+    flat: dict[str, Any] = {}
+    for key, value in tables.items():
+        own = isinstance(value, Mapping)
+        flat |= flatten_tables(value, f"{prefix}{key}.") if own else {prefix + key: value}
+    return flat
+
+
 def group_by_model(points: Iterable[tuple[int, Point]]) -> list[tuple[int, Point]]:
     """Return points in their order, but those of one model together, so that it is built once."""
     groups: dict[str, list[tuple[int, Point]]] = {}

@@ -38,6 +38,7 @@ from archfem.studies.parameter_space import (
     check_points,
     describe_changes,
     group_by_model,
+    list_varied_keys,
     parameter_axes,
 )
 from archfem.studies.process_pool import Row, evaluate_points
@@ -214,6 +215,7 @@ class Study:
     def _attributes(self) -> dict[str, Any]:
         """Attributes of the table."""
         attributes = {"title": self.title, "archfem": describe_version()}
+        attributes["varied"] = "; ".join(list_varied_keys(self.points))
         return attributes | {f"samples {key}": value for key, value in (self.samples or {}).items()}
 
     def _collect_rows(

@@ -34,6 +34,9 @@ from archfem.view.style import (
 # Findings of limit analyses and ratings of which codes require at least 1
 REQUIRED_FACTORS = ("factor", "without_pressure", "full_pressure", "geometric")
 
+# Largest over least value beyond which dots of cases have a logarithmic axis [-]
+WIDE_RATIO = 50.0
+
 
 class FragilityCurve(Protocol):
     """Fragility curve, as far as it is drawn."""
@@ -81,8 +84,8 @@ def draw_findings(table: xr.Dataset, max_panels: int = 12, max_keys: int = 3) ->
 
     Points that differ in one number alone are joined by a line. Colours are the values of a key in
     words, such as the case. Findings without negative values begin at zero over words, whose
-    distances mean nothing. Named cases alone are bars with a dashed line at the first one; of
-    ratings these are the factors, with a line at 1.
+    distances mean nothing. Named cases are bars with a dashed line at the first one, under several
+    motions dots of their colours; of ratings these are the factors, with a line at 1.
 
     Args:
         table: table of a study, as by `Study.run`.
@@ -91,7 +94,7 @@ def draw_findings(table: xr.Dataset, max_panels: int = 12, max_keys: int = 3) ->
 
     Returns:
         The figure, with a row for each finding and a column for each key; a panel for each finding
-        where a single key varies, beside the names of the cases if they alone do.
+        where a single key varies, beside the names of the cases if they and motions alone do.
 
     Raises:
         InvalidInput: no finding is a number that differs between points.
@@ -105,9 +108,10 @@ def draw_findings(table: xr.Dataset, max_panels: int = 12, max_keys: int = 3) ->
     names = [name for name in flat.data_vars if differs[name] and frame[name].dtype.kind == "f"]
     if not names or not keys:
         raise InvalidInput("no finding is a number that differs between points")
-    if len(keys) == 1 and frame[keys[0]].dtype.kind not in "fi":
+    named = all(frame[key].dtype.kind not in "fi" for key in keys)
+    if named and (len(keys) == 1 or keys == ["case", "pair"]):
         rated = [name for name in names if name in REQUIRED_FACTORS]
-        return _draw_named_cases(flat, frame, keys[0], (rated or names)[:max_panels])
+        return _draw_named_cases(flat, frame, keys, (rated or names)[:max_panels])
     names = names[: max(max_panels // len(keys), 1)]
     columns = len(keys) if len(keys) > 1 else min(len(names), 3)
     rows = -(-len(names) * len(keys) // columns)
@@ -136,25 +140,35 @@ def draw_findings(table: xr.Dataset, max_panels: int = 12, max_keys: int = 3) ->
     return figure
 
 
-def _draw_named_cases(table: xr.Dataset, frame: Any, key: str, names: Sequence[Any]) -> Figure:
-    """Draw a panel of horizontal bars for each finding, a bar for each case, from the top."""
+def _draw_named_cases(
+    table: xr.Dataset, frame: Any, keys: Sequence[str], names: Sequence[Any]
+) -> Figure:
+    """Draw a panel for each finding, beside a row for each case: a bar, or dots of its motions."""
+    key, *pairs = keys
     labels, columns = list(dict.fromkeys(frame[key])), min(len(names), 3)
     rows = -(-len(names) // columns)
     longest = text_width(max(len(f"{label}") for label in labels))
     size = 0.4 + longest + 2.0 * columns, 0.3 + rows * (0.7 + 0.18 * len(labels))
     figure = new_figure(max(size[0], Size.COLUMN), max(size[1], 1.5))
     panels = figure.subplots(rows, columns, sharey=True, squeeze=False).ravel()
-    place = frame[key].map(labels.index)
+    frame = frame.assign(place=frame[key].map(labels.index)).replace(np.inf, np.nan)
     for axes, name in zip(panels, names, strict=False):
-        values, style = frame[name], {"color": Colour.GREY, "lw": 0.9}
         style_axes(axes, _label_key(table, str(name)))
-        if place.is_unique:
-            axes.barh(place, values.replace(np.inf, np.nan), height=0.7, color=Colour.LINES[0])
-        else:  # samples of a case
-            axes.plot(values, place, "o", ms=3.5, color=Colour.LINES[0])
-        axes.axvline(values.iloc[0], ls="--", label=f"{labels[0]}, the first", **style)
+        if frame["place"].is_unique:
+            axes.barh(frame["place"], frame[name], height=0.7, color=Colour.LINES[0])
+        else:  # motions or samples of a case
+            sets = frame.groupby(pairs, sort=False) if pairs else [(("",), frame)]
+            for number, ((pair, *_), dots) in enumerate(sets):
+                colour = Colour.LINES[number % len(Colour.LINES)]
+                label = {"label": f"{pair}"} if pairs else {}
+                axes.plot(dots[name], dots["place"], "o", ms=3.5, color=colour, **label)
+            if frame[name].min() > 0.0 and frame[name].max() > WIDE_RATIO * frame[name].min():
+                axes.set_xscale("log")
+        style = {"color": Colour.GREY, "lw": 0.9}
+        if not pairs:
+            axes.axvline(frame[name].iloc[0], ls="--", label=f"{labels[0]}, the first", **style)
         if name in REQUIRED_FACTORS:
-            axes.axvline(1.0, **style)
+            axes.axvline(1.0, label="a factor of 1", **style)
     panels[0].set_yticks(range(len(labels)), labels)
     panels[0].set_ylim(len(labels) - 0.5, -0.5)
     for axes in panels[len(names) :]:

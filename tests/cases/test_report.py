@@ -888,6 +888,9 @@ def test_a_study_stands_in_a_report(kept, unplotted, tmp_path, capsys):
     shown = " ".join(words_of(kept / "report.html").split("Study of many cases")[2].split())
     assert "Study: Breadths." in shown
     assert "structure.breadth factor 0.5 0.25 1 0.5" in shown
+    conclusion = " ".join(words_of(kept / "report.html").split())
+    assert "In the study the factor is least, 0.25, at structure.breadth = 0.5." in conclusion
+    assert "Lengths" not in conclusion.partition("were not varied")[0]
     assert af.commands.main(["report", str(kept), "--study", str(tmp_path)]) == 1
     assert "has no study.txt" in capsys.readouterr().err
 

@@ -98,6 +98,27 @@ def test_cases_alone_are_bars_beside_their_names():
     assert "slip [m]" in [axes.get_xlabel() for axes in draw_findings(table).axes]
 
 
+def test_cases_under_several_motions_are_dots_beside_their_names():
+    """A colour for each motion; a fall of metres leaves millimetres legible."""
+    names = [f"case {k}" for k in range(14) for _ in range(2)]
+    moved = np.array([*np.linspace(0.0005, 0.004, 27), 1.7])
+    table = xr.Dataset(
+        {"moved": ("point", moved, {"units": "m"})},
+        {"case": ("point", names), "pair": ("point", ["first", "second"] * 14)},
+    )
+    figure = draw_findings(table)
+    (axes,) = figure.axes
+    assert [text.get_text() for text in axes.get_yticklabels()] == [*dict.fromkeys(names)]
+    assert [line.get_xdata().tolist() for line in axes.lines] == [
+        moved[::2].tolist(),
+        moved[1::2].tolist(),
+    ]
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["first", "second"]
+    assert axes.get_xscale() == "log"
+    (near,) = draw_findings(table.isel(point=slice(26))).axes
+    assert near.get_xscale() == "linear"
+
+
 def test_names_of_many_ratings_do_not_overlap():
     """Only the factors have panels, with a line at 1."""
     names = [f"mobilisation {k}, dispersal uniform, 1 in 2" for k in range(14)]

@@ -1,11 +1,12 @@
 """HTML report of the results of a case.
 
-    conclusion   head, outcome with margin and range, doubts
-    inputs       inputs with their marks
-    report       HTML report of a case
-    report_data  case, runs and files of a report
-    response     sections on ground motions, runs and their checks
-    sections     the other sections: inputs, structure, capacity, further results, sources
+    conclusion      head, outcome with margin and range, doubts
+    inputs          inputs with their marks
+    report          HTML report of a case
+    report_data     case, runs and files of a report
+    response        sections on ground motions, runs and their checks
+    study_findings  the worst of each case of a study, and what changes the answer
+    sections        the other sections: inputs, structure, capacity, further results, sources
 
 Start reading at `report`.
 """

@@ -13,6 +13,7 @@ from archfem._files import read_file_list
 from archfem.cases import result_text
 from archfem.cases.case import REPORT_KEYS
 from archfem.cases.report.report_data import SHOWN_RESULTS, ReportData
+from archfem.cases.report.study_findings import list_studied, read_study, say_what_changes
 from archfem.cases.result_text import RESULTS, Row
 from archfem.dynamics.collapse_state import COLLAPSE_STATES, FALLEN_STATES, CollapseState
 from archfem.dynamics.history import History
@@ -210,6 +211,8 @@ def _build_lead(data: ReportData, rows: Sequence[Row], doubtful: Sequence[str]) 
         carries = "is elastic in the runs and carries tension, which soil does not"
         lead.append(f"{join_names(fill)} {carries}")
     lead += _describe_margin(data, rows)
+    if (study := read_study(data)) is not None:
+        lead += say_what_changes(study)
     if data.runs and not doubtful:
         lead.append("the checks of the numbers raise no doubt")
     lead += [f"the doubts below, on {join_names(doubtful)}, may change this"] if doubtful else []
@@ -461,10 +464,12 @@ def list_unvaried(data: ReportData) -> list[str]:
     predicted = all("predicted_error" in run.dataset.attrs for run in data.runs.values())
     if not predicted and "accuracy.txt" not in data.files:
         single += ["fidelity"] if "dt" in list_varied(data) else ["time step", "fidelity"]
-    return single
+    study = read_study(data)
+    studied = set() if study is None else list_studied(study)
+    return [each for each in single if each not in studied]
 
 
 def sentence(text: str) -> str:
     """Return a text with a capital at its beginning and a full stop at its end."""
     text = text.strip()
-    return text[:1].upper() + text[1:] + ("" if text.endswith(".") else ".")
+    return text[:1].upper() + text[1:] + ("" if text.endswith((".", "?")) else ".")

@@ -12,7 +12,6 @@ import numpy as np
 import xarray as xr
 
 from archfem._files import read_listed
-from archfem._netcdf import read_dataset
 from archfem.cases.report.conclusion import (
     build_conclusion,
     list_elastic_fill,
@@ -31,6 +30,7 @@ from archfem.cases.report.response import (
     build_joint_section,
     build_run_sections,
 )
+from archfem.cases.report.study_findings import read_study, tabulate_study
 from archfem.cases.run import DRAWING_FILE
 from archfem.dynamics.history import SIGN_CONVENTION
 from archfem.dynamics.recorder import library_versions
@@ -58,10 +58,6 @@ _THRUST = "Thrust line under dead load, drawn where the resultant of each joint 
 
 MAX_SLENDERNESS = 2.6  # length over height of a structure that is legible at half the width
 MAX_WIDTH = 170.0  # of a figure of many panels [mm]
-
-# Findings of studies that a report shows, those that decide first, and the number of points
-_FINDINGS = ("factor", "without_pressure", "residual_displacement", "largest_displacement", "fall")
-MAX_POINTS = 24
 
 _PLAYER_CAPTION = "The structure at an instant, the ground acceleration, and one joint."
 
@@ -355,35 +351,23 @@ def _build_scale(data: ReportData) -> list[Any]:
 
 def _build_study(data: ReportData) -> list[Any]:
     """Build table and picture of a study: of a comparison of cases those that it has written."""
-    place = data.study or data.folder
-    if place is None or not (place / "study.txt").is_file():
-        if data.study is not None:
-            raise InvalidInput(f"{place} has no study.txt, which `archfem study` writes: run it")
+    if (found := read_study(data)) is None:
         return []
-    title, _, text = read_listed(place, "study.txt").decode("utf-8").strip().partition("\n\n")
-    table = read_dataset(place / "results.nc", "table").drop_dims("entry", errors="ignore")
-    frame = table.to_dataframe().reset_index()
-    keys = [str(name) for name in table.coords if frame[name].nunique() > 1]
-    names = [name for name in _FINDINGS if name in table.data_vars]
-    caption = f"Study: {title}"
-    if not keys or not names:
+    caption = f"Study: {found.title}"
+    if not len(found.worst):
+        place = data.study or data.folder
+        assert place is not None  # where the study was read
         read_listed(place, "study.png")
-        return [TextBlock(text, "lines", caption), FigureBlock.read(place / "study.png", caption)]
-    shown = frame[[*keys, *names]].head(MAX_POINTS)
-    rows = [[f"{x:.4g}" if isinstance(x, float) else str(x) for x in row] for row in shown.values]
-    more = f"; the first {MAX_POINTS} of {len(frame)} points" if len(frame) > MAX_POINTS else ""
-    head = [_label_finding(table, name) for name in shown]
-    blocks: list[Any] = [Grid(head, rows, f"{caption}{more}")]
+        return [
+            TextBlock(found.text, "lines", caption),
+            FigureBlock.read(place / "study.png", caption),
+        ]
+    blocks: list[Any] = [tabulate_study(found)]
     with suppress(InvalidInput), limit_width(MAX_WIDTH):  # no number differs
-        numbers = [name for name in names if table[name].dtype.kind == "f"]
-        blocks.append(FigureBlock.of(draw_findings(table[numbers], max_panels=4), f"{caption}."))
+        numbers = [name for name in found.names if found.table[name].dtype.kind == "f"]
+        figure = draw_findings(found.table[numbers], max_panels=4)
+        blocks.append(FigureBlock.of(figure, sentence(f"{caption}; all points")))
     return blocks
-
-
-def _label_finding(table: xr.Dataset, name: str) -> str:
-    """Return the name of a key or finding, with its unit."""
-    unit = table[name].attrs.get("units")
-    return f"{name.replace('_', ' ')} [{unit}]" if unit else name.replace("_", " ")
 
 
 def _build_range(data: ReportData) -> list[Any]:

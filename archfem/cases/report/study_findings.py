@@ -1,0 +1,171 @@
+"""Findings of a study in a report: the worst point of each case, falls first, and what decides."""
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from archfem._files import read_listed
+from archfem._netcdf import read_dataset
+from archfem.cases.report.report_data import ReportData
+from archfem.dynamics.collapse_state import COLLAPSE_STATES, FALLEN_STATES
+from archfem.errors import InvalidInput
+from archfem.units import format_mm
+from archfem.view.pages.document import Grid
+
+# Findings that a report shows, those that decide first: of factors the least is the worst
+_FACTORS = ("factor", "without_pressure")
+_SIZES = ("residual_displacement", "largest_displacement")
+MAX_CASES = 24
+MAX_NAMES = 4  # of cases in a sentence
+
+# Coordinates that number points, or are motions of one case
+_NO_CASE = {"point", "sample", "variation", "pair", "suite.pair"}
+
+# What a key of a case varies, in the words of the conclusion
+_VARIED = {
+    "lengths": r"structure\.(?!gravity|material|contact)",
+    "stiffness": r"contacts\..*\.(\w*stiffness|closure|finish)$",
+    "friction": r"contacts\..*\.friction$",
+    "damping": r"analysis\.damping",
+    "size of the motions": r"(motion|suite)\.(scale|reduction|target)|.*\.pga$",
+    "time step": r"analysis\.(dt|tolerance)$",
+    "motion": r"suite\.pair$|motion\.(file|synthetic)",
+    "fidelity": r"model\.fidelity$",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class StudyFindings:
+    """Table of a study, and the worst point of each case."""
+
+    title: str
+    text: str  # that the command has written
+    table: xr.Dataset
+    keys: tuple[str, ...]  # coordinates that tell cases apart
+    names: tuple[str, ...]  # findings that are shown, that which decides first
+    worst: Any  # DataFrame, a row for each case in the order of the study; `falls`, of `runs`
+
+    @property
+    def decides(self) -> str:
+        """Name of the finding by which cases are compared."""
+        return self.names[0]
+
+    def label(self, row: Any) -> str:
+        """Return the name of the case of a row."""
+        if self.keys == ("case",):
+            return f"'{row['case']}'"
+        return ", ".join(f"{key.replace('_', ' ')} = {_format(row[key])}" for key in self.keys)
+
+
+def read_study(data: ReportData) -> StudyFindings | None:
+    """Read the study of a report, or of its results; None if there is none."""
+    place = data.study or data.folder
+    if place is None or not (place / "study.txt").is_file():
+        if data.study is not None:
+            raise InvalidInput(f"{place} has no study.txt, which `archfem study` writes: run it")
+        return None
+    title, _, text = read_listed(place, "study.txt").decode("utf-8").strip().partition("\n\n")
+    return collect_findings(title, text, read_dataset(place / "results.nc", "table"))
+
+
+def collect_findings(title: str, text: str, table: xr.Dataset) -> StudyFindings:
+    """Return the worst point of each case of the table of a study."""
+    table = table.drop_dims("entry", errors="ignore")
+    frame = table.to_dataframe().reset_index()
+    differing = [str(name) for name in table.coords if frame[name].nunique() > 1]
+    keys = [name for name in differing if name not in _NO_CASE] or differing
+    names = [name for name in (*_FACTORS, *_SIZES) if name in table.data_vars]
+    worst = _find_worst(frame, keys, names) if keys and names else frame.head(0)
+    return StudyFindings(title, text, table, tuple(keys), tuple(names), worst)
+
+
+def _find_worst(frame: Any, keys: list[str], names: list[str]) -> Any:
+    """Return the worst point of each case, with the number of its falls and of its motions."""
+    states = frame["fall"] if "fall" in frame else frame[names[0]].map(lambda _: "")
+    rank = states.map(lambda state: COLLAPSE_STATES.index(state) if state else 0)
+    size = frame[names[0]] if names[0] in _FACTORS else -frame[names[0]]
+    ranked = frame.assign(rank=-rank, size=size, falls=states.isin(FALLEN_STATES), runs=1)
+    counts = ranked.groupby(keys, sort=False, dropna=False)[["falls", "runs"]].transform("sum")
+    ranked = ranked.assign(**{name: counts[name] for name in counts})
+    return ranked.sort_values(["rank", "size"]).drop_duplicates(keys).sort_index()
+
+
+def tabulate_study(found: StudyFindings) -> Grid:
+    """Tabulate the worst point of each case: those that fall first, then those with doubts."""
+    ranks = ["rank", *(["doubts"] if "doubts" in found.worst else [])]
+    order = found.worst.sort_values(ranks, ascending=[True, False][: len(ranks)], kind="stable")
+    pair = next((name for name in ("pair", "suite.pair") if name in order), "")
+    several = pair not in ("", *found.keys) and order["runs"].max() > 1
+    state = "fall" in order and any(order["fall"])
+    head = [_label_finding(found.table, name) for name in (*found.keys, *found.names)]
+    head += ["under"] if several else []
+    head += ["outcome"] if state else []
+    rows = []
+    for _, row in order.head(MAX_CASES).iterrows():
+        cells = [_format(row[name]) for name in (*found.keys, *found.names)]
+        cells += [str(row[pair])] if several else []
+        count = f", in {row['falls']} of {row['runs']}" if several and row["falls"] else ""
+        rows.append([*cells, f"{row['fall']}{count}"] if state else cells)
+    caption = f"Study: {found.title}"
+    caption += "; of each case its worst motion" if several else ""
+    if left := order.iloc[MAX_CASES:].to_dict("records"):
+        falls = sum(row["falls"] > 0 for row in left)
+        caption += f"; {len(left)} of {len(order)} cases are left out, of which {falls} fall"
+    return Grid(head, rows, caption)
+
+
+def _label_finding(table: xr.Dataset, name: str) -> str:
+    """Return the name of a key or finding, with its unit."""
+    unit = table[name].attrs.get("units")
+    return f"{name.replace('_', ' ')} [{unit}]" if unit else name.replace("_", " ")
+
+
+def _format(value: Any) -> str:
+    """Return a number with four digits, or a word."""
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def say_what_changes(found: StudyFindings) -> Iterator[str]:
+    """Yield a sentence: which cases of a study fall, and which differs most from the first."""
+    if not len(found.worst):
+        return
+    rows, name = found.worst.to_dict("records"), found.decides
+    falling = [found.label(row) for row in rows if row["falls"]]
+    more = f" and {len(falling) - MAX_NAMES} more" * (len(falling) > MAX_NAMES)
+    text = f"in the study none of {len(rows)} cases falls, and "
+    if falling:
+        count = f"{len(falling)} of {len(rows)} cases fall{'s' * (len(falling) == 1)}"
+        text = f"in the study {count}: {', '.join(falling[:MAX_NAMES])}{more}; of the others "
+    elif "fall" not in found.table:
+        text = "in the study "
+    others = [row for row in rows if not row["falls"] and np.isfinite(row[name])]
+    if len(others) > 1:
+        yield text + _compare_cases(found, others)
+    elif falling:
+        yield text.removesuffix("; of the others ")
+
+
+def _compare_cases(found: StudyFindings, rows: list[Any]) -> str:
+    """Say which of some cases changes the finding that decides most."""
+    name, first = found.decides, rows[0]
+    least, words = name in _FACTORS, name.replace("_", " ")
+    extreme = (min if least else max)(rows, key=lambda row: row[name])
+    show = format_mm if found.table[name].attrs.get("units") == "m" else "{:.3g}".format
+    if found.keys != ("case",):  # none of them is the given one
+        end = "least" if least else "largest"
+        return f"the {words} is {end}, {show(extreme[name])}, at {found.label(extreme)}"
+    verb = "lowers" if least else "raises"
+    if extreme is first:
+        return f"none {verb} the {words} of {found.label(first)}, {show(first[name])}"
+    change = f"from {show(first[name])} to {show(extreme[name])}"
+    return f"{found.label(extreme)} {verb} the {words} most, {change}"
+
+
+def list_studied(found: StudyFindings) -> set[str]:
+    """Return what a study varies, in the words of the conclusion."""
+    keys = [*str(found.table.attrs.get("varied", "")).split("; "), *found.keys]
+    return {word for word, key in _VARIED.items() if any(re.match(key, each) for each in keys)}

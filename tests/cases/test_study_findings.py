@@ -1,0 +1,99 @@
+"""Studies in reports: a row for each case, those that fall first, and what changes the answer."""
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import archfem as af
+from archfem.cases.report import study_findings
+
+
+def study(falls=(), cases=30, **attrs):
+    """Return the findings of cases under two motions; some fall under the second."""
+    rows = [(f"case {k}", pair) for k in range(cases) for pair in ("first", "second")]
+    sizes = [0.001 * (1 + k // 2) for k in range(2 * cases)]
+    for k in falls:
+        sizes[2 * k + 1] = 1.7
+    states = ["fallen" if size == 1.7 else "stands" for size in sizes]
+    table = xr.Dataset(
+        {"residual_displacement": ("point", sizes, {"units": "m"}), "fall": ("point", states)},
+        {
+            "point": np.arange(2 * cases),
+            "case": ("point", [case for case, _ in rows]),
+            "pair": ("point", [pair for _, pair in rows]),
+        },
+        attrs=attrs,
+    )
+    return study_findings.collect_findings("Title", "", table)
+
+
+def test_each_case_has_a_row_and_those_that_fall_are_the_first():
+    grid = study_findings.tabulate_study(study(falls=[29]))
+    assert grid.head == ["case", "residual displacement [m]", "under", "outcome"]
+    assert len(grid.rows) == study_findings.MAX_CASES
+    assert grid.rows[0] == ["case 29", "1.7", "second", "fallen, in 1 of 2"]
+    assert grid.rows[1][0] == "case 0"
+    assert grid.caption.endswith("worst motion; 6 of 30 cases are left out, of which 0 fall")
+    many = study_findings.tabulate_study(study(falls=range(27)))
+    assert many.caption.endswith("6 of 30 cases are left out, of which 3 fall")
+    assert "left out" not in study_findings.tabulate_study(study(cases=24)).caption
+
+
+def test_cases_with_doubts_stand_before_others():
+    found = study(cases=3)
+    found.worst["doubts"] = [0.0, 0.0, 1.0]
+    rows = study_findings.tabulate_study(found).rows
+    assert [row[0] for row in rows] == ["case 2", "case 0", "case 1"]
+
+
+@pytest.mark.parametrize(
+    ("falls", "words"),
+    [
+        (
+            (),
+            "in the study none of 9 cases falls, and 'case 8' raises the residual displacement "
+            "most, from 1 mm to 9 mm",
+        ),
+        (
+            [8],
+            "in the study 1 of 9 cases falls: 'case 8'; of the others 'case 7' raises the "
+            "residual displacement most, from 1 mm to 8 mm",
+        ),
+        (
+            range(1, 9),
+            "in the study 8 of 9 cases fall: 'case 1', 'case 2', 'case 3', 'case 4' and 4 more",
+        ),
+    ],
+)
+def test_one_sentence_says_what_changes_the_answer(falls, words):
+    assert [*study_findings.say_what_changes(study(falls, 9))] == [words]
+
+
+def test_of_factors_the_least_is_the_worst():
+    table = xr.Dataset({"factor": ("case", [0.6, 0.7, np.inf, 0.5])}, {"case": [*"abcd"]})
+    (text,) = study_findings.say_what_changes(study_findings.collect_findings("", "", table))
+    assert text == "in the study 'd' lowers the factor most, from 0.6 to 0.5"
+    higher = table.isel(case=[0, 1])
+    (text,) = study_findings.say_what_changes(study_findings.collect_findings("", "", higher))
+    assert text == "in the study none lowers the factor of 'a', 0.6"
+    varied = xr.Dataset(
+        {"factor": (("friction", "width"), [[0.6, 0.7], [0.5, 0.4]])},
+        {"friction": [0.5, 0.4], "width": [1.0, 2.0]},
+    )
+    (text,) = study_findings.say_what_changes(study_findings.collect_findings("", "", varied))
+    assert text == "in the study the factor is least, 0.4, at friction = 0.4, width = 2"
+
+
+def test_the_table_of_a_study_names_what_it_varies(tmp_path):
+    """Also what named cases change; a value that all cases share is not varied."""
+    (tmp_path / "column.toml").write_text(
+        '[structure]\nshape = "column"\nheights = [2.0]\nbreadth = 0.5\n[limit]\nhorizontal = 1.0\n'
+    )
+    (tmp_path / "study.toml").write_text(
+        'case = "column.toml"\ncompute = "limit"\nset = ["structure.width=2"]\n[cases]\n"a" = {}\n'
+        '"b" = { set = ["structure.breadth=1", \'contacts."stone to stone".friction=0.4\'] }\n'
+    )
+    table = af.Study.read(tmp_path / "study.toml").run(workers=1)
+    assert table.attrs["varied"] == "contacts.stone to stone.friction; structure.breadth"
+    found = study_findings.collect_findings("", "", table)
+    assert study_findings.list_studied(found) == {"lengths", "friction"}
