@@ -96,7 +96,8 @@ def thickness(options: argparse.Namespace) -> None:
     print(case.title)
     print(
         f"least thickness at rest: {format_mm(least)} of {format_mm(ring.thickness)}, the "
-        "mean depth of its joints, about the middle line; the ring alone on fixed springings\n"
+        "mean depth of its joints as drawn, all stones scaled alike about the middle line; "
+        "the ring alone on fixed springings\n"
         f"geometric factor of safety: {ring.thickness / least:.3g}; "
         f"{describe_crushing(limit.strength, case.structure)}"
     )

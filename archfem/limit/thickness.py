@@ -22,7 +22,8 @@ def minimum_thickness(
 ) -> float:
     """Find the least thickness at which a family of structures stands, by bisection [m].
 
-    The search doubles a very small thickness until one stands, and then halves the bracket.
+    The search doubles a very small thickness until one stands, and then halves the bracket. One so
+    thin that it cannot be built, as unequal stones that no longer touch, does not stand.
 
     Args:
         build: function from a thickness [m] to the structure.
@@ -54,7 +55,11 @@ def minimum_thickness(
     low, high = _find_bracket(build, is_stable)
     while high - low > tolerance * high:
         middle = 0.5 * (low + high)
-        low, high = (low, middle) if is_stable(middle) else (middle, high)
+        try:
+            stable = is_stable(middle)
+        except InvalidStructure:  # thinner than one that can be built, which stands
+            stable = False
+        low, high = (low, middle) if stable else (middle, high)
     return high
 
 
@@ -62,10 +67,10 @@ def _find_bracket(
     build: Callable[[float], Structure], is_stable: Callable[[float], bool]
 ) -> tuple[float, float]:
     """Return an unstable thickness and a stable one, at most twice as large [m]."""
-    # Thinner than anything built: the search starts here. The size is that of a thin member: the
-    # thickest may be all thickness.
-    thin = 1e-4 * build(1e-4 * _family_size(build)).size
+    thin, is_start = _find_thin_member(build)
     if is_stable(thin):
+        if not is_start:
+            return 0.5 * thin, thin
         raise InvalidInput(
             f"it stands at any thickness, even {thin:.3g} m: there is no least one to look for"
         )
@@ -102,8 +107,30 @@ def _largest_thickness(
     ) from refusal
 
 
-def _family_size(build: Callable[[float], Structure]) -> float:
-    """Return the size of the thickest member that can be built, from 100 m down [m]."""
+def _find_thin_member(build: Callable[[float], Structure]) -> tuple[float, bool]:
+    """Return a thickness smaller than any built, or the least to be had [m]; whether it is one."""
+    largest, size = _largest_member(build)
+    # the largest may be all thickness: the search starts at a share of the size of a thin one
+    _, member = _double_until_built(build, 1e-4 * size, largest)
+    start = 1e-4 * member.size
+    thin, _ = _double_until_built(build, start, largest)
+    return thin, thin == start
+
+
+def _double_until_built(
+    build: Callable[[float], Structure], thickness: float, largest: float
+) -> tuple[float, Structure]:
+    """Return the first thickness that can be built, and its structure."""
+    while thickness < largest:
+        try:
+            return thickness, build(thickness)
+        except InvalidStructure:  # as of unequal stones that no longer touch
+            thickness *= 2.0
+    return largest, build(largest)
+
+
+def _largest_member(build: Callable[[float], Structure]) -> tuple[float, float]:
+    """Return the largest thickness that can be built, from 100 m down, and its size [m]."""
     for thickness in 10.0 ** np.arange(2, -7, -1):
         try:
             built = build(float(thickness))
@@ -111,5 +138,5 @@ def _family_size(build: Callable[[float], Structure]) -> float:
             refusal = error
             continue
         check_type(built, Structure, f"build({thickness:g})", "make a structure, thickness given")
-        return built.size
+        return float(thickness), built.size
     raise InvalidInput(f"build makes no structure 1e-6 to 100 m thick: {refusal}")

@@ -40,10 +40,12 @@ class Ring:
         same factor: the arch of which Heyman's geometric factor of safety is the multiple.
 
         Args:
-            thickness: mean depth of the joints [m].
+            thickness: mean depth of the joints as drawn, times the factor [m]. Joints of unequal
+                stones are those along both, and become less deep than that.
 
         Raises:
-            InvalidStructure: the stones of a thicker ring run into themselves.
+            InvalidStructure: the stones of a thicker ring run into themselves, or those of a
+                thinner one no longer touch.
 
         References:
             Heyman, Int. J. Mech. Sci. 11 (1969) 363-385.

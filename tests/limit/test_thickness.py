@@ -70,6 +70,20 @@ def test_the_greatest_that_can_be_built_may_be_the_only_one_that_stands():
     assert minimum_thickness(bounded, tolerance=1e-4) == pytest.approx(free, rel=2e-4)
 
 
+@pytest.mark.parametrize("share", [0.5, 1.0, 1.4])
+def test_a_thickness_too_thin_to_build_does_not_stand(share):
+    """The least that can be built stands where it is thicker than the least that stands."""
+    free = minimum_thickness(lambda t: ring(thickness=t), tolerance=1e-4)
+
+    def bounded(thickness):
+        if thickness < share * free:
+            raise af.InvalidStructure("stones do not touch")
+        return ring(thickness=thickness)
+
+    found = minimum_thickness(bounded, tolerance=1e-4)
+    assert found == pytest.approx(max(1.0, share) * free, rel=2e-4)
+
+
 def test_a_least_thickness_far_below_the_greatest_that_can_be_built_is_found():
     """A ring along its intrados may be 100 m thick, and this one stands from 14 mm on."""
     x = np.linspace(-2.0, 2.0, 2001)

@@ -115,6 +115,33 @@ def test_stones_of_unequal_depth_touch_along_what_is_common():
     assert [block.area for block in half.blocks[:2]] == pytest.approx([0.5, 0.4])
 
 
+def test_unequal_stones_that_no_longer_touch_do_not_stand(tmp_path):
+    """Every second stone of a semicircle is deeper outwards: thin ones miss their neighbours."""
+    angles, drawing = np.linspace(np.pi, 0.0, 14), ezdxf.new(units=ezdxf.units.M)
+
+    def draw(angles, inner, outer, layer):
+        polar = zip([*angles, *angles[::-1]], [inner, inner, outer, outer], strict=True)
+        corners = [(radius * np.cos(angle), radius * np.sin(angle)) for angle, radius in polar]
+        drawing.modelspace().add_lwpolyline(corners, close=True, dxfattribs={"layer": layer})
+
+    for k in range(13):
+        draw(angles[k : k + 2], 1.0, 1.3 + 0.06 * (k % 2), "RING")
+    for end, side in ((0.0, -0.3), (np.pi, 0.3)):
+        draw([end, end + side], 0.9, 1.5, "ROCK")
+    drawing.saveas(tmp_path / "arch.dxf")
+    ring = find_ring(read(tmp_path / "arch.dxf"))
+    with pytest.raises(af.InvalidStructure, match="do not touch any more"):
+        ring.with_thickness(0.02)
+    least = af.minimum_thickness(ring.with_thickness, tolerance=1e-5)
+    assert af.stands(ring.with_thickness(least))
+    assert not af.stands(ring.with_thickness(0.9999 * least))
+    # joints become less deep than the factor says by what neighbours are offset, 30 mm (1 - factor)
+    factor = least / ring.thickness
+    assert ring.with_thickness(least).depths[1:-1] == pytest.approx(
+        0.3 * factor - 0.03 * (1.0 - factor), abs=1e-3
+    )
+
+
 @pytest.mark.parametrize(
     ("build", "message"),
     [
