@@ -14,6 +14,7 @@ from archfem.dynamics.history import History
 from archfem.dynamics.loose_fill import _cut_off, interpolate_field, loosen_fill
 from archfem.dynamics.recorder import Record
 from archfem.dynamics.rigid_body.bodies import LooseBlocks
+from archfem.masonry.block import rotate
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.studies.study import Study
 from archfem.studies.variations import as_falling, prepare_runs
@@ -54,6 +55,20 @@ def test_the_least_is_cut_off_two_squares(share):
     assert _cut_off(SQUARE, np.add(SQUARE, (1.0, 0.0)), every, share) is SQUARE
 
 
+@pytest.mark.parametrize("share", [1.0, 0.5])
+def test_a_corner_is_cut_off_along_the_face_that_it_is_in(share):
+    """A square of which a corner is by d in a face x + y = 2 - d √2."""
+    other, every, depth = (
+        np.array([(1.9, 0.0), (1.9, 1.9), (0.0, 1.9)]),
+        np.ones(4, bool),
+        0.1 / 2**0.5,
+    )
+    one, two = _cut_off(SQUARE, other, every, share), _cut_off(other, SQUARE, every, share)
+    assert shapely.area(shapely.Polygon(one)) == pytest.approx(1.0 - (share * depth) ** 2)
+    legs = 1.9 - share * 0.1
+    assert shapely.area(shapely.Polygon(two)) == pytest.approx(legs**2 / 2.0)
+
+
 def test_grains_of_fill_as_built_fill_its_place(footbridge):
     (number,) = find_yielding_blocks(footbridge)
     loose = loosen_fill(footbridge, LooseBlocks.as_built(footbridge), {})
@@ -71,7 +86,8 @@ def test_fill_that_was_pressed_into_stones_is_cut_off(footbridge):
     """A body that lies 0.1 m too deep loses what is in the arch, and in no grain twice."""
     (number,) = find_yielding_blocks(footbridge)
     start = LooseBlocks.as_built(footbridge)
-    start.poses[number] = 0.0, -0.1, 0.0
+    start.poses[:, 0] = 0.3  # of all
+    start.poses[number, 1] = -0.1
     loose = loosen_fill(footbridge, start, {})
     placed = [
         place(block, pose)
@@ -80,7 +96,7 @@ def test_fill_that_was_pressed_into_stones_is_cut_off(footbridge):
     fill, whole = loose.origin == number, shapely.Polygon(footbridge.blocks[number].drawn())
     grains, stones = ([placed[k] for k in np.flatnonzero(which)] for which in (fill, ~fill))
     masonry, soil = shapely.unary_union(stones), shapely.unary_union(grains)
-    inside = shapely.difference(shapely.affinity.translate(whole, 0.0, -0.1), masonry)
+    inside = shapely.difference(shapely.affinity.translate(whole, 0.3, -0.1), masonry)
     # straight cuts take a little more at corners of stones
     assert 0.95 * inside.area < soil.area <= inside.area + 0.01
     # stones are drawn with more chords than they are simulated with
@@ -106,6 +122,26 @@ def test_grains_have_the_motion_of_their_body(footbridge):
     assert middle[0] == pytest.approx(body.centroid[0] + 0.02 * body.centroid[1], abs=2e-3)
     moved = next(iter(loose_frames(loose)))
     assert loose.restore(moved).velocities[number, 0] == pytest.approx(body.centroid[1], rel=0.02)
+
+
+def test_grains_of_a_turning_bridge_turn_with_it(footbridge):
+    """All blocks turn and move as one rigid body: no grain is cut, and each has its speed."""
+    (number,) = find_yielding_blocks(footbridge)
+    start, turn, spin = LooseBlocks.as_built(footbridge), 0.1, 2.0
+    built = np.array([block.centroid for block in footbridge.blocks])
+    placed = np.add(rotate(built, turn), (0.5, 2.0))
+    start.poses[:, :2], start.poses[:, 2] = placed - built, turn
+    start.velocities[:] = np.column_stack(
+        [-spin * placed[:, 1], spin * placed[:, 0], np.full(len(placed), spin)]
+    )
+    loose = loosen_fill(footbridge, start, {})
+    which = np.flatnonzero(loose.origin == number)
+    grains = [loose.structure.blocks[k] for k in which]
+    area = sum(grain.area for grain in grains)
+    assert area == pytest.approx(footbridge.blocks[number].area, rel=2e-3)
+    x, y = np.array([grain.centroid for grain in grains]).T
+    expected = np.column_stack([-spin * y, spin * x, np.full_like(x, spin)])
+    assert loose.start.velocities[which] == pytest.approx(expected, abs=2e-3)
 
 
 def loose_frames(loose):

@@ -1,6 +1,7 @@
 """Ratings with one changed property at a time: against whole ratings of changed cases."""
 
 import re
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -9,7 +10,7 @@ import pytest
 import archfem as af
 from archfem.cases.analysis_keys import rate_case
 from archfem.studies import variations
-from archfem.studies.variations import vary_rating
+from archfem.studies.variations import _list_rating_changes, vary_rating
 
 SEARCHED = 0.005
 """Relative: varied ratings search the places of least bounds, whole ones all of them."""
@@ -79,7 +80,38 @@ def test_each_row_is_the_rating_of_a_changed_case(tmp_path):
     assert words == f"one property at a time changes the factor of {found.factor:.4g} {ends}"
 
 
-def test_variations_that_are_stopped_are_kept(tmp_path, unplotted, capsys, monkeypatch):
+@pytest.mark.parametrize("key", ["breadth", "gap"])
+def test_the_keys_of_a_case_are_changed_one_property_at_a_time(tmp_path, key):
+    """By a gap all piers are a tenth of the least breadth broader."""
+    path = tmp_path / "case.toml"
+    path.write_text(CASE.replace("PIER", f'{key} = "0.8 m"').replace("0.3 m", "0.05 m"))
+    case = af.Case.read(path)
+    joints = [SimpleNamespace(role="pier", depth=depth) for depth in (0.7, 0.5, 0.6)]
+    structure = SimpleNamespace(width=3.0, joints=joints)
+    found = SimpleNamespace(structure=structure, strength=4e6, width=2.8, fill=case.limit.fill)
+    changes = dict(_list_rating_changes(case, found))
+    by = {"breadth": 0.08, "gap": 0.05}[key]
+    rings = ["structure.arches.thickness", "structure.arches.right.thickness"]
+    expected = {
+        "rings a tenth thinner": dict(zip(rings, (0.36, 0.405), strict=True)),
+        "rings a tenth thicker": dict(zip(rings, (0.44, 0.495), strict=True)),
+        "piers a tenth narrower": {f"structure.piers.{key}": 0.8 - by},
+        "piers a tenth broader": {f"structure.piers.{key}": 0.8 + by},
+        "0.1 m less cover": {"structure.backfill.cover": 0.02},
+        "0.1 m more cover": {"structure.backfill.cover": 0.15},
+        "half the strength of the stones": {"limit.strength": 2e6},
+        "a vehicle on 2.52 m": {"rating.width": 2.52},
+        "a vehicle on 3 m": {"rating.width": 3.0},
+    }
+    for angle in (30, 40):
+        changed = changes.pop(f"fill of {angle}°")["limit.fill.friction_angle"]
+        assert float(changed.removesuffix(" degree")) == pytest.approx(angle)
+    assert changes.keys() == expected.keys()
+    for name, values in expected.items():
+        assert changes[name] == pytest.approx(values), name
+
+
+def test_variations_that_are_stopped_are_kept(tmp_path, unplotted, capsys, monkeypatch, caplog):
     """The same command computes only those that are left; another rating computes all."""
     path, out = tmp_path / "case.toml", tmp_path / "out"
     path.write_text(CASE.replace("PIER", 'breadth = "0.87 m"'))
@@ -108,10 +140,22 @@ def test_variations_that_are_stopped_are_kept(tmp_path, unplotted, capsys, monke
     second = pd.read_csv(out / "rating_variations.csv").set_index("with")["factor"]
     assert "not computed" not in set(second)
     assert second["rings a tenth thinner"] == rows["rings a tenth thinner"]
-    assert "interrupted" not in (out / "rating.txt").read_text()
+    text, factors = (out / "rating.txt").read_text(), pd.to_numeric(second, errors="coerce")
+    assert "interrupted" not in text
+    ends = [f"{factors[name]:.4g} ({name})" for name in (factors.idxmin(), factors.idxmax())]
+    assert " to {} at least and {} at most\n".format(*ends) in text
     seen.clear()
+
+    def refuse(*given, **_):
+        seen.append(given)
+        raise af.DidNotConverge("no optimum", last=None)
+
+    monkeypatch.setattr(variations, "rate_again", refuse)
     af.commands.main([*command, "--live", "1.5"])
     assert len(seen) == 10
+    # that rings do not fit on a narrower pier is no failure
+    assert caplog.text.count("no optimum") == 10
+    assert "piers a tenth narrower" not in caplog.text
     capsys.readouterr()
 
 
