@@ -29,7 +29,7 @@ from archfem.joints.criteria import (
 )
 from archfem.limit.collapse import Collapse, Outcome, describe_fill
 from archfem.limit.fill_range import FillRange
-from archfem.limit.fill_strength import PlasticFill
+from archfem.limit.fill_strength import PlasticFill, as_pressure
 from archfem.limit.mechanism_count import Mechanism, duration_text
 from archfem.limit.rating import Rating
 from archfem.masonry.structure import Structure, describe_spans, join_joint_names, join_names
@@ -303,13 +303,15 @@ def describe_ratings(
     case: Case, rated: Sequence[tuple[Rating, Sequence[str]]], varied: ResultTable | None = None
 ) -> tuple[str, dict[str, str]]:
     """Return the text of ratings and their doubts, and this and its tables as files."""
-    texts = ["\n".join([str(found), *doubts]) for found, doubts in rated]
-    files = {"rating.csv": rated[0][0].table()}
+    lines = [[*str(found).splitlines(), *doubts] for found, doubts in rated]
+    files, tables = {"rating.csv": rated[0][0].table()}, list[str]()
     if len(rated) > 1:
         summary = tabulate_ratings([found for found, _ in rated])
-        texts.insert(0, summary.text)
-        files["vehicles.csv"] = summary.csv
-    texts.append(describe_fill_defaults(case))
+        tables, files["vehicles.csv"] = [summary.text], summary.csv
+        common = [line for line in lines[0] if all(line in other for other in lines)]
+        lines = [[line for line in own if line not in common] for own in lines]
+        lines.append(["of all vehicles:", *common])
+    texts = [*tables, *("\n".join(each) for each in lines), describe_fill_defaults(case)]
     files["rating.txt"] = "\n\n".join(filter(None, texts))
     if varied is None:
         return files["rating.txt"], files
@@ -318,7 +320,7 @@ def describe_ratings(
 
 
 def doubt_rating(found: Rating, limit: LimitAnalysis) -> list[str]:
-    """Return doubts about a rating, equilibrium and a strength left out, and a note on values."""
+    """Return doubts about a rating, equilibrium and a strength left out, and notes."""
     if np.isnan(found.factor):
         words = "limit analysis finds no equilibrium of the bridge under its own weight; check the "
         return [f"{DOUBT_MARK}{words}thickness of its rings and piers, and the fill"]
@@ -330,7 +332,13 @@ def doubt_rating(found: Rating, limit: LimitAnalysis) -> list[str]:
     if "from memory" in str(found):
         words = "values from memory were not compared with the text of their code"
         lines.append(f"{NOTE_MARK}{words}: look them up before you sign")
-    return lines
+    if (fill := as_pressure(found.fill)) is not None:
+        least = fill.active / fill.passive_coefficient**2  # over the passive pressure
+        if fill.mobilisation < least:
+            words = f"mobilisation {fill.mobilisation:.2g} counts as {least:.2g}, the active"
+            lines.append(f"{NOTE_MARK}{words} pressure; 0 is not without pressure, which is beside")
+    words = "a second lorry that meets the vehicle, and all that spandrel walls carry"
+    return [*lines, f"{NOTE_MARK}left out: {words}"]
 
 
 def describe_limit(case: Case, found: Collapse, opposite: Collapse | None) -> tuple[Collapse, str]:
@@ -501,18 +509,17 @@ def state_scale(
 
 
 def state_ratings(rated: Sequence[tuple[Rating, Sequence[str]]]) -> Statement:
-    """State the factor of each vehicle; of the first what pressure and backing add; the worst."""
-    rows = []
+    """State the factor of each vehicle, by codes too; of the first by pressure and backing."""
+    rows, sentences = [], list[str]()
     for found, _ in rated:
-        factor = "-" if np.isnan(found.factor) else f"{found.factor:.4g}"
-        rows.append(("rating", found.vehicle.name, f"{found.outcome}, {found.place}", factor))
-    first, doubts = rated[0][0], [doubt for _, own in rated for doubt in own]
-    worst = min((found for found, _ in rated), key=lambda each: each.factor)
-    sentences = [repr(first), *first.describe_codes()]
-    sentences += [*first.describe_pressure(), *first.describe_backing()]
-    if worst.factor < first.factor:
-        sentences.append(f"least of {len(rated)} vehicles: {worst!r}")
-    return Statement(sentences, rows, doubts)
+        name, factor = found.vehicle.name, "-" if np.isnan(found.factor) else f"{found.factor:.4g}"
+        rows.append(("rating", name, f"{found.outcome}, {found.place}", factor))
+        for code, (of_code, words) in found.by_codes.items():
+            rows.append(("rating", f"{name} {code}", words, f"{of_code:.4g}"))
+        sentences += [repr(found), *found.describe_codes()]
+        if found is rated[0][0]:
+            sentences += [*found.describe_pressure(), *found.describe_backing()]
+    return Statement(sentences, rows, [doubt for _, own in rated for doubt in own])
 
 
 def state_assessments(found: Mapping[str, KinematicAssessment], doubts: list[str]) -> Statement:

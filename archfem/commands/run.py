@@ -24,7 +24,7 @@ from archfem._files import (
 from archfem._optional import can_film
 from archfem.cases import result_folder as results
 from archfem.cases import result_text
-from archfem.cases.analysis_keys import list_vehicles, name_vehicles, parse_rating, rate_case
+from archfem.cases.analysis_keys import name_vehicles, parse_rating, rate_case
 from archfem.cases.case import Case
 from archfem.cases.defaults import describe_defaults, describe_fill_defaults
 from archfem.cases.result_text import RESULTS, state_ratings
@@ -59,7 +59,7 @@ from archfem.statics.mechanism_assessment import KinematicAssessment
 from archfem.statics.modes import Modes
 from archfem.statics.pushover import Pushover
 from archfem.units import MPa
-from archfem.view.collapse import draw_ratings
+from archfem.view.collapse import draw_ratings, draw_worst_places
 from archfem.view.motions import draw_suite
 from archfem.view.style import Files, write_files
 
@@ -284,7 +284,7 @@ def rate(options: argparse.Namespace) -> int:
     case = Case.read(options.case, options.changes)
     rating = {**case.settings.get("rating", {}), **given}
     tables = name_vehicles(options.vehicles, rating)
-    ratings, table = _rate_each(case, tables, list_vehicles(rating))
+    ratings, table = _rate_each(case, tables)
     (first, lines), varied, stated = ratings[0], None, state_ratings(ratings)
     interrupted = len(ratings) < len(tables) and not np.isnan(first.factor)
     if options.vary and not interrupted and not np.isnan(first.factor):
@@ -298,8 +298,10 @@ def rate(options: argparse.Namespace) -> int:
     files |= {RATING_FILE: format_tables({"rating": table}).rstrip(), **stated.as_file("rating")}
 
     def draw() -> Files:
-        every = {"vehicles.png": draw_ratings([found for found, _ in ratings])}
-        return {**files, "rating.png": first.plot(), **(every if len(ratings) > 1 else {})}
+        drawn = {"rating.png": first.plot()}
+        if len(found := [found for found, _ in ratings]) > 1:
+            drawn |= {"vehicles.png": draw_ratings(found), "places.png": draw_worst_places(found)}
+        return {**files, **drawn}
 
     _write_results("rate", case, options.out, f"{case.title}\n{text}", draw)
     if interrupted:
@@ -323,9 +325,9 @@ def _vary(
 
 
 def _rate_each(
-    case: Case, tables: Sequence[Mapping[str, Any]], own: Sequence[Any]
+    case: Case, tables: Sequence[Mapping[str, Any]]
 ) -> tuple[list[tuple[Rating, list[str]]], Mapping[str, Any]]:
-    """Return ratings with doubts, the case's own first and then the worst; table of the first.
+    """Return ratings with doubts, one's own vehicles before those of codes; table of the first.
 
     Those before Ctrl-C are returned, if there are any.
     """
@@ -348,7 +350,7 @@ def _rate_each(
             progress.show(f"{found.vehicle.name}: {found.headline.partition(',')[0]}", 1)
             if np.isnan(found.factor):  # whatever the vehicle
                 break
-    rated.sort(key=lambda each: (each[2]["vehicle"] not in own, each[0].factor))
+    rated.sort(key=lambda each: (isinstance(each[2]["vehicle"], str), each[0].factor))
     return [(found, doubts) for found, doubts, _ in rated], rated[0][2]
 
 

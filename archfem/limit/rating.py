@@ -1,7 +1,7 @@
 """Rating of bridges for vehicles of codes: partial factors, widths, geometric factor of safety."""
 
-from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from itertools import islice
 from typing import Any
 
@@ -28,19 +28,21 @@ from archfem.limit.vehicles import (
     VEHICLES,
     MovingLoad,
     Vehicle,
+    axles_on_rings,
     axles_on_structure,
     check_area_load,
     check_factor,
     collapse_factors,
     cut_road,
+    find_vehicle,
     find_worst_rows,
     moving_load,
     parse_axles,
+    places_at_ends,
     vehicle_positions,
 )
 from archfem.masonry.loads import PointLoad
 from archfem.masonry.structure import (
-    CONTACT_TOLERANCE,
     HasStructure,
     Structure,
     describe_spans,
@@ -54,9 +56,17 @@ from archfem.units import MPa
 # memory)
 ASSUMED_STRENGTH = 5e6
 
-# Partial times dynamic factor on a lorry in traffic by EN 1990 and EN 1991-2, on a good and on a
-# fair road [-] (from memory)
-EUROCODE_FACTORS = 1.35 * 1.2, 1.35 * 1.4
+# Partial and dynamic factor on a lorry of one's own [-] by EN 1990 and EN 1991-2, annex B, and by
+# CS 458 (from memory)
+CODE_FACTORS: Mapping[str, tuple[float, float]] = {
+    "by Eurocodes on a good road": (1.35, 1.2),
+    "by Eurocodes on a fair road": (1.35, 1.4),
+    "alone at walking pace": (1.1, 1.0),
+}
+
+# Factors of a rating that its outcome is made of, in other states of fill and stones
+_PRESSURES = ("without_pressure", "full_pressure", "without_backing", "without_either")
+_STATES = (*_PRESSURES, "crushing", "by_pressure")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -94,9 +104,11 @@ class Rating(ResultDisplay):
             NaN, and with a plastic fill.
         by_pressure: least factor with a plastic fill as weight and pressure (`Fill`) of its
             strength, which the four states above have then too; else NaN.
-        by_cs454: least factor of a vehicle of one's own with the factors of CS 454 [-]: 1.9, and
-            1.8 on the worst axle; else NaN, and with a plastic fill.
+        by_cs454: least factors of a vehicle of one's own with those of CS 454 [-], 1.9 and 1.8 on
+            the worst axle: "factor", and those of other states by their names above; else none, and
+            with a plastic fill.
         fill: strength of the fill, or None.
+        missing: "live" and "impact" where neither the vehicle nor its user gave them.
     """
 
     structure: Structure
@@ -117,8 +129,9 @@ class Rating(ResultDisplay):
     without_either: float = np.nan
     crushing: float = np.nan
     by_pressure: float = np.nan
-    by_cs454: float = np.nan
+    by_cs454: Mapping[str, float] = field(default_factory=dict)
     fill: Fill | PlasticFill | None = None
+    missing: tuple[str, ...] = ()
 
     @property
     def factor(self) -> float:
@@ -140,8 +153,9 @@ class Rating(ResultDisplay):
             needed = [f"the {part}" for part in [self._needs()] if part]
             needed += ["stones that do not crush"] if self.crushing < 1.0 else []
             words += f" only with {' and '.join(needed)}" if needed else ""
-            if missing := self._missing_factors():
-                words += f" if the code's {missing} is at most {self.factor:.4g}"
+        if self.missing:
+            most = f" if the code's {self._missing_factors} is at most {self.factor:.4g}"
+            words += most if self.passes else f" even without the code's {self._missing_factors}"
         words += self._say_range()
         words += f" without {self.vehicle.left_out}" if self.vehicle.left_out else ""
         return words if np.isnan(self.by_rule) else f"{words}; {self._rule_text()}"
@@ -187,10 +201,10 @@ class Rating(ResultDisplay):
         least = "none" if np.isnan(factors).any() else f"{min(factors):.4g}"
         return f" ({least} to {np.nanmax(factors):.4g} over what is assumed of the fill)"
 
+    @property
     def _missing_factors(self) -> str:
-        """Return the factors of a code that neither the vehicle nor its user gave, in words."""
-        names = ("live", "impact")
-        return " × ".join(name for name in names if self._source(name).startswith("none"))
+        """Factors of a code that neither the vehicle nor its user gave, in words."""
+        return " × ".join(self.missing)
 
     def _rule_text(self) -> str:
         """Return the factor with the width by rule and the whole load of the code."""
@@ -226,7 +240,7 @@ class Rating(ResultDisplay):
             return "and carries no vehicle"
         axles = parse_axles(self.vehicle.axles, self.vehicle.spacings)
         place = self.moving.direction, self.moving.position
-        stand = [load.x for load in axles_on_structure(self.structure, axles, *place)]
+        stand = axles_on_rings(self.structure, axles, *place, self.fill)
         worst, joints = self.moving.worst, self.structure.joints
         spans, moves = find_clear_spans(self.structure), {joints[k].part for k, _ in worst.hinges}
         moves |= {joints[number].part for number in worst.sliding}
@@ -243,13 +257,17 @@ class Rating(ResultDisplay):
         sense = 1.0 if self.moving.direction == "right" else -1.0
         every = {float(self.moving.position + sense * ahead) for ahead in axles[:, 1]}
         others = _name_places(every - {*stand})
+        only = [name.strip("'") for name in over] if over else list(spans)
+        apart = [x - spans[only[0]][0] for x in stand]
+        inside = len(only) == 1 and min(apart) >= 0.0
+        clear = f", {_name_places(apart)} m from the left clear springing" if inside else ""
         count = f"{len(stand)} axle{'s'[: len(stand) - 1]}"
         count += f" of {len(axles)}" if len(axles) > len(stand) else ""
         ends = np.array([*spans.values()])
         beside = over and not all(((x >= ends[:, 0]) & (x <= ends[:, 1])).any() for x in stand)
         name = f" over {'or beside ' if beside else ''}{join_names(list(over))}" if over else ""
         others = f" (the other{'s'[: len(every) - len(stand) - 1]} at {others} m)" if others else ""
-        return f"with {count}{name} at x = {_name_places(stand)} m{others}"
+        return f"with {count}{name} at x = {_name_places(stand)} m{clear}{others}"
 
     def __str__(self) -> str:
         """Describe outcome, worst places, mechanism, factors and sources, a line each."""
@@ -258,9 +276,6 @@ class Rating(ResultDisplay):
         source = vehicle.source if own else f"{vehicle.source} ({vehicle.grade})"
         factors = self.moving.factors["factor"].min("position")
         least = (f"{way} {float(factors.sel(direction=way)):.4g}" for way in DRIVING_DIRECTIONS)
-        by_rule = self.width == vehicle.spread_over(self.structure)
-        rule = f"{vehicle.wheels:g} m of wheels, with the fill at most {vehicle.lane:g} m; "
-        rule += vehicle.width_source
         also, beside = "", ""
         if self.area_load:
             also = " and on the distributed load × live"
@@ -284,7 +299,7 @@ class Rating(ResultDisplay):
             "it is Heyman's criterion, often 2 or more (from memory), which no code has",
             f"{vehicle.name}: axles {len(vehicle.axles)}, {sum(vehicle.axles) / 1e3:.4g} kN"
             f"{beside}; {source}",
-            f"over {self.width:.3g} m of width ({rule if by_rule else 'given'})",
+            vehicle.describe_width(self.structure, self.width),
             f"live load by {self.live:g} ({self._source('live')})",
             f"impact by {self.impact:g}{self._impact_axle()} ({self._source('impact')})",
             f"dead load by {self.dead:g} ({favourable if self.dead == 1.0 else 'given'})",
@@ -333,28 +348,50 @@ class Rating(ResultDisplay):
             return ""
         return f"at {ASSUMED_STRENGTH / MPa:g} MPa the least factor is {self.crushing:.4g}"
 
-    def describe_codes(self) -> list[str]:
-        """Return the line on the factors of codes for a vehicle of one's own, if it is one."""
-        vehicle, code, factors = self.vehicle, VEHICLES["CS454-single"], list[str]()
-        if vehicle.grade != "given" or np.isnan(self.factor):
-            return []
-        words, product = "no code's live × impact is in it", self.live * self.impact
+    @property
+    def by_codes(self) -> dict[str, tuple[float, str]]:
+        """Factor and outcome of a vehicle of one's own with the factors of codes, by their names.
+
+        They are from memory. With a distributed load or an impact on one axle they are of CS 454
+        alone.
+        """
+        if self.vehicle.grade != "given" or np.isnan(self.factor):
+            return {}
+        found, code = dict[str, Mapping[str, float]](), VEHICLES["CS454-single"]
         # the dynamic factor is not on a distributed load, and may be on one axle alone
-        if self.impact == 1.0 or (not self.area_load and vehicle.impact_on == "all axles"):
-            if self._missing_factors() != "live × impact":
-                given = f"live × impact {product:.4g} given"
-                words = f"bare axles {product * self.factor:.4g}, {given}"
-            if not self.area_load:
-                high, low = (product * self.factor / by for by in EUROCODE_FACTORS)
-                by = " to ".join(f"{factor:.3g}" for factor in EUROCODE_FACTORS[::-1])
-                factors.append(f"{low:.4g} to {high:.4g} by Eurocodes ({by})")
-        elif self._missing_factors() != "live × impact":
-            words = f"live {self.live:g} and impact {self.impact:g} given"
-        if not np.isnan(self.by_cs454):
-            on_axle = f"{code.live:g}, and {code.live * code.impact:.3g} on the worst axle"
-            factors.append(f"{self.by_cs454:.4g} by CS 454 ({on_axle})")
-        beside = f"; as a lorry in traffic {', and '.join(factors)}, from memory" if factors else ""
-        return [f"{words}{beside}"]
+        for name, (live, impact) in CODE_FACTORS.items() if self._is_multiple else ():
+            share = self.live * self.impact / (live * impact)
+            of = {each: share * getattr(self, each) for each in ("factor", "by_rule", *_STATES)}
+            found[f"{name} ({live:g} × {impact:g}, from memory)"] = of
+        if self.by_cs454:
+            live, impact = code.factors
+            words = f"by CS 454 ({live:g}, and {impact:g} on the worst axle, from memory)"
+            found[words] = self.by_cs454
+        codes = {name: self._with_factors(of) for name, of in found.items()}
+        return {name: (other.factor, other.outcome) for name, other in codes.items()}
+
+    @property
+    def _is_multiple(self) -> bool:
+        """Whether the factor with other factors on the vehicle is a multiple of this one."""
+        on_all = self.impact == 1.0 or self.vehicle.impact_on == "all axles"
+        return on_all and not self.area_load
+
+    def _with_factors(self, of: Mapping[str, float]) -> "Rating":
+        """Return this with the factors, in each state, of another code on the same vehicle."""
+        moving = replace(self.moving, worst=replace(self.moving.worst, factor=of["factor"]))
+        states: dict[str, Any] = {each: of.get(each, np.nan) for each in ("by_rule", *_STATES)}
+        return replace(self, moving=moving, missing=(), **states)
+
+    def describe_codes(self) -> list[str]:
+        """Return the lines on a vehicle of one's own with the factors of codes, if it is one."""
+        codes, product, lines = self.by_codes, self.live * self.impact, list[str]()
+        if codes and self._is_multiple and len(self.missing) < 2:
+            given = f"live × impact {product:.4g} given"
+            lines = [f"bare axles {product * self.factor:.4g}, {given}"]
+        name = self.vehicle.name
+        return lines + [
+            f"{name} {by}: factor {factor:.4g}, {words}" for by, (factor, words) in codes.items()
+        ]
 
     def _describe_hinges(self) -> list[str]:
         """Return the line on where the hinges of the worst place are, if there are some."""
@@ -364,12 +401,10 @@ class Rating(ResultDisplay):
 
     def _source(self, factor: str) -> str:
         """Return where a factor on the vehicle comes from."""
-        vehicle = self.vehicle
-        value, source = getattr(self, factor), str(getattr(vehicle, f"{factor}_source"))
-        if value != getattr(vehicle, factor):
-            return "given"
-        # a vehicle of one's own has factors of 1 where it gives none
-        return "none given" if value == 1.0 and source == "given" else source
+        source = str(getattr(self.vehicle, f"{factor}_source"))
+        if factor in self.missing:
+            return "none given" if source == "given" else source
+        return source if getattr(self, factor) == getattr(self.vehicle, factor) else "given"
 
     def _impact_axle(self) -> str:
         """Return which axle alone has the dynamic factor at the worst place, in words."""
@@ -459,9 +494,8 @@ def rate(  # noqa: PLR0913  (factors of the check, and the strength of the bridg
     References:
         Heyman, The Masonry Arch, Ellis Horwood (1982).
     """
-    structure, driven = structure_of(structure), _find_vehicle(vehicle)
-    live = driven.live if live is None else check_factor(live, "live, factor on the vehicle")
-    impact = driven.impact if impact is None else check_factor(impact, "impact, dynamic factor")
+    structure, driven = structure_of(structure), find_vehicle(vehicle)
+    live, impact, missing = driven.choose_factors(live, impact)
     check_factor(dead, "dead, factor on the weights")
     rule = driven.spread_over(structure)
     width = rule if width is None else width
@@ -482,7 +516,7 @@ def rate(  # noqa: PLR0913  (factors of the check, and the strength of the bridg
     axles = parse_axles(driven.axles, driven.spacings)
     positions = _places_along(weighted, axles)
     moving = drive(width, area_load, positions[::5] if is_plastic else positions)
-    if fill is None and (ends := _places_at_ends(weighted, axles, moving)):
+    if fill is None and (ends := places_at_ends(weighted, axles, moving)):
         at_ends, positions = drive(width, area_load, ends), [*positions, *ends]
         everywhere = xr.concat([moving.factors, at_ends.factors], "position").sortby("position")
         worse = min(moving, at_ends, key=lambda each: each.worst.factor)
@@ -493,12 +527,16 @@ def rate(  # noqa: PLR0913  (factors of the check, and the strength of the bridg
         by_rule = drive(*least, [moving.position]).worst.factor
     unknown = np.nan, np.nan
     geometric, deepest = unknown if is_plastic else _geometric_factor(weighted, moving, options)
-    factors = live, impact, dead, width, area_load
     more: dict[str, Any] = {"strength": strength, "deepest": deepest, "fill": fill}
-    for each, by, states, count in _further_searches(driven, rows, live, options):
+    for key, each, by, states in _further_searches(driven, rows, live, options):
         # of the whole width, as the structure is modelled
         loads = [np.column_stack([structure.width / width * row, axles[:, 1]]) for row in each]
-        more |= _find_least_factors(weighted, positions, loads, by * area_load, states, count)
+        # mechanisms are much the same whichever axle has the impact of CS 454
+        count = 32 if key else 32 * len(rows)
+        found = _find_least_factors(weighted, positions, loads, by * area_load, states, count)
+        more |= {key: found} if key else found
+    factors = live, impact, dead, width, area_load
+    more["missing"] = missing
     return Rating(structure, driven, *factors, moving, geometric, by_rule, **more)
 
 
@@ -542,19 +580,6 @@ def _least_of(each: Sequence[MovingLoad]) -> MovingLoad:
     )
 
 
-def _find_vehicle(vehicle: str | Vehicle) -> Vehicle:
-    """Return a vehicle of the library by its name, or the given one."""
-    if isinstance(vehicle, Vehicle):
-        return vehicle
-    known = {name.lower(): each for name, each in VEHICLES.items()}
-    if vehicle.lower() not in known:
-        raise InvalidInput(
-            f"vehicle {vehicle!r} is not known: use one of {', '.join(VEHICLES)}, or give your own "
-            "as af.limit.Vehicle(name, axles, spacings)"
-        )
-    return known[vehicle.lower()]
-
-
 def _scale_weights(structure: Structure, factor: float) -> Structure:
     """Return a structure whose blocks weigh a multiple."""
     if factor == 1.0:
@@ -572,26 +597,6 @@ def _places_along(structure: Structure, vehicle: Array, steps: int = 100) -> Seq
     length = float(np.ptp(ends)) - 2.0 * float(vehicle[0, 1])
     count = 1 + int(np.ceil(steps * float(np.ptp(ends)) / length))
     return tuple(np.linspace(ends[0], ends[1], count).tolist())
-
-
-def _places_at_ends(
-    structure: Structure, vehicle: Array, moving: MovingLoad, share: float = 1.05
-) -> list[float]:
-    """Return places where an axle stands at an end of a stone, near those of least factors [m]."""
-    # A mechanism resists an axle least at an end of the stone on which it stands, where the factor
-    # jumps from stone to stone. A fill spreads axles over both.
-    corners = np.concatenate([structure.blocks[number].points[:, 0] for number in structure.free])
-    beside = 2.0 * CONTACT_TOLERANCE * structure.size
-    ends = np.unique(np.concatenate([corners - beside, corners + beside]))
-    least, places = moving.factors["factor"], set[float]()
-    for sense, way in ((1.0, "right"), (-1.0, "left")):
-        factors = least.sel(direction=way).values
-        low = np.isfinite(factors) & (factors <= share * moving.worst.factor)
-        for place in least["position"].values[low]:
-            for ahead in vehicle[:, 1]:
-                after = int(np.searchsorted(ends, place + sense * ahead))
-                places |= {float(x - sense * ahead) for x in ends[max(after - 1, 0) : after + 1]}
-    return sorted(places - {*least["position"].values.tolist()})
 
 
 def _geometric_factor(
@@ -629,15 +634,14 @@ def _geometric_factor(
 
 def _further_searches(
     driven: Vehicle, rows: Sequence[Array], live: float, options: dict[str, Any]
-) -> Iterator[tuple[Sequence[Array], float, dict[str, dict[str, Any]], int]]:
-    """Yield rows of weights, partial factor, states and rows solved first of further factors."""
+) -> Iterator[tuple[str, Sequence[Array], float, dict[str, dict[str, Any]]]]:
+    """Yield name, rows of weights, partial factor and states of further least factors."""
     if states := _other_states(options):
-        yield rows, live, states, 32 * len(rows)
+        yield "", rows, live, states
     if driven.grade == "given" and not isinstance(options["fill"], PlasticFill):
         code = VEHICLES["CS454-single"]
-        other = replace(driven, impact_on=code.impact_on).factored(code.live, code.impact)
-        # mechanisms are much the same whichever axle has the impact
-        yield other, code.live, {"by_cs454": options}, 32
+        other = replace(driven, impact_on=code.impact_on).factored(*code.factors)
+        yield "by_cs454", other, code.factors[0], {"factor": options} | states
 
 
 def _other_states(options: dict[str, Any]) -> dict[str, dict[str, Any]]:

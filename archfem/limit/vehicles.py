@@ -21,7 +21,7 @@ from archfem.limit.fill_strength import Fill, PlasticFill, as_pressure
 from archfem.limit.linear_programme import Optimum, Programme
 from archfem.limit.nonassociated import find_weakest, starting_forces
 from archfem.masonry.loads import PointLoad
-from archfem.masonry.structure import HasStructure, Structure, structure_of
+from archfem.masonry.structure import CONTACT_TOLERANCE, HasStructure, Structure, structure_of
 
 DRIVING_DIRECTIONS = ("right", "left")
 
@@ -44,12 +44,12 @@ class Vehicle:
         name: in tables and pictures.
         axles: weight of each axle, from the front [N].
         spacings: distances between the axles, one fewer [m].
-        live: partial factor of the code on its weight [-].
+        live: partial factor of the code on its weight [-]; None where it is not given, and 1.
         source: code and clause of the axles, and what of the code's load is left out.
         grade: "read" where weights and spacings were read in the code's table or in a text that
             quotes it, "from memory" otherwise.
         live_source: code and clause of the partial factor, and its grade.
-        impact: dynamic factor of the code on its weight [-].
+        impact: dynamic factor of the code on its weight [-]; None likewise.
         impact_source: code and clause of the dynamic factor, and its grade.
         impact_on: "all axles" that the dynamic factor multiplies; or "worst axle", that one alone
             with which the factor at collapse is least, as in BD 21.
@@ -64,11 +64,11 @@ class Vehicle:
     name: str
     axles: tuple[Newtons, ...]
     spacings: tuple[Metres, ...] = ()
-    live: float = 1.0
+    live: float | None = None
     source: str = "given"
     grade: str = "given"
     live_source: str = "given"
-    impact: float = 1.0
+    impact: float | None = None
     impact_source: str = "given"
     area_load: Pascals = 0.0
     wheels: Metres = 1.5
@@ -92,8 +92,29 @@ class Vehicle:
                 f"m, wheels over {self.wheels:g} m and {self.area_load} Pa: that can only be a "
                 "wrong unit"
             )
-        check_factor(self.live, f"partial factor on the live load of {self.name}")
-        check_factor(self.impact, f"dynamic factor of {self.name}")
+        check_factor(self.factors[0], f"partial factor on the live load of {self.name}")
+        check_factor(self.factors[1], f"dynamic factor of {self.name}")
+
+    @property
+    def factors(self) -> tuple[float, float]:
+        """Partial and dynamic factor on its weight [-], 1 where one is not given."""
+        return 1.0 if self.live is None else self.live, 1.0 if self.impact is None else self.impact
+
+    def choose_factors(
+        self, live: float | None, impact: float | None
+    ) -> tuple[float, float, tuple[str, ...]]:
+        """Return both factors [-], those given or its own, and the names of those nobody gives.
+
+        Args:
+            live: partial factor that is given [-], or None.
+            impact: dynamic factor that is given [-], or None.
+        """
+        given = {"live": live, "impact": impact}
+        missing = tuple(k for k, x in given.items() if x is None and getattr(self, k) is None)
+        own = self.factors
+        live = own[0] if live is None else check_factor(live, "live, factor on the vehicle")
+        impact = own[1] if impact is None else check_factor(impact, "impact, dynamic factor")
+        return live, impact, missing
 
     def factored(self, live: float, impact: float) -> list[Array]:
         """Return weights with both factors [N]: a row, or one for each axle that has the impact.
@@ -136,6 +157,22 @@ class Vehicle:
         ]
         depth = max(min(covers, default=0.0), 0.0)
         return min(self.wheels + depth, self.lane, structure.width)
+
+    def describe_width(self, structure: Structure, width: float) -> str:
+        """Describe of what a width that carries one vehicle consists.
+
+        Args:
+            structure: the bridge.
+            width: that carries the vehicle [m].
+        """
+        if width != self.spread_over(structure):
+            return f"over {width:.3g} m of width (given)"
+        fill = width - self.wheels
+        words = f"{self.wheels:g} m over the wheels and {fill:.3g} m of fill above the crown"
+        if width >= min(self.lane, structure.width):
+            words = "all of the bridge" if width < self.lane else "all of a lane"
+        words += f", never more than a lane of {self.lane:g} m"
+        return f"over {width:.3g} m of width: {words} ({self.width_source})"
 
 
 def _read_vehicles() -> dict[str, Vehicle]:
@@ -325,6 +362,25 @@ def axles_on_structure(
         for x, weight in axles
         if any(np.ptp(np.sign(places - x)) > 0 for places in corners)
     )
+
+
+def axles_on_rings(
+    structure: Structure,
+    vehicle: Array,
+    direction: str,
+    position: float,
+    fill: Fill | PlasticFill | None,
+) -> list[float]:
+    """Return the places of the axles that load a ring, or any stone where there is none [m]."""
+    stones, _ = self_weight_programme(structure, None, np.inf, as_pressure(fill))
+    free = stones.rigid_regions.structure
+    rings = np.array([free.blocks[number].role == "ring" for number in free.free])
+    rings |= not rings.any()
+    return [
+        load.x
+        for load in axles_on_structure(structure, vehicle, direction, position)
+        if np.abs(stones.load([load]).reshape(-1, 3)[rings]).max() > 1e-9 * -load.force[1]
+    ]
 
 
 def check_area_load(area_load: float) -> float:
@@ -547,6 +603,39 @@ def _find_worst(factors: Array, count: Numbers) -> tuple[int, int]:
     flat = (factors <= (1.0 + 1e-6) * factors[finite].min()).argmax()
     direction, place = np.unravel_index(flat, factors.shape)
     return int(direction), int(place)
+
+
+def places_at_ends(
+    structure: Structure, vehicle: Array, moving: MovingLoad, share: float = 1.05
+) -> list[float]:
+    """Return places where an axle stands at an end of a stone, near those of least factors [m]."""
+    # A mechanism resists an axle least at an end of the stone on which it stands, where the factor
+    # jumps from stone to stone. A fill spreads axles over both.
+    corners = np.concatenate([structure.blocks[number].points[:, 0] for number in structure.free])
+    beside = 2.0 * CONTACT_TOLERANCE * structure.size
+    ends = np.unique(np.concatenate([corners - beside, corners + beside]))
+    least, places = moving.factors["factor"], set[float]()
+    for sense, way in ((1.0, "right"), (-1.0, "left")):
+        factors = least.sel(direction=way).values
+        low = np.isfinite(factors) & (factors <= share * moving.worst.factor)
+        for place in least["position"].values[low]:
+            for ahead in vehicle[:, 1]:
+                after = int(np.searchsorted(ends, place + sense * ahead))
+                places |= {float(x - sense * ahead) for x in ends[max(after - 1, 0) : after + 1]}
+    return sorted(places - {*least["position"].values.tolist()})
+
+
+def find_vehicle(vehicle: str | Vehicle) -> Vehicle:
+    """Return a vehicle of the library by its name, or the given one."""
+    if isinstance(vehicle, Vehicle):
+        return vehicle
+    known = {name.lower(): each for name, each in VEHICLES.items()}
+    if vehicle.lower() not in known:
+        raise InvalidInput(
+            f"vehicle {vehicle!r} is not known: use one of {', '.join(VEHICLES)}, or give your own "
+            "as af.limit.Vehicle(name, axles, spacings)"
+        )
+    return known[vehicle.lower()]
 
 
 VEHICLES: Mapping[str, Vehicle] = _read_vehicles()

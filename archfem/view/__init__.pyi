@@ -6,6 +6,7 @@ from .collapse import draw_kinematic_assessment as draw_kinematic_assessment
 from .collapse import draw_moving_load as draw_moving_load
 from .collapse import draw_rating as draw_rating
 from .collapse import draw_ratings as draw_ratings
+from .collapse import draw_worst_places as draw_worst_places
 from .films.film import film as film
 from .films.film import film_modes as film_modes
 from .films.film import picture as picture

@@ -173,29 +173,22 @@ def _take_axles_as_given(found: Rating) -> tuple[Collapse, str, list[PointLoad]]
 
 @validate_arguments
 def draw_ratings(ratings: Sequence[Rating]) -> Figure:
-    """Draw the factors of several vehicles along a bridge, and each vehicle at its worst place.
+    """Draw the factors of several vehicles along a bridge.
 
     Args:
-        ratings: of one bridge, in the order of the panels.
+        ratings: of one bridge; the first six are drawn.
 
     Returns:
         The figure: the lesser factor of both directions over the place of each vehicle's middle, up
-        to four times the least one, above a panel for each vehicle with its worst mechanism. The
-        first six are drawn.
+        to four times the least one.
     """
     drawn = ratings[: len(Colour.LINES)]
     structure, factors_of = drawn[0].structure, [found.factor for found in drawn]
     top = max(
         4.0 * max(1.0, min(factors_of)), 1.5 * max(filter(np.isfinite, factors_of), default=1)
     )
-    wide, tall = structure_figure(structure).get_size_inches()
-    # two panels a row, so that six fit a page
-    count = (len(drawn) + 1) // 2
-    figure = new_figure(wide, 2.6 + count * (0.5 * tall + 0.7))
-    ratios = [2.6] + [0.5 * tall + 0.7] * count
-    grid = figure.add_gridspec(1 + count, 2, height_ratios=ratios)
-    upper = figure.add_subplot(grid[0, :])
-    rows = [figure.add_subplot(grid[1 + k // 2, k % 2]) for k in range(len(drawn))]
+    figure = new_figure(Size.PAGE, 2.8)
+    upper = figure.subplots()
     for k, found in enumerate(drawn):
         over = found.moving.factors["factor"].min("direction")
         finite = over.where(np.isfinite(over))
@@ -207,13 +200,34 @@ def draw_ratings(ratings: Sequence[Rating]) -> Figure:
     style_axes(upper, "middle of the vehicle, x [m]", "factor [-]")
     set_title(upper, f"{structure.name}: least factor of each vehicle, over its place")
     upper.legend(frameon=False, fontsize=Size.LABEL, loc="lower center", ncols=3)
+    return figure
+
+
+@validate_arguments
+def draw_worst_places(ratings: Sequence[Rating]) -> Figure:
+    """Draw each of several vehicles at its worst place on a bridge, with the mechanism.
+
+    Args:
+        ratings: of one bridge, in the order of the panels; the first six are drawn.
+
+    Returns:
+        The figure, with two panels a row.
+    """
+    drawn = ratings[: len(Colour.LINES)]
+    structure, count = drawn[0].structure, (len(drawn) + 1) // 2
+    low, high = outline_bounds(structure)
+    # a page prints figures as high as 94 mm in full width
+    tall = (0.5 * Size.PAGE - 0.2) * (high[1] - low[1]) / (high[0] - low[0]) + 0.3
+    figure = new_figure(Size.PAGE, 0.4 + count * tall)
+    rows = [figure.add_subplot(count, 2, 1 + k) for k in range(len(drawn))]
     for found, axes in zip(drawn, rows, strict=True):
         worst, factors, strips = _take_axles_as_given(found)
         draw_structure(structure, axes=axes)
         _draw_mechanism(axes, structure, worst, factors)
         _mark_strips(axes, structure, strips)
         axes.get_legend().remove()
-        set_title(axes, f"{found.vehicle.name}: {found.factor:.3g}, {found.outcome}")
+        axes.set_axis_off()
+        set_title(axes, f"{found.vehicle.name}: {found.factor:.3g}")
     labelled = {x.get_label(): x for axes in rows for x in axes.get_legend_handles_labels()[0]}
     # the size of the loads is another one in each panel
     kept = [handle for label, handle in labelled.items() if not label.startswith("live load")]

@@ -462,7 +462,7 @@ def test_places_of_axles_are_of_the_span_that_is_loaded(monkeypatch):
     pier = af.shapes.Pier(gap=1.0, height=1.0, course=0.5, name="pier")
     bridge = af.bridge(arches=arches, piers=[pier])
     inner = [joint.intrados[0] for joint in bridge.joints if joint.part == "right arch"]
-    monkeypatch.setattr(rating, "_places_at_ends", lambda *_: [])
+    monkeypatch.setattr(rating, "places_at_ends", lambda *_: [])
     monkeypatch.setattr(rating, "_places_along", lambda *_: (min(inner) + 1.0,))
     found = af.rate(bridge, Vehicle("axles", (1e3,) * 9, (0.2,) * 8))
     first, last = min(inner) + 0.2, min(inner) + 1.8

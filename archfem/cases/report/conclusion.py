@@ -156,8 +156,11 @@ def build_conclusion(data: ReportData) -> Section:
         (name, demand, outcome + " (in doubt)" * (result in doubtful), factor)
         for result, (name, demand, outcome, factor) in _capacity_rows(data)
     ]
-    lead = " ".join(map(sentence, _build_lead(data, rows, doubtful)))
-    texts = filter(None, [lead, " ".join(_describe_ends(data))])
+    lead = [*map(sentence, _build_lead(data, rows, doubtful))]
+    lead = lead if data.statements.keys() == {"rating"} else [" ".join(lead)]
+    demand = data.case.report.get("demand", "")
+    asked = demand and sentence(f"demand, as stated: {demand}")
+    texts = filter(None, [asked, *lead, " ".join(_describe_ends(data))])
     blocks: list[Any] = [*map(TextBlock, texts)]
     for result in filter(doubts.get, doubtful):
         ordered = sorted(doubts[result], key=_weigh)
@@ -219,8 +222,6 @@ def _build_lead(data: ReportData, rows: Sequence[Row], doubtful: Sequence[str]) 
     if single := list_unvaried(data):
         none = ", and displacements have no range" * (data.verdict_range is None)
         lead.append(f"{join_words(single)} were not varied{none}")
-    if demand := data.case.report.get("demand"):
-        lead[:1] = [f"for {demand}: {lead[0]}"] if lead else [f"the demand, as stated: {demand}"]
     return lead
 
 

@@ -256,22 +256,23 @@ def build_static_sections(data: ReportData) -> list[Section]:
 
 def _build_rating(data: ReportData) -> list[Any]:
     """Build text and picture of a rating, below the table of several vehicles."""
-    caption = "(a) Factor along the bridge, and (b) mechanism at the worst place"
-    blocks = data.read_result("rating", caption)
-    if (table := data.read_text("rating_variations.csv")) is not None:
+    table, grids, of = data.read_text("vehicles.csv"), list[Any](), ""
+    if table is not None:
         head, *rows = reader(table.splitlines())
-        blocks.insert(1, Grid(head, rows, "Factor with one property changed at a time", "words"))
-    if (table := data.read_text("vehicles.csv")) is None:
-        return blocks
-    # the text begins with the same table, and the picture is of the first vehicle
-    text, *figures = blocks
-    _, *texts = text.text.split("\n\n")
-    head, *rows = reader(table.splitlines())
-    grid = Grid(head, rows, "Factors of several vehicles", "words")
-    every = data.read_figure(
-        "vehicles.png", "(a) Factor of each vehicle over its place, (b) and on: each at its worst"
-    )
-    return [grid, *(every or figures), *(TextBlock(each, "lines") for each in texts)]
+        grids, of = [Grid(head, rows, "Factors of several vehicles", "words")], f", {rows[0][0]}"
+        grids += data.read_figure("vehicles.png", "Factor of each vehicle over its place.")
+        grids += data.read_figure("places.png", "Each vehicle at its worst place.")
+    caption = f"(a) Factor along the bridge, and (b) mechanism at the worst place{of}"
+    text, *figures = data.read_result("rating", caption) or [None]
+    if text is None:
+        return []
+    # of several vehicles the text begins with the same table
+    texts = text.text.split("\n\n")[1:] if grids else [text.text]
+    if (varied := data.read_text("rating_variations.csv")) is not None:
+        head, *rows = reader(varied.splitlines())
+        title = f"Factor with one property changed at a time{of}"
+        figures.insert(0, Grid(head, rows, title, "words"))
+    return [*grids, *(TextBlock(each, "lines") for each in texts), *figures]
 
 
 def _tabulate_dead_load(joints: xr.Dataset) -> Grid:

@@ -142,7 +142,8 @@ def _check_cover(bottom: Sequence[Point], surface: Sequence[Point]) -> None:
         place = int(np.argmin(cover))
         raise InvalidStructure(
             f"the fill is {cover[place]:.3f} m above the stones at x = {x[place]:.2f} m, and it "
-            f"must be at least {min_cover} m: give more cover, less erosion or lower sidewalls"
+            f"must be at least {min_cover} m: give more cover, less erosion, or less of `above`, "
+            "the height of sidewalls over the springing"
         )
 
 
