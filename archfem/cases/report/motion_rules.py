@@ -1,4 +1,4 @@
-"""Rules of a norm for suites of motions: what they ask, what is found, and whether it is met."""
+"""Rules of a norm for suites of motions: what is required, what is found, and whether it is met."""
 
 import re
 from collections.abc import Iterator
@@ -28,7 +28,7 @@ class Check(NamedTuple):
     """One rule for the motions of a report."""
 
     rule: str
-    asked: str
+    required: str
     found: str
     met: bool | None  # None where it could not be checked
 
@@ -60,23 +60,23 @@ def _check_spectra(data: ReportData, rule: SelectionRule) -> Iterator[Check]:
     target, reduction = data.case.target, (data.case.suite or {}).get("reduction", 1.0)
     if target is None:
         return
-    asked = f"{rule.lower:g} to {rule.upper:g}" if rule.upper < np.inf else f"≥ {rule.lower:g}"
+    required = f"{rule.lower:g} to {rule.upper:g}" if rule.upper < np.inf else f"≥ {rule.lower:g}"
     ratios = f"{rule.shortest_ratio:g} T₁" if rule.shortest_ratio else f"{rule.shortest:g} s"
     name = f"mean spectrum over the target, from {ratios} to {rule.longest_ratio:g} T₁"
     period, motions = find_period(data), [*data.motions.values()]
     if period is None:
-        yield Check(name, asked, "the period T₁ is not among the results", None)
+        yield Check(name, required, "the period T₁ is not among the results", None)
     else:
         band = rule.band(period)
         periods = np.geomspace(*band, 120)
         try:
             design = reduction * _mean_spectrum(motions, periods) / target.horizontal(periods)
         except InvalidInput as error:  # a spectrum that ends below the longest period
-            yield Check(name, asked, str(error), None)
+            yield Check(name, required, str(error), None)
         else:
             met = bool(rule.lower <= design.min() and design.max() <= rule.upper)
             within = f"from {band[0]:.3g} to {band[1]:.3g} s"
-            yield Check(name, asked, f"{design.min():.3g} to {design.max():.3g} {within}", met)
+            yield Check(name, required, f"{design.min():.3g} to {design.max():.3g} {within}", met)
     if rule.zero_period:
         mean = np.mean([motion.pga for motion in motions]) / STANDARD_GRAVITY
         ratio = float(reduction * mean / target.horizontal(0.0))
@@ -118,12 +118,14 @@ def tabulate_checks(data: ReportData) -> list[Grid]:
         return []
     rows = [(*check[:3], check.state) for check in checks]
     caption = f"Rules for motions. {rule.source}; stationary part from memory"
-    return [Grid(("rule", "asked", "found", ""), rows, caption, "words")]
+    return [Grid(("rule", "required", "found", ""), rows, caption, "words")]
 
 
 def note_checks(data: ReportData) -> list[str]:
     """Return a note on the rules of the norm that the motions do not meet."""
-    missed = [f"{x.rule}, {x.asked}, is {x.found}" for x in check_motions(data) if x.met is False]
+    missed = [
+        f"{x.rule}, {x.required}, is {x.found}" for x in check_motions(data) if x.met is False
+    ]
     rules = "a rule" if len(missed) == 1 else f"{len(missed)} rules"
     norm = data.case.report.get("norm", "")
     words = f"the motions do not meet {rules} of {norm}, as known from memory: {'; '.join(missed)}"
