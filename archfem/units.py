@@ -162,6 +162,15 @@ def _check_text(text: str, unit: str, key: str) -> None:
         raise InvalidInput(f"{key} = {text!r} has a power no unit has: write a number in {unit}")
 
 
+def _refuse_mass(quantity: Any, unit: str, words: str) -> None:
+    """Refuse a mass in place of a weight, and a density in place of a weight by volume."""
+    masses = {"N": ("a mass", "kg", "kN"), "N/m**3": ("a density", "kg/m**3", "kN/m³")}
+    if unit in masses and quantity.check(masses[unit][1]):
+        noun, mass, force = masses[unit]
+        weight = f"{float(quantity.to(mass).magnitude) * G / kN:.4g} {force}"
+        raise InvalidInput(f"{words} is {noun}: give its weight, times g: '{weight}'")
+
+
 def _convert(text: str, unit: str, key: str) -> float:
     """Convert a quantity in text to a unit."""
     import pint
@@ -185,9 +194,7 @@ def _convert(text: str, unit: str, key: str) -> float:
                 f"{key} = {text!r} is an angle, and this must be a pure number: a coefficient of "
                 f"friction is the tangent of its angle, {tan(angle):.3f}"
             )
-        if unit == "N" and quantity.check("[mass]"):
-            weight = float(quantity.to("kg").magnitude) * G / kN
-            raise InvalidInput(f"{key} = {text!r} is a mass: give its weight, '{weight:.4g} kN'")
+        _refuse_mass(quantity, unit, f"{key} = {text!r}")
         return float(quantity.to(target).magnitude)
     except InvalidInput:
         raise

@@ -64,8 +64,15 @@ def test_a_length_of_a_fall_has_no_power_of_ten(length, words):
 
 @pytest.mark.parametrize("mass", ["10 t", "10000 kg"])
 def test_a_mass_in_place_of_a_weight_is_refused_with_its_weight(mass):
-    with pytest.raises(af.InvalidInput, match=r"is a mass: give its weight, '98\.1 kN'"):
+    with pytest.raises(af.InvalidInput, match=r"is a mass: give its weight, times g: '98\.1 kN'"):
         af.units.in_unit(mass, "N", "axles")
+
+
+@pytest.mark.parametrize("density", ["2300 kg/m³", "2300 kg/m3", "2.3 t/m**3"])
+def test_a_density_in_place_of_a_unit_weight_is_refused_with_its_weight(density):
+    words = r"is a density: give its weight, times g: '22\.56 kN/m³'"
+    with pytest.raises(af.InvalidInput, match=words):
+        af.units.in_unit(density, "N/m**3", "unit_weight")
 
 
 @pytest.mark.parametrize(

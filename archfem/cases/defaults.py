@@ -10,6 +10,7 @@ from archfem.cases.case import Case
 from archfem.cases.toml_file import Table, format_key
 from archfem.masonry.joint_closing import FINISHED_KEYS, finish_range
 from archfem.masonry.materials import Contact, Material
+from archfem.masonry.structure import Structure
 from archfem.units import GPa, MPa, kN, kPa, mm
 
 HINGE_REASON = "8 % short of the edge, as in Demirel and Aldemir (2021)"
@@ -170,14 +171,22 @@ def _explain_finishes(case: Case) -> Iterator[str]:
     for contact, joint in {joint.contact: joint for joint in structure.joints}.items():
         if (finish := tables.get(contact.name, {}).get("finish")) is None:
             continue
-        law = finish_range(structure, joint, finish)
-        values = [f"k_n {_range_text(law.initial, 1e9)} MPa/mm at first"]
-        values += [f"closing {_range_text(law.closure, mm)} mm at most"] if contact.closure else []
-        values.append(f"k_s {_range_text(law.shear, 1e9)} MPa/mm")
-        yield (
-            f'contacts.{format_key(contact.name)}.finish = "{finish}": {", ".join(values)}; '
-            f"{'; '.join(law.sources[:3])}"
-        )
+        ranges = list_finish_ranges(structure, contact, finish)
+        values = ", ".join(f"{word} {text}" for word, text in ranges.values())
+        sources = "; ".join(finish_range(structure, joint, finish).sources[:3])
+        yield f'contacts.{format_key(contact.name)}.finish = "{finish}": {values}; {sources}'
+
+
+def list_finish_ranges(
+    structure: Structure, contact: Contact, finish: str
+) -> dict[str, tuple[str, str]]:
+    """Return name and usual value with its range of each property that follows from a finish."""
+    joint = next(joint for joint in structure.joints if joint.contact == contact)
+    law = finish_range(structure, joint, finish)
+    found = {"normal_stiffness": ("k_n", f"{_range_text(law.initial, 1e9)} MPa/mm at first")}
+    if contact.closure:
+        found["closure"] = "closing", f"{_range_text(law.closure, mm)} mm at most"
+    return found | {"shear_stiffness": ("k_s", f"{_range_text(law.shear, 1e9)} MPa/mm")}
 
 
 def _range_text(values: tuple[float, float, float], unit: float) -> str:

@@ -211,6 +211,8 @@ def refuse_unknown(table: Table, keys: Iterable[str], section: str = "") -> None
             hint = suggest_name(key, keys) or f"the keys are {sorted(keys)}"
             if section == "structure" and key in ("materials", "contacts"):
                 hint = f"[{key}] stands beside [structure], at the top of the file"
+            if key == "density" and "unit_weight" in keys:
+                hint = "give unit_weight, which is the density times g: 23.54 kN/m³ for 2400 kg/m³"
             raise InvalidInput(f"unknown key '{section + '.' if section else ''}{key}': {hint}")
 
 

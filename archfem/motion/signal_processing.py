@@ -24,6 +24,9 @@ MAX_PEAK_ACCELERATION = 5.0 * STANDARD_GRAVITY
 # Memory limit: a day at 100 Hz
 MAX_SAMPLES = 10_000_000
 
+# Shares of its duration between which an artificial motion keeps its intensity [-]
+PLATEAU = 0.15, 0.5
+
 
 def validate_samples(samples: Array | None, component: str) -> Array:
     """Copy a component into a read-only array of finite numbers below 5 g."""
@@ -267,4 +270,5 @@ def generate_enveloped_noise(
 def intensity_envelope(count: int) -> Array:
     """Return the intensity in time (count,) [-]: parabolic rise, plateau of 1, exponential fade."""
     time = np.linspace(0.0, 1.0, count)
-    return np.minimum(time / 0.15, 1.0) ** 2 * np.exp(-5.0 * np.maximum(time - 0.5, 0.0))
+    begin, end = PLATEAU
+    return np.minimum(time / begin, 1.0) ** 2 * np.exp(-5.0 * np.maximum(time - end, 0.0))

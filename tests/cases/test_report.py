@@ -540,7 +540,20 @@ def test_stiffness_by_a_finish_is_inferred_and_numbers_have_their_units():
     rows = tabulate_inputs(report_data.ReportData(af.Case.of(tables), {})).rows
     marks = {name: (value, mark) for name, value, mark in rows}
     assert marks["stone to stone: finish"] == ("dressed", "given")
-    assert marks["stone to stone: k_n"][1] == marks["stone to stone: k_s"][1] == "inferred"
+    # the ranges are those of the softest and the stiffest faces of the finish
+    law = af.joint_stiffness(30e9, 1.0, "dressed")
+    low, usual, high = (f"{each / 1e9:.2g}" for each in law.initial)
+    said = f"{usual} ({low} to {high}) MPa/mm at first"
+    assert marks["stone to stone: k_n"] == (said, "inferred")
+    low, usual, high = (f"{each * 1e3:.2g}" for each in sorted(law.closure))
+    assert marks["stone to stone: closing"] == (f"{usual} ({low} to {high}) mm at most", "inferred")
+    assert marks["stone to stone: k_s"][1] == "inferred"
+    tables["contacts"]["stone to stone"]["finish"] = "weathered"
+    rows = tabulate_inputs(report_data.ReportData(af.Case.of(tables), {})).rows
+    (words,) = (value for name, value, _ in rows if name == "stone to stone: finish")
+    assert "they may move less" in words
+    tables["contacts"]["stone to stone"]["finish"] = "dressed"
+    rows = tabulate_inputs(report_data.ReportData(af.Case.of(tables), {})).rows
     assert marks["stone to stone: μ"] == ("0.6", "given")
     peak = ("peak 0.667 of the horizontal", "default")
     assert marks["vertical motion, synthetic"] == peak

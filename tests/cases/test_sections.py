@@ -143,7 +143,7 @@ def test_a_report_of_several_runs_has_a_section_for_each(runs, piers, monkeypatc
     monkeypatch.setattr(response.FigureBlock, "of", lambda figure, caption: caption)
     monkeypatch.setattr(response, "draw_envelopes", lambda *_: [])
     monkeypatch.setattr(response, "build_player", lambda *given: f"one of {given[-1]} players")
-    case = SimpleNamespace(title="piers", structure=piers, suite=None, target=None)
+    case = SimpleNamespace(title="piers", structure=piers, suite=None, target=None, report={})
     monkeypatch.setattr(report_data.ReportData, "given_motions", {})
     monkeypatch.setattr(response, "replace", lambda figure, **_: figure)
     one = report_data.ReportData(case, {"first": runs["first"]})

@@ -10,6 +10,7 @@ from archfem._validation import check_choice
 from archfem.cases.toml_file import (
     merge_tables,
     parse_change,
+    refuse_unknown,
     remove_key,
     set_value,
     split_key_path,
@@ -221,3 +222,12 @@ def test_counts_beyond_the_room_are_refused_before_they_take_any():
         af.Motion.synthetic(duration=1e9, dt=1e-3)
     with pytest.raises(af.InvalidInput, match="there is room for 10000000"):
         af.Motion.synthetic(duration=1.0).resampled(1e-12)
+
+
+def test_a_density_is_no_key_where_weights_are():
+    with pytest.raises(
+        af.InvalidInput, match=r"unknown key 'materials.stone.density': give unit_w"
+    ):
+        refuse_unknown({"density": 2300}, ["unit_weight", "young"], "materials.stone")
+    with pytest.raises(af.InvalidInput, match="the keys are"):
+        refuse_unknown({"density": 2300}, ["young"], "materials.stone")

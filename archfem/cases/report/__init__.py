@@ -2,6 +2,7 @@
 
     conclusion      head, outcome with margin and range, doubts
     inputs          inputs with their marks
+    motion_rules    rules of norms for suites of motions
     report          HTML report of a case
     report_data     case, runs and files of a report
     response        sections on ground motions, runs and their checks

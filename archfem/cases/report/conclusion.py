@@ -12,6 +12,7 @@ import numpy as np
 from archfem._files import read_file_list
 from archfem.cases import result_text
 from archfem.cases.case import REPORT_KEYS
+from archfem.cases.report.motion_rules import note_checks
 from archfem.cases.report.report_data import SHOWN_RESULTS, ReportData
 from archfem.cases.report.study_findings import list_studied, read_study, say_what_changes
 from archfem.cases.result_text import RESULTS, Row
@@ -427,6 +428,7 @@ def _doubt_displacement(data: ReportData, found: VerdictRange) -> Iterator[str]:
 def list_notes(data: ReportData) -> dict[str, list[str]]:
     """Return the notes of each result, with that on motions of another demand."""
     notes = {RESULTS[name]: [*each.notes] for name, each in data.statements.items() if each.notes}
+    notes |= {_HISTORIES: missed} if (missed := note_checks(data)) else {}
     peaks = [_peak_of_ground(run) for run in data.runs.values()]
     if peaks and "assessment" in data.statements:
         mean, other = np.mean(peaks), _peak_of_spectrum(data)

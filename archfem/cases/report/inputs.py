@@ -10,12 +10,14 @@ from archfem.cases.defaults import (
     HINGE_REASON,
     list_default_keys,
     list_fill_values,
+    list_finish_ranges,
     value_text,
 )
 from archfem.cases.report.report_data import STATIC_RESULTS, ReportData
 from archfem.cases.structure_keys import BRIDGE_PARTS, keys_of_part, list_shapes, shape_keys
 from archfem.dynamics.schemes import EffectiveDamping, Rayleigh, interpret_damping
 from archfem.limit.collapse import collapse_factor
+from archfem.masonry.joint_closing import FINISHED_KEYS
 from archfem.masonry.materials import Contact, Material
 from archfem.masonry.shapes.bridge_parts import Backfill
 from archfem.motion.design_spectra import CodeSpectrum
@@ -143,22 +145,32 @@ def _property_rows(data: ReportData) -> Iterator[Row]:
         defaults = list_default_keys(case, item)
         given = case.settings.get(section, {}).get(item.name, {})
         unused = _UNUSED | ({"strength"} - given.keys()) if data.is_static else set()
+        follows = {*FINISHED_KEYS} if "finish" in given else set()
         for key, (word, *_, reason) in DECIDING_VALUES[section].items():
             text, mark = value_text(section, key, getattr(item, key)), _mark(key in given)
             if key in defaults:
                 text += f" ({reason.partition(';')[0]})"
-            elif key not in given and text != "not known":  # by the finish
-                mark = "inferred"
-            if key not in unused:
+            if key not in unused | follows:
                 yield f"{item.name}: {word}", text, mark
-        if "finish" in given.keys() - unused:
-            yield f"{item.name}: finish", given["finish"], "given"
+        if "finish" in given.keys() - unused and isinstance(item, Contact):
+            yield from _finish_rows(data, item, given["finish"])
         for key, (word, unit, name) in _FURTHER_PROPERTIES.items():
             if (key in given or getattr(item, key, None)) and key not in unused:
                 text = f"{getattr(item, key) / unit:g}{name}"
                 yield f"{item.name}: {word}", text, _mark(key in given)
         if isinstance(item, Contact) and item.law is not None:
             yield f"{item.name}: law", str(item.law), "given"
+
+
+def _finish_rows(data: ReportData, contact: Contact, finish: str) -> Iterator[Row]:
+    """Yield a finish and the values that follow from it, with their ranges."""
+    rough = finish in ("hewn", "weathered")
+    words = (
+        "; rougher faces are stiffer under little stress, so that they may move less, and close "
+    )
+    yield f"{contact.name}: finish", finish + f"{words}further" * rough, "given"
+    for word, text in list_finish_ranges(data.case.structure, contact, finish).values():
+        yield f"{contact.name}: {word}", text, "inferred"
 
 
 def _command_rows(data: ReportData) -> Iterator[Row]:

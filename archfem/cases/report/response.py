@@ -15,10 +15,8 @@ from archfem.cases.report.conclusion import (
     sentence,
     summarise_outcomes,
 )
-from archfem.cases.report.report_data import (
-    ReportData,
-    build_player,
-)
+from archfem.cases.report.motion_rules import tabulate_checks
+from archfem.cases.report.report_data import ReportData, build_player
 from archfem.dynamics.history import History
 from archfem.masonry.joint_closing import describe_closing
 from archfem.masonry.structure import Structure, join_names
@@ -60,6 +58,7 @@ def build_ground_section(data: ReportData) -> Section:
             "displacements drift"
         )
     blocks: list[Any] = [Grid(*result_text.tabulate_motions(motions), caption)]
+    blocks += tabulate_checks(data)
     if missed := [*_list_missed_peaks(data)]:
         blocks.append(TextBlock(f"Steps of runs miss peaks: {'; '.join(missed)}."))
     if data.case.suite is None:

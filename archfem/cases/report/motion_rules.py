@@ -1,0 +1,132 @@
+"""Rules of a norm for suites of motions: what is required, what is found, and whether it is met."""
+
+import re
+from collections.abc import Iterator
+from inspect import signature
+from typing import NamedTuple
+
+import numpy as np
+
+from archfem._typing import Array
+from archfem.cases.report.report_data import ReportData
+from archfem.errors import InvalidInput
+from archfem.motion.motion import Motion
+from archfem.motion.record_selection import SELECTION_RULES, SelectionRule
+from archfem.motion.response_spectra import response_spectrum
+from archfem.motion.signal_processing import PLATEAU
+from archfem.units import STANDARD_GRAVITY
+from archfem.view.pages.document import Grid
+
+# Norms by their words in [report], with the name of their rule
+_NORMS = {r"EN ?1998|EC ?8|Eurocode 8": "EC8", r"NTC": "NTC-2018"}
+
+# Shortest stationary part of artificial motions, in both norms: from memory [s]
+MIN_PLATEAU = 10.0
+
+
+class Check(NamedTuple):
+    """One rule for the motions of a report."""
+
+    rule: str
+    required: str
+    found: str
+    met: bool | None  # None where it could not be checked
+
+    @property
+    def state(self) -> str:
+        """Whether the rule is met, in words."""
+        return {True: "met", False: "not met", None: "not checked"}[self.met]
+
+
+def find_rule(data: ReportData) -> SelectionRule | None:
+    """Return the rule for motions of the norm of a report; None if it is of another norm."""
+    norm = data.case.report.get("norm", "")
+    found = (rule for words, rule in _NORMS.items() if re.search(words, norm, re.IGNORECASE))
+    return SELECTION_RULES.get(next(found, ""))
+
+
+def check_motions(data: ReportData) -> list[Check]:
+    """Check the motions of a report by the rules of its norm; none without a norm or a run."""
+    rule = find_rule(data)
+    if rule is None or not data.runs:
+        return []
+    count = len(data.runs)
+    number = Check("number of motions", f"≥ {rule.fewest}", f"{count}", count >= rule.fewest)
+    return [number, *_check_spectra(data, rule), *_check_plateaus(data)]
+
+
+def _check_spectra(data: ReportData, rule: SelectionRule) -> Iterator[Check]:
+    """Yield the checks of the mean spectrum, before a reduction, against the target."""
+    target, reduction = data.case.target, (data.case.suite or {}).get("reduction", 1.0)
+    if target is None:
+        return
+    required = f"{rule.lower:g} to {rule.upper:g}" if rule.upper < np.inf else f"≥ {rule.lower:g}"
+    ratios = f"{rule.shortest_ratio:g} T₁" if rule.shortest_ratio else f"{rule.shortest:g} s"
+    name = f"mean spectrum over the target, from {ratios} to {rule.longest_ratio:g} T₁"
+    period, motions = find_period(data), [*data.motions.values()]
+    if period is None:
+        yield Check(name, required, "the period T₁ is not among the results", None)
+    else:
+        band = rule.band(period)
+        periods = np.geomspace(*band, 120)
+        try:
+            design = reduction * _mean_spectrum(motions, periods) / target.horizontal(periods)
+        except InvalidInput as error:  # a spectrum that ends below the longest period
+            yield Check(name, required, str(error), None)
+        else:
+            met = bool(rule.lower <= design.min() and design.max() <= rule.upper)
+            within = f"from {band[0]:.3g} to {band[1]:.3g} s"
+            yield Check(name, required, f"{design.min():.3g} to {design.max():.3g} {within}", met)
+    if rule.zero_period:
+        mean = np.mean([motion.pga for motion in motions]) / STANDARD_GRAVITY
+        ratio = float(reduction * mean / target.horizontal(0.0))
+        met = ratio >= rule.zero_period
+        name = "mean PGA over the target at period zero"
+        yield Check(name, f"≥ {rule.zero_period:g}", f"{ratio:.3g}", met)
+
+
+def _mean_spectrum(motions: list[Motion], periods: Array) -> Array:
+    """Return the mean horizontal spectrum of some motions [g]."""
+    spectra = np.array([response_spectrum(motion, periods, 0.05) for motion in motions])
+    return spectra.mean(axis=0) / STANDARD_GRAVITY
+
+
+def _check_plateaus(data: ReportData) -> Iterator[Check]:
+    """Yield the check of the stationary part of synthetic motions, whose envelope is known."""
+    tables = (data.case.suite or {}).get("pairs") or {"": data.case.motion or {}}
+    usual = signature(Motion.synthetic).parameters["duration"].default
+    made = [each["synthetic"] for each in tables.values() if "synthetic" in each]
+    if durations := [float(each.get("duration", usual)) for each in made]:
+        share, least = PLATEAU[1] - PLATEAU[0], min(durations)
+        part = share * least
+        found = f"{part:.3g} s, {share:.0%} of {least:g} s"
+        name = "stationary part of artificial motions"
+        yield Check(name, f"≥ {MIN_PLATEAU:g} s", found, part >= MIN_PLATEAU)
+
+
+def find_period(data: ReportData) -> float | None:
+    """Return the period of the computed mode with the largest mass along x [s]."""
+    row = r"^\d+ +[\d.]+ Hz +([\d.]+) s +([\d.]+)%"
+    modes = re.findall(row, data.read_text("modes.txt") or "", re.MULTILINE)
+    return float(max(modes, key=lambda mode: float(mode[1]))[0]) if modes else None
+
+
+def tabulate_checks(data: ReportData) -> list[Grid]:
+    """Tabulate the rules of the norm of a report for its motions, with their source."""
+    rule, checks = find_rule(data), check_motions(data)
+    if rule is None or not checks:
+        return []
+    rows = [(*check[:3], check.state) for check in checks]
+    caption = f"Rules for motions. {rule.source}; stationary part from memory"
+    return [Grid(("rule", "required", "found", ""), rows, caption, "words")]
+
+
+def note_checks(data: ReportData) -> list[str]:
+    """Return a note on the rules of the norm that the motions do not meet."""
+    missed = [
+        f"{x.rule}, {x.required}, is {x.found}" for x in check_motions(data) if x.met is False
+    ]
+    rules = "a rule" if len(missed) == 1 else f"{len(missed)} rules"
+    norm = data.case.report.get("norm", "")
+    words = f"the motions do not meet {rules} of {norm}, as known from memory: {'; '.join(missed)}"
+    return [words] if missed else []

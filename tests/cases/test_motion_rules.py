@@ -1,0 +1,73 @@
+"""Rules of a norm for the motions of a report, each met, not met or not checked."""
+
+import numpy as np
+import pytest
+
+import archfem as af
+from archfem.cases.report import motion_rules, report_data
+
+TARGET = {"code": "EC8", "type": 1, "ag": 0.2, "ground": "B"}
+MODES = "mode  frequency\n1  9.00 Hz  0.111 s   1.0%  2%\n2  10.00 Hz  0.10000 s   73.9%  0.0%\n"
+
+
+def data_of(norm="EN 1998-1", pairs=3, duration=30.0, modes=MODES, factor=1.0, **suite):
+    """Return the data of a report of motions that are the target's plateau at its band."""
+    made = {f"pair {k}": {"synthetic": {"seed": k, "duration": duration}} for k in range(pairs)}
+    tables = {
+        "structure": {"shape": "column", "heights": [1.0], "breadth": 0.5},
+        "suite": {"target": TARGET, "pairs": made, **suite},
+        "report": {"norm": norm},
+    }
+    data = report_data.ReportData(af.Case.of(tables), dict.fromkeys(made))
+    motions = af.cases.Case.of(tables).ground_suite().motions
+    vars(data)["motions"] = {name: m.scaled(factor) for name, m in zip(made, motions, strict=True)}
+    object.__setattr__(data, "read_text", lambda name: modes if name == "modes.txt" else None)
+    return data
+
+
+def states(data):
+    return {check.rule.partition(",")[0]: check.state for check in motion_rules.check_motions(data)}
+
+
+def test_rules_are_met_by_matched_motions_of_thirty_seconds():
+    data = data_of(matched=True)
+    assert set(states(data).values()) == {"met"}
+    assert len(states(data)) == 4
+    assert motion_rules.note_checks(data) == []
+    (grid,) = motion_rules.tabulate_checks(data)
+    assert "from memory" in grid.caption
+    assert grid.rows[1][2].endswith("from 0.02 to 0.2 s")  # of the mode with the largest mass
+
+
+def test_a_short_stationary_part_is_a_note():
+    """The envelope is constant from 15 to 50 % of the duration, which the samples show."""
+    data = data_of(duration=10.0, matched=True)
+    assert states(data)["stationary part of artificial motions"] == "not met"
+    (note,) = motion_rules.note_checks(data)
+    assert note == (
+        "the motions do not meet a rule of EN 1998-1, as known from memory: stationary part of "
+        "artificial motions, ≥ 10 s, is 3.5 s, 35% of 10 s"
+    )
+    level = af.motion.signal_processing.intensity_envelope(1001)
+    assert np.mean(level == 1.0) == pytest.approx(0.35, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("changes", "rule", "state"),
+    [
+        ({"pairs": 2}, "number of motions", "not met"),
+        ({"factor": 0.5}, "mean spectrum over the target", "not met"),
+        ({"factor": 0.5}, "mean PGA over the target at period zero", "not met"),
+        ({"factor": 0.5, "reduction": 2.0}, "mean PGA over the target at period zero", "not met"),
+        ({"reduction": 2.0}, "mean PGA over the target at period zero", "met"),
+        ({"modes": None}, "mean spectrum over the target", "not checked"),
+        ({"norm": "NTC 2018", "factor": 2.0}, "mean spectrum over the target", "not met"),
+    ],
+)
+def test_each_rule_can_fail(changes, rule, state):
+    assert states(data_of(matched=True, **changes))[rule] == state
+
+
+def test_other_norms_have_no_rules_here():
+    data = data_of(norm="SIA 261")
+    assert motion_rules.check_motions(data) == motion_rules.tabulate_checks(data) == []
