@@ -226,10 +226,15 @@ def describe_dead_load(result: DeadLoadResult, *, explain: bool = False) -> str:
 
 def _describe_largest(joints: xr.Dataset) -> str:
     """Return the largest |e| and V / N of joints, and their smallest compression."""
-    return (
+    least = float(joints["N"].min())
+    text = (
         f"|e| ≤ {float(abs(joints['eccentricity']).max()):.3f}, "
-        f"V/N ≤ {float(joints['friction'].max()):.3f}, N ≥ {float(joints['N'].min()) / kN:.2f} kN"
+        f"V/N ≤ {float(joints['friction'].max()):.3f}, N ≥ {least / kN:.2f} kN"
     )
+    if abs(least) > 1e-6 * float(joints["N"].max()):
+        return text
+    idle = joints["name"][joints["N"] <= 1e-6 * joints["N"].max()].values.tolist()
+    return f"{text}: nothing is carried by {join_joint_names(idle)}"
 
 
 def describe_supports(structure: Structure, max_names: int = 4) -> str:

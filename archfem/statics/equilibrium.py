@@ -10,7 +10,7 @@ rigid blocks that no thrust line within friction can hold must not be at rest: t
 (Heyman, Int. J. Solids Struct. 2 (1966) 249-279) checks it by a linear programme without stiffness.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache, partial
 from itertools import combinations
@@ -32,12 +32,13 @@ from archfem.limit.collapse import stands
 from archfem.limit.instability import explain_instability
 from archfem.limit.linear_programme import NoEquilibrium
 from archfem.masonry.backfill import jointed_fill
-from archfem.masonry.block import as_point, say_place
+from archfem.masonry.block import Block, as_point, say_place
 from archfem.masonry.construction import Stage, resolve_stages
 from archfem.masonry.loads import BodyForce
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import (
     CONTACT_TOLERANCE,
+    Joint,
     Structure,
     join_joint_names,
     join_names,
@@ -518,29 +519,53 @@ def _doubt_springers(structure: Structure) -> list[Doubt]:
     return doubts
 
 
+def _free_faces(structure: Structure) -> Iterator[tuple[Joint, int, int, Array]]:
+    """Yield joints at supports, with their fixed block, the other and the normal from fixed."""
+    joints = zip(structure.joints, structure.pairs.tolist(), structure.normals, strict=True)
+    for joint, (low, high), normal in joints:
+        if structure.blocks[low].fixed != structure.blocks[high].fixed:
+            fixed_first = structure.blocks[low].fixed
+            yield (joint, low, high, normal) if fixed_first else (joint, high, low, -normal)
+
+
 def _doubt_inner_supports(structure: Structure) -> list[Doubt]:
-    """Return a doubt for fixed blocks that stand within a ring or pier instead of at its ends."""
+    """Return a doubt for fixed blocks within a ring or pier, or that lie on blocks that move."""
     blocks, body = structure.blocks, np.arange(len(structure.blocks))
     for one, other in structure.pairs:  # fixed blocks side by side are one body
         if blocks[one].fixed and blocks[other].fixed:
             body[body == body[other]] = body[one]
     # faces of each body that touch a part: block, middle of the joint, normal away from the block
     faces: dict[tuple[int, str], list[tuple[int, Array, Array]]] = {}
-    joints = zip(structure.joints, structure.pairs, structure.normals, strict=True)
-    for joint, (low, high), normal in joints:
-        if blocks[low].fixed != blocks[high].fixed and joint.role != "other":
-            block, outward = (low, normal) if blocks[low].fixed else (high, -normal)
-            of_part = faces.setdefault((int(body[block]), joint.part), [])
-            of_part.append((int(block), joint.middle, outward))
-    doubts = []
-    for (_, part), touching in faces.items():
+    below: dict[int, list[str]] = {}  # names of what moves below each fixed block
+    for joint, block, free, outward in _free_faces(structure):
+        if joint.role == "other":  # as of a sidewall, which may lie on pieces of fill
+            continue
+        if outward[1] < -0.5:  # a bed, to 60° steep
+            below.setdefault(block, []).append(f"'{blocks[free].name}'")
+        of_part = faces.setdefault((int(body[block]), joint.part), [])
+        of_part.append((block, joint.middle, outward))
+    doubts = dict[tuple[int, str], Doubt]()
+    for (number, part), touching in faces.items():
         for (first, at, one), (last, beyond, other) in combinations(touching, 2):
             # both look away from one another, and not upwards, as springings on a pier do
             away = one @ other < 0.0 < (at - beyond) @ (one - other)
             if away and one[1] + other[1] < 0.1:
-                doubts.append(_doubt_support(structure, sorted({first, last}), part))
+                doubts[number, part] = _doubt_support(structure, sorted({first, last}), part)
                 break
-    return doubts
+    stated = {number for number, _ in doubts}
+    carried = [number for number in below if body[number] not in stated]
+    return [*doubts.values(), *(_doubt_carried(blocks[k], below[k]) for k in carried)]
+
+
+def _doubt_carried(block: Block, below: Sequence[str]) -> Doubt:
+    """Return the doubt about a fixed block that lies on others, which move."""
+    x, y = block.centroid
+    return Doubt(
+        f"'{block.name}' at ({x:.2f}, {y:.2f}) m cannot move, but lies on {join_names(below)}, "
+        "which can, and puts no weight there: what it holds is far stronger than a structure "
+        "in which it moves",
+        "take fixed from it, in a drawing by its layer",
+    )
 
 
 def _doubt_support(structure: Structure, numbers: Sequence[int], part: str) -> Doubt:

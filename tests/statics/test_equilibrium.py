@@ -243,6 +243,45 @@ def test_a_fixed_stone_of_a_pier_or_a_flat_arch_is_a_doubt():
         assert doubt.cause.startswith(f"'{structure.blocks[number].name}' at (")
 
 
+def test_a_fixed_course_on_one_that_moves_is_a_doubt(tmp_path, capsys):
+    """The springing of a ring on piers is of two parts; the course below hangs from nothing."""
+    sizes = {"radius": 1.5, "thickness": 0.35, "voussoirs": 9, "pier_breadth": 0.7}
+    portal = af.arch_on_piers(**sizes, courses=[0.5, 0.5, 0.5])
+    assert structure_doubts(portal) == []
+    tops = [k for k in portal.free if portal.blocks[k].part.endswith("pier")]
+    tops = [k for k in tops if portal.centroids[k][1] > -0.3]
+    wrong = with_fixed(portal, *tops)
+    doubts = structure_doubts(wrong)
+    assert len(doubts) == len(tops) == 2
+    for k, doubt in zip(sorted(tops), sorted(doubts, key=lambda each: each.cause), strict=True):
+        x, y = wrong.centroids[k]
+        name = wrong.blocks[k].name
+        assert doubt.cause.startswith(f"'{name}' at ({x:.2f}, {y:.2f}) m cannot move, but lies on ")
+        assert doubt.remedy == "take fixed from it, in a drawing by its layer"
+    path = af.Analysis(wrong, fidelity="rigid").write(tmp_path / "wrong.toml")
+    horizontal = ["--set", "limit.horizontal=1.0"]
+    for command in (["check"], ["limit", *horizontal], ["run", "--out", str(tmp_path / "out")]):
+        assert af.commands.main([command[0], str(path), *command[1:]]) == 3
+        said = capsys.readouterr().out
+        assert said.count("m cannot move, but lies on '") == 2
+        assert ("N ≥ 0.00 kN: nothing is carried by " in said) == (command[0] != "limit")
+
+
+def test_a_fixed_wall_on_pieces_of_fill_is_none():
+    """Sidewalls lean against what they hold."""
+    stones = [
+        af.Block(
+            ((0.0, -1.0), (2.0, -1.0), (2.0, 0.0), (0.0, 0.0)), af.STONE, "ground", fixed=True
+        ),
+        af.Block(((0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (0.0, 1.0)), af.STONE, "fill"),
+        af.Block(((0.0, 1.0), (2.0, 1.0), (2.0, 2.0), (0.0, 2.0)), af.STONE, "wall", fixed=True),
+    ]
+    for role, count in (("other", 0), ("pier", 1)):
+        own = [replace(block, role=role) for block in stones]
+        assembled = af.masonry.assembled(own, af.masonry.STONE_TO_STONE)
+        assert len(structure_doubts(assembled)) == count
+
+
 def test_a_fixed_pier_between_arches_of_one_part_is_none():
     """A fixed pier carries two stones of one part, whose springings are nearly vertical."""
     skew = np.tan(np.radians(3.5))
