@@ -56,7 +56,7 @@ def check_file(path: str | os.PathLike[str], what: str, max_bytes: int = 2**28) 
     try:
         place = Path(path)
         status = place.stat()
-    except FileNotFoundError as error:
+    except FileNotFoundError:
         raise InvalidInput(
             f"there is no {what} {path}: check its name and the folder of its path"
         ) from None
