@@ -56,12 +56,12 @@ def check_file(path: str | os.PathLike[str], what: str, max_bytes: int = 2**28) 
     try:
         place = Path(path)
         status = place.stat()
-    except FileNotFoundError as error:
+    except FileNotFoundError:
         raise InvalidInput(
             f"there is no {what} {path}: check its name and the folder of its path"
-        ) from error
+        ) from None
     except (OSError, ValueError, TypeError) as error:
-        raise InvalidInput(_read_error(path, what, error)) from error
+        raise InvalidInput(_read_error(path, what, error)) from None
     if not stat.S_ISREG(status.st_mode):
         raise InvalidInput(f"{place} is a folder, a device or a pipe: give a {what}, a file")
     if status.st_size > max_bytes:
@@ -102,7 +102,7 @@ def read_bytes(path: str | os.PathLike[str], what: str, max_bytes: int = 2**28) 
     try:
         return check_file(path, what, max_bytes).read_bytes()
     except OSError as error:
-        raise InvalidInput(_read_error(path, what, error)) from error
+        raise InvalidInput(_read_error(path, what, error)) from None
 
 
 def _read_error(path: Any, what: str, error: Exception) -> str:
@@ -115,7 +115,7 @@ def read_text(path: str | os.PathLike[str], what: str, max_bytes: int = 2**28) -
     try:
         return read_bytes(path, what, max_bytes).decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise InvalidInput(f"{path} is no {what}, for it is not UTF-8: {error}") from error
+        raise InvalidInput(f"{path} is no {what}, for it is not UTF-8: {error}") from None
 
 
 @contextmanager

@@ -5,6 +5,7 @@ import json
 import os
 import subprocess
 import sys
+import traceback
 from contextlib import nullcontext
 from pathlib import Path
 
@@ -12,6 +13,19 @@ import pytest
 
 import archfem as af
 from archfem import _files
+
+
+@pytest.mark.parametrize("text", [None, "title = ", b"\xff"])
+def test_a_file_that_cannot_be_read_has_one_traceback(tmp_path, text):
+    """The message of archfem is the last and the only one: the error below it adds nothing."""
+    path = tmp_path / "case.toml"
+    if text is not None:
+        path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    with pytest.raises(af.InvalidInput) as raised:
+        af.Case.read(path)
+    shown = "".join(traceback.format_exception(raised.value))
+    assert shown.count("Traceback") == 1
+    assert shown.splitlines()[-1].startswith("archfem.errors.InvalidInput: ")
 
 
 def test_a_file_appears_when_it_is_whole(tmp_path):

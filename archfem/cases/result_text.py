@@ -32,7 +32,12 @@ from archfem.limit.fill_range import FillRange
 from archfem.limit.fill_strength import PlasticFill, as_pressure
 from archfem.limit.mechanism_count import Mechanism, duration_text
 from archfem.limit.rating import Rating
-from archfem.masonry.structure import Structure, describe_spans, join_joint_names, join_names
+from archfem.masonry.structure import (
+    Structure,
+    describe_spans,
+    join_names,
+    list_or_count,
+)
 from archfem.motion.hazard import DESIGN_PERIOD, MEASURES
 from archfem.motion.matching import DEFAULT_BAND, Match
 from archfem.motion.motion import Motion
@@ -269,8 +274,8 @@ def describe_collapse(structure: Structure, collapse: Collapse, limit: LimitAnal
     hinges = [f"{joints[number].name} at the {side}" for number, side in collapse.hinges]
     sliding = [joints[number].name for number in collapse.sliding]
     lines = [f"limit analysis: {collapse.sentence}"]
-    lines += [f"hinges, by the face in contact: {join_names(hinges, '; ')}"] if hinges else []
-    lines += [f"sliding: {join_joint_names(sliding)}"] if sliding else []
+    lines += [f"hinges, by the face in contact: {list_or_count(hinges)}"] if hinges else []
+    lines += [f"sliding: {list_or_count(sliding)}"] if sliding else []
     lines += [str(collapse.solutions)] if collapse.solutions else []
     over = collapse.describe_range()
     if over:

@@ -56,7 +56,7 @@ def read_tables(path: Path, what: str) -> dict[str, Any]:
     try:
         return parse_tables(text)
     except InvalidInput as error:
-        raise InvalidInput(f"{path} is not TOML: {error}") from error
+        raise InvalidInput(f"{path} is not TOML: {error}") from None
 
 
 def parse_tables(text: str, max_depth: int = 20) -> dict[str, Any]:
@@ -73,7 +73,7 @@ def parse_tables(text: str, max_depth: int = 20) -> dict[str, Any]:
     try:
         tables = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
-        raise InvalidInput(str(error)) from error
+        raise InvalidInput(str(error)) from None
     _check_nesting(tables, "", 0, max_depth)
     return tables
 

@@ -41,6 +41,7 @@ from archfem.masonry.structure import (
     Structure,
     join_joint_names,
     join_names,
+    list_or_count,
     structure_of,
 )
 from archfem.units import MPa, kN, kPa
@@ -207,8 +208,8 @@ class Collapse(ResultDisplay):
         """Describe outcome, factor and failing joints in one line."""
         turning = zip(self.hinges, self.hinge_names, strict=True)
         sides = [f"{name} at the {side}" for (_, side), name in turning]
-        hinges = join_names(sides, "; ") or "none"
-        sliding = join_joint_names(self.sliding_names) or "none"
+        hinges = list_or_count(sides) or "none"
+        sliding = list_or_count(self.sliding_names) or "none"
         bound = (
             "" if self.upper == self.factor or np.isnan(self.factor) else f" to {self.upper:.4g}"
         )

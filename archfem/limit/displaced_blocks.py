@@ -367,7 +367,8 @@ def find_mechanism(
         factor, velocity = _solve_flat(bodies, contacts, coefficient, forces)
     motion = bodies.spread(velocity)
     speed = blocks.largest_speed(motion)
-    found = classify_motion(blocks, joints, motion / speed, coefficient, contacts, factor)
+    dilates = np.zeros(len(contacts)) if flat else coefficient
+    found = classify_motion(blocks, joints, motion / speed, dilates, contacts, factor)
     return replace(found, is_flat=flat)
 
 
@@ -388,8 +389,8 @@ def _solve_flat(
         # half steps: whole ones may alternate between two states
         before, forces = factor, 0.5 * (forces + found)
     raise DidNotConverge(
-        "no mechanism was found whose faces slide without dilatancy: assess fewer blocks, or "
-        "forbid sliding (friction=None)"
+        "no mechanism was found whose faces slide without dilatancy: af.collapse_factor(…, "
+        "friction='nonassociated') searches for one, at rest"
     )
 
 

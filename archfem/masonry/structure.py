@@ -65,6 +65,13 @@ def join_joint_names(names: Sequence[str]) -> str:
     return _shorten_list(names, _group_by_stem, "; ")
 
 
+def list_or_count(names: Sequence[str], most: int = 16) -> str:
+    """List the joints of a mechanism, or count them where a picture alone shows so many."""
+    if len(names) > most:
+        return f"{len(names)} joints, drawn in the picture"
+    return join_joint_names(names)
+
+
 def _shorten_list(names: Sequence[str], put: Callable[[Sequence[str]], str], comma: str) -> str:
     """Join a list; of a long one both ends, with its length."""
     # longer lists of names in messages lose their middle

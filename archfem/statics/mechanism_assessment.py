@@ -18,6 +18,7 @@ References:
 """
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -33,6 +34,7 @@ from archfem.errors import DidNotConverge, InvalidInput, logger
 from archfem.limit.backfill import BlocksWithFill, FillProfile, attach_fill
 from archfem.limit.collapse import collapse_factor
 from archfem.limit.displaced_blocks import (
+    TOUCHING,
     FillPressure,
     KinematicChain,
     PlacedBlocks,
@@ -50,8 +52,8 @@ from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import (
     HasStructure,
     Structure,
-    join_joint_names,
     join_names,
+    list_or_count,
     structure_of,
 )
 from archfem.motion.design_spectra import (
@@ -201,8 +203,8 @@ class KinematicAssessment(ResultDisplay):
             lines.append("no horizontal force makes it a mechanism")
         else:
             names = [joint.name for joint in self.structure.joints]
-            hinges = join_names([f"{names[k]} at the {end}" for k, end in self.hinges], "; ")
-            sliding = join_joint_names([names[k] for k in self.sliding])
+            hinges = list_or_count([f"{names[k]} at the {end}" for k, end in self.hinges])
+            sliding = list_or_count([names[k] for k in self.sliding])
             lines += [
                 f"{name_mechanism(self.structure, self.path.velocity)}; hinges: "
                 f"{hinges or 'none'}; sliding: {sliding or 'none'}",
@@ -212,7 +214,8 @@ class KinematicAssessment(ResultDisplay):
             ]
             changes = [event.text for event in self.path.events if event.text != self.path.end]
             lines += [f"along the path: {join_names(changes, '; ')}"] if changes else []
-            lines += [self.path.end.sentence, *map(str, self.checks)]
+            lines += [self.path.end.sentence] if self.displacement else []
+            lines += map(str, self.checks)
             if (over_fill := self.checks[-1].over_fill) is not None:
                 over = over_fill.describe(digits=3)
                 lines.append(f"over what is assumed of the fill: {over} times as strong")
@@ -258,7 +261,8 @@ def kinematic_assessment(  # noqa: PLR0913  (the factors of the codes are argume
     - *linear*: q a₀* / FC against the ground acceleration, that of the spectrum at T = 0;
     - *displacement*: d_u* as a share of d₀* against the displacement spectrum at the period of the
       limit state, with the accelerations of the curve divided by FC. A mechanism that the ground
-      acceleration does not set in motion, a₀* / FC above it, passes as well.
+      acceleration does not set in motion, a₀* / FC above it, passes as well. There is none for a
+      mechanism without a finite motion, such as most wedges of walls in bond.
 
     A fill, bodies softer than their joints, counts by its weight and mass on the stones below,
     column by column; with its strength, `fill`, it presses on them as in `collapse_factor`. Along
@@ -272,7 +276,9 @@ def kinematic_assessment(  # noqa: PLR0913  (the factors of the codes are argume
             of the limit state by η = √(10/(5 + ξ)) >= 0.55; or a ground motion, whose response
             spectrum is the demand. Beyond 4 s the spectral displacement of European codes is held.
         direction: sense of the horizontal forces along x, 1 or -1.
-        friction: "coulomb", "nonassociated" or None for no sliding, as for `collapse_factor`.
+        friction: "coulomb", "nonassociated" or None for no sliding, as for `collapse_factor`. Where
+            dilatancy alone lets the mechanism of "coulomb" move, as in walls in bond, that of
+            "nonassociated" is taken, if it can be searched. None is no bound for walls in bond.
         part: name of a part; only joints that touch its blocks may move.
         blocks: names or numbers of blocks; only joints that touch them may move.
         loads: loads that stay with their blocks, such as floors and ties.
@@ -292,7 +298,7 @@ def kinematic_assessment(  # noqa: PLR0913  (the factors of the codes are argume
 
     Raises:
         InvalidInput: an argument is unknown or out of range, or the structure does not stand.
-        DidNotConverge: no mechanism was found that moves without the dilatancy of sliding faces.
+        DidNotConverge: the solver of linear programmes gave up.
 
     Note:
         EN 1998-3 and ASCE 41 have checks of their own, whose texts could not be read: give their
@@ -355,20 +361,73 @@ class _Search:
         loads = (*weights, *self.loads)
         placed = PlacedBlocks.at_rest(stones, loads, self.direction, pressure)
         friction = stones.friction if self.friction else np.full(len(stones.joints), np.inf)
-        mechanism = _find_first_mechanism(placed, joints, friction, self.friction)
-        path, holds = None, 0
-        if mechanism is not None:
-            follower = PathFollower(placed, joints, friction)
-            path = follower.follow(mechanism)
-            if not path.displacements[-1].any():
-                raise DidNotConverge(
-                    f"the mechanism of limit analysis, at a factor of {mechanism.factor:.4g}, "
-                    "cannot move if its faces slide without dilatancy: assess fewer blocks, or "
-                    "forbid sliding (friction=None)"
-                )
-            holds = follower.last_equilibrium(path)
+        mechanism = _find_first_mechanism(placed, joints, friction)
         given = self.spectrum, self.rules, self.confidence_factor
-        return _Oscillator(placed, path, holds, bool(weights), *given).assess(self.q)
+        if mechanism is None:
+            return _Oscillator(placed, None, 0, bool(weights), *given).assess(self.q)
+        path, holds, doubt = self._follow(placed, joints, friction, mechanism)
+        oscillator = _Oscillator(placed, path, holds, bool(weights), *given, searched=doubt)
+        return oscillator.assess(self.q)
+
+    def _follow(
+        self, placed: PlacedBlocks, joints: list[int], friction: Array, first: KinematicChain
+    ) -> tuple[MechanismPath, int, str]:
+        """Return the path of a mechanism, where it holds to, and the doubt about its factor.
+
+        Where dilatancy alone lets a mechanism move, it is that of the search without dilatancy; of
+        one that has no finite motion even so, the path is the place at rest.
+        """
+        mechanism, doubt, slides = first, "", any(contact.slip for contact in first.contacts)
+        searches = [False, True] if self.friction == "coulomb" else [True]
+        for searched in searches if slides else [False]:
+            if searched:
+                mechanism, doubt = self._search_flat(placed, joints, first)
+            follower = PathFollower(placed, joints, friction)
+            with suppress(DidNotConverge):  # no mechanism was found whose faces slide flat
+                path = follower.follow(mechanism)
+                if follower.travel > TOUCHING * self.structure.size:
+                    return path, follower.last_equilibrium(path), doubt
+        rest = np.array([mechanism.factor]), np.zeros((1, *mechanism.motion.shape))
+        return (
+            MechanismPath(placed, *rest, mechanism.motion, (mechanism,), (), PathEnd.LOCKS),
+            0,
+            doubt,
+        )
+
+    def _search_flat(
+        self, placed: PlacedBlocks, joints: list[int], first: KinematicChain
+    ) -> tuple[KinematicChain, str]:
+        """Return the mechanism of the search without dilatancy, or the first, and a doubt."""
+        structure, searches = placed.structure, self.friction == "nonassociated"
+        dilates = (
+            f"faces dilate as this mechanism slides: alpha_0 = {first.factor:.4g} is an upper "
+            "estimate"
+        )
+        if len(joints) < len(structure.joints) or placed.loads:
+            if searches:
+                raise InvalidInput(
+                    "friction 'nonassociated' is searched for the whole structure only: leave out "
+                    "part and blocks, or use 'coulomb'"
+                )
+            given = "part, blocks, loads and fill"
+            return first, f"{dilates}; a search without dilatancy takes no {given}: leave them out"
+        dry = [replace(x, contact=replace(x.contact, cohesion=0.0)) for x in structure.joints]
+        found = collapse_factor(
+            replace(structure, joints=tuple(dry)),
+            live=BodyForce(placed.direction),
+            friction="nonassociated",
+            strength=np.inf,
+        )
+        if not found.motion.any():
+            return first, f"{dilates}, and a search without dilatancy found none: hold a motion"
+        contacts, doubt = placed.touching(joints), ""
+        flat = np.zeros(len(contacts))
+        if found.solutions is not None and found.solutions.may_be_less:
+            doubt = (
+                f"alpha_0 <= {found.factor:.4g} is the least that a search without dilatancy "
+                "found, and a weaker mechanism may exist: hold a motion a tenth below"
+            )
+        return classify_motion(placed, joints, found.motion, flat, contacts, found.factor), doubt
 
     def vary(
         self, lever: float, fill: Any, found: KinematicAssessment
@@ -507,7 +566,7 @@ def _select_joints(
 
 
 def _find_first_mechanism(
-    placed: PlacedBlocks, joints: list[int], coefficient: Array, friction: str | None
+    placed: PlacedBlocks, joints: list[int], coefficient: Array
 ) -> KinematicChain | None:
     """Return the mechanism of least factor at rest; None where there is none."""
     refusal = _DoesNotStand(
@@ -525,21 +584,7 @@ def _find_first_mechanism(
         raise refusal from error
     if any(found is not None and found.factor <= 1e-9 for found in (mechanism, *others)):
         raise refusal
-    slides = mechanism is not None and any(each.slip for each in mechanism.contacts)
-    if friction != "nonassociated" or not slides:
-        return mechanism
-    if len(joints) < len(placed.structure.joints):
-        raise InvalidInput(
-            "friction 'nonassociated' is searched for the whole structure only: leave out part "
-            "and blocks, or use 'coulomb'"
-        )
-    live = BodyForce(placed.direction)
-    found = collapse_factor(placed.structure, live=live, friction="nonassociated", strength=np.inf)
-    if not found.motion.any():
-        return mechanism
-    contacts = placed.touching(joints)
-    at_contacts = coefficient[[contact.joint for contact in contacts]]
-    return classify_motion(placed, joints, found.motion, at_contacts, contacts, found.factor)
+    return mechanism
 
 
 @dataclass(frozen=True, eq=False)
@@ -554,6 +599,7 @@ class _Oscillator:
     rules: LimitState
     confidence_factor: float
     by_body: bool = False  # whether each body that moves as one has one weight
+    searched: str = ""  # doubt about a factor that was searched without dilatancy
 
     @cached_property
     def weights(self) -> tuple[Array, Array]:
@@ -625,7 +671,12 @@ class _Oscillator:
                 f"sliding that dilates (associated flow) would raise alpha_0 to {collapse:.4g}, "
                 "and faces slide flat here"
             )
-        if self.path.end is not PathEnd.FALLS:
+        if len(self.path.factors) == 1:
+            found.append(
+                "this mechanism begins, and its contacts permit no finite motion: there is no "
+                "displacement check, and what is withstood beyond the start rests on q alone"
+            )
+        elif self.path.end is not PathEnd.FALLS:
             found.append(
                 f"alpha does not vanish: {self.path.end.sentence}, and the displacement check "
                 "counts the end of the path as d_0*"
@@ -636,6 +687,9 @@ class _Oscillator:
     def doubts(self) -> list[str]:
         """Why a ratio may be too high: another code's spectrum, a fill left out, other joints."""
         found = self.rules.doubt(self.spectrum)
+        if self.searched:
+            share = f"its linear ratio is e* = {self.e_star:.3g} times that of this one at least"
+            found.append(f"{self.searched}; whatever moves at this alpha_0, {share}")
         if self.fill and self.placed.fill is None and self.path is not None:
             found.append(
                 "the fill counts as weight and mass on the stones: its pressure on them, which "
@@ -662,7 +716,8 @@ class _Oscillator:
             mass = self.e_star * (self.weights[0].sum() / structure.gravity)
             control = structure.blocks[self.control].name
             starts = a_0 / self.confidence_factor / ground  # ratio at which it is set in motion
-            displacement = self._check_displacement(starts)
+            if len(path.factors) > 1:
+                displacement = self._check_displacement(starts)
             if path.end is PathEnd.FALLS:
                 d_0 = float(curve["d"][-1])
                 secant = self._secant_period(0.16 * d_0)

@@ -326,13 +326,19 @@ def draw_kinematic_assessment(found: KinematicAssessment) -> Figure:
 
     Returns:
         The figure: blocks at rest and at the displacement d_u* beside a*(d*), divided by the
-        confidence factor, over the spectrum of the demand.
+        confidence factor, over the spectrum of the demand; the mechanism alone where it has no
+        finite motion.
 
     Raises:
         InvalidInput: no horizontal force makes the structure a mechanism.
     """
-    if found.path is None or found.displacement is None:
+    if found.path is None:
         raise InvalidInput("there is no motion to draw: no mechanism moves under horizontal forces")
+    if found.displacement is None:
+        figure = structure_figure(found.structure)
+        _draw_displaced_mechanism(figure.add_subplot(), found)
+        add_legend_below(figure, 2)
+        return figure
     wide, high = structure_figure(found.structure).get_size_inches()
     wide = max(wide, 0.75 * Size.COLUMN)
     if panel_grid(2) == (1, 2):
@@ -350,14 +356,18 @@ def draw_kinematic_assessment(found: KinematicAssessment) -> Figure:
 
 
 def _draw_displaced_mechanism(axes: Axes, found: KinematicAssessment) -> None:
-    """Draw the blocks at rest, and at the displacement capacity, true to scale."""
+    """Draw the blocks at rest, and at the displacement capacity, true to scale, if there is one."""
     structure, path, check = found.structure, found.path, found.displacement
     draw_structure(structure, axes=axes)
-    place = int(np.searchsorted(found.curve["d"].values, check.capacity))
-    place = min(place, len(path.displacements) - 1)
-    blocks = path.blocks.moved(path.displacements[place])
-    moved = [k for k in structure.free if np.abs(path.displacements[place, k]).max() > 1e-9]
-    _draw_motion(axes, [blocks.outlines[k] for k in moved], "mechanism at d_u*")
+    if check is None:
+        motion = scale_motion(structure, path.velocity)
+        _draw_motion(axes, outline_moving_blocks(structure, motion), "mechanism as it begins")
+    else:
+        place = int(np.searchsorted(found.curve["d"].values, check.capacity))
+        place = min(place, len(path.displacements) - 1)
+        blocks = path.blocks.moved(path.displacements[place])
+        moved = [k for k in structure.free if np.abs(path.displacements[place, k]).max() > 1e-9]
+        _draw_motion(axes, [blocks.outlines[k] for k in moved], "mechanism at d_u*")
     rest = np.zeros((len(structure.blocks), 3))
     _mark_hinges(axes, structure, found, rest, {"label": "hinge at rest", "ms": 6.5})
     _mark_sliding(axes, structure, found.sliding)

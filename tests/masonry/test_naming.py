@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 import archfem as af
-from archfem.masonry.structure import find_number, join_joint_names, join_names
+from archfem.masonry.structure import find_number, join_joint_names, join_names, list_or_count
 
 RING = Path(__file__).parents[2] / "meshes" / "ring_paper.toml"
 NAMES = ["north pier, base", "main arch, joint 4", "main arch, joint 5"]
@@ -66,4 +66,6 @@ def test_joints_in_a_list(names, words):
 
 def test_a_long_list_loses_its_middle():
     assert join_names(["a", "b"]) == "a, b"
+    assert list_or_count([*"abcdefghijklmnop"]).endswith("m; n; o; p (16 in all)")
+    assert list_or_count([*"abcdefghijklmnopq"]) == "17 joints, drawn in the picture"
     assert join_names([*"abcdefghi"], "; ") == "a; b; c; d; …; f; g; h; i (9 in all)"

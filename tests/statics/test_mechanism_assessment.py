@@ -6,6 +6,7 @@ from math import atan2, pi, sqrt
 import numpy as np
 import pytest
 from backfilled import SOIL, arch_bridge, rectangle, retaining_wall, slender_bridge, two_walls
+from bonded import bonded_wall
 
 import archfem as af
 from archfem.statics import LIMIT_STATES, AssessmentCheck, LimitState, mechanism_assessment
@@ -304,6 +305,64 @@ def test_sliding_with_and_without_dilatancy():
     assert both["coulomb"].sliding == (9,)
     assert both[None].sliding == ()
     assert both[None].alpha_0 > both["coulomb"].alpha_0
+
+
+@pytest.fixture(scope="module")
+def wedge():
+    """A wall in bond whose wedge no finite motion follows, and the weakest mechanism found."""
+    wall = bonded_wall(7, half=1.0)
+    found = af.collapse_factor(wall, live=af.BodyForce(1.0), friction="nonassociated")
+    return found, af.kinematic_assessment(wall, SPECTRUM)
+
+
+def test_a_wedge_of_a_wall_in_bond_has_the_linear_check_alone(wedge, verified):
+    """e*, M* and a0* by hand from displacements at rest, alpha_0 by their work and of friction.
+
+    Associated flow has a larger factor, and its mechanism cannot begin without dilatancy.
+    """
+    (limit, found), wall = wedge, wedge[0].structure
+    free = list(wall.free)
+    sizes = [np.ptp(np.array(wall.blocks[k].outline), axis=0) for k in free]
+    weights = np.array([0.4 * breadth * height * STONE for breadth, height in sizes])
+    across, up, _ = limit.motion[free].T
+    friction = 0.0  # work of 0.6 N on the slips of beds and heads
+    for joint, normal in zip(wall.joints, limit.joints["N"].values, strict=True):
+        middle, along = joint.ends.mean(axis=0), np.diff(joint.ends, axis=0)[0]
+        jump = np.zeros(2)
+        for block, sign in zip(joint.blocks, (-1.0, 1.0), strict=True):
+            x, y = middle - wall.blocks[block].centroid
+            speed, rise, rotation = limit.motion[block]
+            jump += sign * np.array([speed - rotation * y, rise + rotation * x])
+        friction += 0.6 * normal * abs(jump @ along) / np.hypot(*along)
+    factor = (weights @ up + friction) / (weights @ across)
+    moves = np.abs(limit.motion[free]).max(axis=1) > 1e-9
+    share, acceleration = oscillator(weights[moves], across[moves], factor)
+    expected = {"alpha_0": factor, "e_star": share, "a_0_star": acceleration}
+    expected["M_star"] = share * weights[moves].sum() / G
+    check_values(found, expected, verified, "wedge of a wall in bond", 1e-6)
+    associated = af.collapse_factor(wall, live=af.BodyForce(1.0)).factor
+    assert found.alpha_0 == pytest.approx(limit.factor, rel=1e-9)
+    assert found.alpha_0 < 0.999 * associated
+    assert found.displacement is None
+    assert found.checks == [found.linear]
+    assert found.linear.ratio == pytest.approx(2.0 * acceleration / 1.35 / found.linear.demand)
+    assert "there is no displacement check" in found.notes[0]
+    (doubt,) = found.doubts
+    assert doubt.startswith(f"alpha_0 <= {factor:.4g} is the least that a search")
+    assert f"its linear ratio is e* = {share:.3g} times that of this one" in doubt
+    assert "T_s" in str(found)
+    assert "NTC-2018 SLV" not in str(found)
+
+
+def test_a_wedge_under_loads_has_an_upper_estimate(wedge):
+    """Loads are not searched without dilatancy: the factor of associated flow, with a doubt."""
+    wall = wedge[0].structure
+    corner = wall.free[0]  # with a weight too small to count
+    load = af.masonry.AttachedLoad(corner, tuple(wall.blocks[corner].centroid), weight=1e-3)
+    part = af.kinematic_assessment(wall, SPECTRUM, loads=[load])
+    assert part.displacement is None
+    assert part.alpha_0 > wedge[1].alpha_0
+    assert part.doubts[0].startswith("faces dilate as this mechanism slides: alpha_0 = ")
 
 
 @pytest.mark.slow

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from backfilled import arch_bridge
+from bonded import bonded_wall
 from portals import DRY, box, portal
 
 import archfem as af
@@ -133,6 +134,15 @@ def test_an_assessment_shows_moved_blocks_curve_and_demand(coarse_ring):
     locked = af.kinematic_assessment(piers, found.spectrum, part="left pier")
     with pytest.raises(af.InvalidInput, match="no mechanism moves under horizontal forces"):
         draw_kinematic_assessment(locked)
+
+
+def test_an_assessment_without_a_finite_motion_shows_the_mechanism_as_it_begins():
+    wall = bonded_wall(7, half=1.0)
+    found = af.kinematic_assessment(wall, af.Eurocode8(ag=0.3, ground="B"))
+    (axes,) = draw_kinematic_assessment(found).axes
+    moved = np.abs(found.path.velocity).max(axis=1) > 1e-3
+    assert len(axes.collections[1].get_paths()) == moved.sum() > 10
+    assert axes.collections[1].get_label() == "mechanism as it begins"
 
 
 def test_a_rating_shows_factors_over_the_middle_and_the_mechanism(coarse_ring, few_places):
