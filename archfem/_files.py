@@ -428,6 +428,20 @@ def refuse_listed(path: Path) -> None:
         )
 
 
+def refuse_unlisted(folder: Path, names: Iterable[str]) -> None:
+    """Refuse to replace files of a result folder that no command has written there."""
+    try:
+        groups = read_file_list(folder)
+    except InvalidInput:  # which files are results is not known, and a new run is the remedy
+        return
+    for path in (folder / name for name in names if group_of(groups, name) is None):
+        if path.is_file():
+            raise InvalidInput(
+                f"{path} is no result of archfem, by {LIST_FILE}, and a run would replace it: "
+                "name another folder, or move that file"
+            )
+
+
 def _listed_digests(path: Path) -> Iterator[str]:
     """Yield the digests that a file has in the lists of its folders."""
     path = path.absolute()

@@ -165,8 +165,9 @@ class Case:
             folder=folder,
         )
         _ = case.joints  # refuses names of no joint
-        if "free_body" in output:
-            case.structure.block_number(output["free_body"])
+        loads = case.assessment.options.get("loads", ())
+        for block in (*filter(None, [output.get("free_body")]), *(load.block for load in loads)):
+            structure.block_number(block)  # refuses names of no block
         return case
 
     @property

@@ -512,6 +512,8 @@ def replace_run(case: Case, folder: Path) -> Iterator[Path]:
 
 def _start_draft(case: Case, folder: Path, inputs: str) -> Path:
     """Return a draft with the case, and of a suite the histories that earlier calls computed."""
+    _files.complete_publication(folder)
+    _files.refuse_unlisted(folder, (CASE_FILE, HISTORY_FILE))
     draft, listed = _files.start_draft(folder, "run"), _files.intact_file_list(folder).get("run")
     pairs = {f"{name}/{HISTORY_FILE}": name for name in (case.suite or {}).get("pairs", ())}
     for path in _files.list_files(draft):

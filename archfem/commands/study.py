@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING
 
 import xarray as xr
 
+from archfem._display import DOUBT_MARK
 from archfem._files import DERIVED, create_result_folder, hash_content, replace_results
+from archfem.commands.cli import ExitCode
 from archfem.errors import InvalidInput
 from archfem.studies.result_store import RESULT_FILES, format_table, status
 
@@ -33,7 +35,7 @@ def study(options: argparse.Namespace) -> int:
     print(status(folder))
     errors = table["error"].values.ravel().tolist()
     for error in sorted({error for error in errors if error}):
-        print(f"{errors.count(error)} ended in {error}")
+        print(f"{DOUBT_MARK}{errors.count(error)} of {len(errors)} points ended in {error}")
     # of this very table
     inputs = hash_content(folder / RESULT_FILES[0])
     with replace_results(folder, DERIVED["study"][0], inputs) as draft:
@@ -41,7 +43,7 @@ def study(options: argparse.Namespace) -> int:
     for name in ("study.txt", "study.png", *RESULT_FILES):
         if (folder / name).is_file():
             print(f"wrote {folder / name}")
-    return 1 if all(errors) else 0
+    return 1 if all(errors) else ExitCode.DOUBTFUL if any(errors) else 0
 
 
 def _write_results(definition: "Study", table: xr.Dataset, folder: Path) -> None:

@@ -5,6 +5,7 @@ Positions of the blocks over time decide, whether joints or loose blocks were si
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from math import inf
 
 import numpy as np
 
@@ -58,6 +59,7 @@ class CollapseState:
         residual: the same at the end [m].
         resting: whether all blocks were at rest at the end, or vibrated too weakly to overturn; if
             not, more may fall.
+        admissible_step: time step that follows sliding; infinite where that of the run does [s].
     """
 
     kind: str
@@ -66,6 +68,7 @@ class CollapseState:
     displacement: float
     residual: float
     resting: bool
+    admissible_step: float = inf
 
     @property
     def text(self) -> str:

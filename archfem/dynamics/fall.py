@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import xarray as xr
 
+from archfem._typing import Array
 from archfem._validation import validate_arguments
 from archfem.dynamics.collapse_state import (
     FALLEN_STATES,
@@ -143,17 +144,20 @@ def simulate_fall(
     # grains are many, and where each of them goes depends on the step anyhow
     dt = None if whole and loose.structure is structure else TRIED_STEPS[0]
     simulation = RigidBlockSimulation(loose.structure, dt=dt, rocking_ratio=rocking_ratio)
-    frames, failure = list[FallFrame](), ""
+    frames, failure, poses = list[FallFrame](), "", list[Array]()
     try:
         for each in simulation.frames(loose.start, end, motion, spacing=0.02):
             frame = loose.restore(each)
             frames.append(frame)
+            poses.append(each.poses)
             if not whole and find_lost(frame.poses).any():
                 break
     except DidNotConverge as error:
         failure = str(error)
-        frames = frames or [loose.restore(each) for each in error.last]
-    dataset = _fall_dataset(frames, motion, released)
+        if not frames:
+            frames = [loose.restore(each) for each in error.last]
+            poses = [each.poses for each in error.last]
+    dataset = _fall_dataset(frames, motion, released).merge(loose.describe_grains(poses))
     return dataset.assign_attrs(fall_failure=failure), frames
 
 

@@ -88,7 +88,7 @@ def _read_number(value: Any) -> float:
 # Functions that refuse a value which an attribute of a file cannot have
 ATTRIBUTE_KINDS: dict[str, Callable[[Any], Any]] = {
     **dict.fromkeys(("pga", "energy_drift", "displacement", "residual"), _read_number),
-    **dict.fromkeys(("last_time", "predicted_error"), _read_number),
+    **dict.fromkeys(("last_time", "predicted_error", "admissible_step"), _read_number),
     **dict.fromkeys(("fall_time", "fall_residual", "fall_resting"), _read_number),
     **dict.fromkeys(("criteria_hinge", "criteria_duration", "criteria_friction"), _read_number),
     **dict.fromkeys(("halved_steps", "steps", "criteria_failures"), index),
@@ -272,6 +272,7 @@ class History(ResultDisplay):
             float(attrs.get("displacement", np.nan)),
             float(attrs["fall_residual"]),
             bool(attrs["fall_resting"]),
+            float(attrs.get("admissible_step", np.inf)),
         )
 
     @cached_property

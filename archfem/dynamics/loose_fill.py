@@ -12,6 +12,7 @@ from math import sqrt
 from statistics import fmean
 
 import numpy as np
+import xarray as xr
 from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 
 from archfem._typing import Array, Flags, Numbers
@@ -68,6 +69,24 @@ class LooseFill:
         np.add.at(poses, self.origin, shares[:, None] * (frame.poses - self.start.poses))
         np.add.at(velocities, self.origin, shares[:, None] * frame.velocities)
         return replace(frame, poses=poses, velocities=velocities)
+
+    def describe_grains(self, poses: Sequence[Array]) -> xr.Dataset:
+        """Return corners of the grains at the start, and their motion over frames, for pictures."""
+        if self.start is self.built:
+            return xr.Dataset()
+        grains = [k for k, block in enumerate(self.structure.blocks) if block.grain]
+        corners = [np.array(self.structure.blocks[k].points) for k in grains]
+        owner = np.repeat(np.arange(len(grains)), [len(each) for each in corners])
+        # positions in a picture need no more digits
+        moved = np.array(poses, np.float32)[:, grains]
+        return xr.Dataset(
+            {
+                "grain_corner": (("grain_point", "axis"), np.concatenate(corners), {"units": "m"}),
+                "grain_of_corner": ("grain_point", owner),
+                "grain_block": ("grain", self.origin[grains]),
+                "grain_pose": (("fall_frame", "grain", "pose"), moved, {"units": "m, m, rad"}),
+            }
+        )
 
 
 @dataclass(eq=False)

@@ -160,6 +160,7 @@ def verdict_range(  # noqa: PLR0913  (one call, one argument for each thing that
     if isinstance(structure, Analysis) and analysis.fidelity != structure.fidelity:
         doubts = [_blame_variations(each, analysis.fidelity) for each in doubts]
     doubts += doubt_soft_blocks(*structures)
+    doubts += _doubt_steps_of_sliding([row["found"] for row in rows.values()], analysis.dt)
     dataset.attrs["doubts"] = write_doubts(doubts)
     contacts = [joint.contact for joint in analysis.structure.joints]
     dataset.attrs["k_n"] = float(np.mean([contact.normal_stiffness for contact in contacts]))
@@ -176,6 +177,20 @@ def _blame_variations(doubt: Doubt, fidelity: object) -> Doubt:
         "judge by its runs, or vary it by af.verdict_range(case.analysis, motion)"
     )
     return replace(doubt, remedy=remedy)
+
+
+def _doubt_steps_of_sliding(found: Sequence[Mapping[str, Any]], dt: float | None) -> list[Doubt]:
+    """Return a doubt where time steps are too long for the sliding of some runs."""
+    steps = [step for row in found if (step := row.get("admissible_step", inf)) < inf]
+    if not steps or dt is None:
+        return []
+    return [
+        Doubt(
+            f"in {len(steps)} of {len(found)} runs the steps, {1e3 * dt:g} ms or half of it, are "
+            "long for sliding",
+            f"take {1e3 * min(steps):g} ms or less, `--set analysis.dt={min(steps):g}`",
+        )
+    ]
 
 
 def as_falling(
@@ -330,6 +345,7 @@ def evaluate_variation(variation: Variation) -> dict[str, Any]:
         "displacement": state.displacement,
         "residual": state.residual,
         "time": np.nan if state.time is None else state.time,
+        "admissible_step": state.admissible_step,
     }
 
 

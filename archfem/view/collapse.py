@@ -538,7 +538,8 @@ def _draw_instant(axes: Axes, falls: FallingBlocks, time: float) -> None:
     axes.axhline(falls.level, color=Colour.EDGE, lw=1.2, zorder=0)
     built = [block.drawn() for block in structure.blocks]
     add_polygons(axes, built, "none", edge=Colour.UNDEFORMED, width=0.6)
-    add_polygons(axes, falls.outlines(time), block_colours(structure), zorder=2, gid="blocks")
+    colours = [block_colours(structure)[number] for number in falls.owners]
+    add_polygons(axes, falls.outlines(time), colours, zorder=2, gid="blocks")
     axes.set_title(f"t = {time:.2f} s", fontsize=Size.TITLE, color=Colour.TEXT)
     axes.autoscale_view()
     axes.label_outer()

@@ -1,15 +1,16 @@
 """Positions of blocks over a run, including blocks that came loose, and the ground motion."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Self
 
 import numpy as np
+import xarray as xr
 
 from archfem._typing import Array, Numbers
 from archfem.dynamics.history import History
 from archfem.dynamics.rigid_body.bodies import make_bodies
 from archfem.joints.criteria import Criteria, assessed_joints
-from archfem.masonry.block import rotate
+from archfem.masonry.block import measure_polygon, rotate
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import Structure
 
@@ -90,6 +91,8 @@ class FallingBlocks:
     # displacement of each block's centroid, and its rotation (f, n_blocks, 3) [m, m, rad]
     poses: Array
     level: float  # of the ground [m]
+    # grains of fill that fall in its place, with their poses; else empty
+    grains: xr.Dataset = field(default_factory=xr.Dataset)
 
     @classmethod
     def of(cls, structure: Structure, run: History) -> Self | None:
@@ -97,7 +100,19 @@ class FallingBlocks:
         if "fall_pose" not in run.dataset:
             return None
         times, poses = run.dataset["fall_time"].values, run.dataset["fall_pose"].values
-        return cls(structure, times, poses, make_bodies(structure, 0.0).level)
+        grains = run.dataset[[key for key in run.dataset if str(key).startswith("grain_")]]
+        return cls(structure, times, poses, make_bodies(structure, 0.0).level, grains)
+
+    @property
+    def broken(self) -> Numbers:
+        """Numbers of the bodies of fill that fall as grains."""
+        return np.unique(self.grains["grain_block"].values) if self.grains else np.zeros(0, int)
+
+    @property
+    def owners(self) -> Numbers:
+        """Number of the block of each outline."""
+        kept = np.setdiff1d(np.arange(len(self.structure.blocks)), self.broken)
+        return np.append(kept, self.grains["grain_block"].values) if self.grains else kept
 
     def pose(self, time: float) -> Array:
         """Return the poses of all blocks at a time (n_blocks, 3)."""
@@ -110,6 +125,21 @@ class FallingBlocks:
         return centres + poses[..., :2] + rotate(points - centres, poses[..., 2])
 
     def outlines(self, time: float) -> list[Array]:
-        """Return the outlines of all blocks at a time, each (k, 2) [m]."""
+        """Return the outlines at a time, each (k, 2) [m], of blocks and then of grains."""
         blocks = enumerate(self.structure.blocks)
-        return [self.places(block.drawn(), number, time) for number, block in blocks]
+        kept = [(number, block) for number, block in blocks if number not in self.broken]
+        places = [self.places(block.drawn(), number, time) for number, block in kept]
+        return [*places, *self.grain_outlines(time)]
+
+    def grain_outlines(self, time: float) -> list[Array]:
+        """Return the outlines of the grains of fill at a time, each (k, 2) [m]."""
+        if not self.grains:
+            return []
+        corners, owner = (self.grains[f"grain_{key}"].values for key in ("corner", "of_corner"))
+        poses = _interpolate(self.times, self.grains["grain_pose"].values, np.array([time]))[0]
+        outlines = np.split(corners, np.flatnonzero(np.diff(owner)) + 1)
+        centres = [measure_polygon(outline)[1] for outline in outlines]
+        return [
+            centre + pose[:2] + rotate(outline - centre, pose[2])
+            for outline, centre, pose in zip(outlines, centres, poses, strict=True)
+        ]

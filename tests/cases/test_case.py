@@ -53,6 +53,10 @@ def test_changes_from_the_command_line():
         ("analysis.dt=-1", r"toml: dt \[s\] = -1.0 is not between 1e-06 and 0.1"),
         ("analysis.dt='5 s'", r"toml: dt \[s\] = 5.0 is not between 1e-06 and 0.1"),
         ("output.free_body='vousoir 3'", "no block 'vousoir 3': .*'voussoir 3'"),
+        (
+            "assessment.loads=[{ block = 'vousoir 3', point = [0, 1], weight = 1e3 }]",
+            "no block 'vousoir 3': .*'voussoir 3'",
+        ),
         ("model.cells=4", r"model.cells = 4 is not a list"),
         ("model.cells=[0, 4]", "ring_paper.toml: cells through = 0 is not a whole number"),
         (

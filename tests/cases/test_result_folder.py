@@ -221,6 +221,19 @@ def break_off(case, motion, *given):
     raise af.DidNotConverge("no equilibrium", history=history)
 
 
+@pytest.mark.parametrize("name", ["history.nc", "case.toml"])
+def test_a_run_replaces_no_file_that_archfem_did_not_write(name, small, tmp_path, capsys):
+    (tmp_path / "out").mkdir()
+    mine = tmp_path / "out" / name
+    mine.write_bytes(b"of the user")
+    assert af.commands.main(["run", str(small), "--out", str(mine.parent)]) == 1
+    assert f"{name} is no result of archfem" in capsys.readouterr().err
+    with pytest.raises(af.InvalidInput, match="would replace it"):
+        next(af.cases.run_case(af.Case.read(small), mine.parent))
+    assert mine.read_bytes() == b"of the user"
+    assert [path.name for path in mine.parent.iterdir()] == [name]
+
+
 def test_in_python_too_a_run_replaces_another_as_a_whole(two_runs):
     """Files of the suite that was there vanish with it; a run that fails replaces none."""
     folder, _ = two_runs

@@ -18,6 +18,10 @@ from archfem.masonry.block import rotate
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.studies.study import Study
 from archfem.studies.variations import as_falling, prepare_runs
+from archfem.view.films.frames import frames_of_fall
+from archfem.view.films.settings import Setup
+from archfem.view.pages.player_data import Scene
+from archfem.view.positions import FallingBlocks
 
 SQUARE = np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)])
 
@@ -206,3 +210,68 @@ def test_a_bridge_with_fill_in_one_piece_falls_by_elastic_and_rigid_joints(footb
     assert run(motion).kind == "fallen"
     (doubt,) = doubt_soft_blocks(footbridge)
     assert "holds stones by tension until they are loose: backfill" in str(doubt)
+
+
+def test_pictures_of_a_fall_have_the_grains_in_place_of_the_fill(footbridge):
+    """Grains that all move by one motion leave the area of the fill and move its centroid."""
+    (number,) = find_yielding_blocks(footbridge)
+    loose = loosen_fill(footbridge, LooseBlocks.as_built(footbridge), {})
+    moved = loose.start.poses + np.array([0.5, -1.0, 0.0])
+    frames = [loose.start.poses, moved]
+    run = xr.Dataset(
+        {
+            "fall_time": ("fall_frame", [1.0, 2.0]),
+            "fall_pose": (
+                ("fall_frame", "block", "pose"),
+                np.zeros((2, len(footbridge.blocks), 3))
+                + [[[0.0]], [[1.0]]] * np.array([0.5, -1.0, 0.0]),
+            ),
+        }
+    ).merge(loose.describe_grains(frames))
+    falls = FallingBlocks.of(footbridge, History(run, footbridge))
+    assert falls.broken.tolist() == [number]
+    count = len(run["grain_block"])
+    assert len(falls.outlines(1.5)) == len(falls.owners) == len(footbridge.blocks) - 1 + count
+    whole = shapely.Polygon(footbridge.blocks[number].drawn())
+    built, halfway = (
+        shapely.union_all([shapely.Polygon(each) for each in falls.grain_outlines(time)])
+        for time in (1.0, 1.5)
+    )
+    assert shapely.difference(built, whole).area < 1e-3 * whole.area
+    assert halfway.area == pytest.approx(whole.area, rel=5e-3)
+    travel = np.subtract(halfway.centroid.coords[0], built.centroid.coords[0])
+    assert travel == pytest.approx([0.25, -0.5], abs=1e-3)
+    # a fall of stones alone has none
+    stones = run.drop_vars([name for name in run if str(name).startswith("grain_")])
+    assert FallingBlocks.of(footbridge, History(stones, footbridge)).grain_outlines(1.5) == []
+
+
+def test_film_and_player_show_grains_from_the_fall_on(footbridge):
+    """The fill becomes a point in a grain then; before, grains are points below the stones."""
+    analysis = as_falling(
+        af.Analysis(
+            footbridge,
+            fidelity={"backfill": "full", "rest": "rigid"},
+            damping="effective",
+            dt=0.005,
+        )
+    )
+    analysis = replace(analysis, record=Record(fields_every=50, whole_fall=False))
+    run = analysis.run(af.Motion.synthetic(seed=1, duration=3.0, pga=45.0))
+    model, (number,) = analysis.model, find_yielding_blocks(footbridge)
+    scene, falls = Scene(footbridge, run, model), FallingBlocks.of(footbridge, run)
+    lengths = [len(each) for each in falls.grain_outlines(0.0)]
+    rings = np.split(np.arange(len(scene.points)), np.cumsum([b["count"] for b in scene._blocks()]))
+    assert [len(ring) for ring in rings[len(footbridge.blocks) : -1]] == lengths
+    last, fill = scene.points + scene.fallen[1][-1], rings[number]
+    assert np.ptp(last[fill], axis=0) == pytest.approx(0.0, abs=1e-9)
+    drawn = sum(shapely.Polygon(last[ring]).area for ring in rings[len(footbridge.blocks) : -1])
+    assert drawn == pytest.approx(footbridge.blocks[number].area, rel=0.1)
+    held = scene.points + scene.moved[1][-1]
+    assert np.ptp(held[rings[-2]], axis=0) == pytest.approx(0.0)
+    assert shapely.Polygon(held[fill]).area > 0.5 * footbridge.blocks[number].area
+    setup = Setup.of(model, run.dataset["q"].values, "displacement", 1.0).with_falls(falls)
+    (frame,) = frames_of_fall(setup, falls, falls.times[-1:])
+    own = model.cells.block == number
+    assert np.ptp(frame.places[own], axis=0) == pytest.approx(0.0)
+    assert len(frame.grains) == len(lengths)

@@ -118,7 +118,7 @@ def test_without_dask_the_extra_is_named(study_file, monkeypatch):
 def test_scheduler_and_workers_as_processes(study_file, tmp_path, capsys):
     with cluster(tmp_path) as (address, _):
         command = ["study", "--own-code", str(study_file), "--out", str(tmp_path / "out")]
-        assert af.commands.main([*command, "--scheduler", address]) == 0
+        assert af.commands.main([*command, "--scheduler", address]) == 3
     af.Study.read(study_file, own_code=True).run(tmp_path / "serial", workers=1)
     assert equal_tables(tmp_path / "out", tmp_path / "serial")
 

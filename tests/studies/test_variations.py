@@ -22,6 +22,8 @@ HELD = {name: values[0] for name, values in DEFAULT_RANGES.items()} | {
 }
 """Values that hold all properties as given."""
 
+STANDS = CollapseState("stands", None, (), 0.02, 0.01, True)
+
 
 @pytest.fixture(scope="module")
 def column():
@@ -36,15 +38,15 @@ def motion():
 @pytest.fixture
 def calls(monkeypatch):
     """Structure, motion, step and analysis of the runs, which are not computed."""
-    calls, stands = [], CollapseState("stands", None, (), 0.02, 0.01, True)
+    calls = []
 
     def elastic(analysis, motion, **options):
         calls.append((analysis.structure, motion, analysis.dt, analysis))
-        return SimpleNamespace(fall=stands, ending=af.dynamics.Ending.FINISHED)
+        return SimpleNamespace(fall=STANDS, ending=af.dynamics.Ending.FINISHED)
 
     def rigid(structure, motion, *, dt):
         calls.append((structure, motion, dt, None))
-        return stands
+        return STANDS
 
     monkeypatch.setattr(evaluators, "time_history", elastic)
     monkeypatch.setattr(variations, "_run_rigid_blocks", rigid)
@@ -57,6 +59,23 @@ def evaluate(column, motion, damping="effective", **changes):
     return evaluate_variation(Variation(analysis, motion, tuple(changes.items())))
 
 
+def test_steps_that_do_not_follow_sliding_are_a_doubt(column, motion, calls, monkeypatch):
+    """Of a run as given and with half the step, the first slides farther than its step follows."""
+
+    def slide(analysis, motion, **options):
+        step = 0.002 if analysis.dt == 0.005 else np.inf
+        return SimpleNamespace(
+            fall=replace(STANDS, admissible_step=step), ending=af.dynamics.Ending.FINISHED
+        )
+
+    options = {"vary": {**HELD, "dt": ("as given", "half")}, "samples": 1, "dt": 0.005}
+    assert not af.verdict_range(column, motion, **options).doubts
+    monkeypatch.setattr(evaluators, "time_history", slide)
+    (doubt,) = af.verdict_range(column, motion, **options).doubts
+    assert "of 3 runs the steps, 5 ms or half of it, are long for sliding" in doubt.cause
+    assert "analysis.dt=0.002" in doubt.remedy
+
+
 def test_contacts_motion_and_step_reach_the_run(column, motion, calls):
     found = evaluate(column, motion)
     (same, moved, dt, *_) = calls.pop()
@@ -65,6 +84,7 @@ def test_contacts_motion_and_step_reach_the_run(column, motion, calls):
         "displacement": 0.02,
         "residual": 0.01,
         "time": pytest.approx(np.nan, nan_ok=True),
+        "admissible_step": np.inf,
     }
     assert (same, dt) == (column, 0.005)
     assert np.array_equal(moved.horizontal, motion.horizontal)

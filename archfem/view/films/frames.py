@@ -37,6 +37,7 @@ class Frame:
     # places where hinges were before, displaced (n, 2) [m]
     past: Array = field(default_factory=lambda: np.zeros((0, 2)))
     outlines: Sequence[Array] = ()  # of blocks displaced by a mechanism, each (k, 2) [m]
+    grains: Sequence[Array] = ()  # outlines of grains of fill, each (k, 2) [m]
 
 
 class Layer(NamedTuple):
@@ -55,6 +56,7 @@ def frame_layers(setup: Setup, frame: Frame) -> list[Layer]:
     thrust = marks.thrust[np.isfinite(marks.thrust[:, 0])]
     return [
         Layer(np.concatenate([edges, polygon_sides(setup.supports)]), Colour.EDGE, 1.2),
+        Layer(polygon_sides(frame.grains), Colour.EDGE, 1.2),
         Layer(polygon_sides(frame.outlines), Colour.MECHANISM, 3.0),
         Layer(frame.past[:, None] + disc, Colour.HINGE, opacity=0.3),
         Layer(marks.links, "white", 6.0),
@@ -117,7 +119,10 @@ def frames_of_fall(setup: Setup, falls: FallingBlocks, times: Array) -> Iterator
         shades = np.linalg.norm(places - cells.places, axis=1) / mm
         if setup.scale.colour == "stress":  # loose blocks are rigid: stress is not computed
             shades = np.zeros(len(cells.polygons))
-        yield Frame(places, shades, float(time), ["blocks are loose"])
+        grains = falls.grain_outlines(float(time))
+        if grains:  # in their place the body, a point within one of them, is not seen
+            places[np.isin(cells.block, falls.broken)] = grains[0].mean(axis=0)
+        yield Frame(places, shades, float(time), ["blocks are loose"], grains=grains)
 
 
 def _places_and_values(setup: Setup, q: Array) -> tuple[Array, Array]:

@@ -151,7 +151,8 @@ class Setup:
         size, cells = self.model.structure.size, self.model.cells
         moved = (falls.places(cells.places, cells.block, float(time)) for time in falls.times)
         places = np.array(list(moved))
-        points = np.concatenate([*places, [self.low, self.high]])
+        grains = (each for time in falls.times for each in falls.grain_outlines(float(time)))
+        points = np.concatenate([*places, *grains, [self.low, self.high]])
         low = np.maximum(points.min(axis=0), self.low - size)
         high = np.minimum(points.max(axis=0), self.high + size)
         low[1] = min(low[1], falls.level - 0.02 * size)

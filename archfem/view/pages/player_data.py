@@ -179,7 +179,9 @@ class Scene:
         chosen = _thin_out(len(times), int(1.0 / (40.0 * between)) if between > 0.0 else 1)
         joint_ends = self.model.observer().joint_ends
         ends = np.array([joint_ends(q) for q in fields[chosen]])
-        return times[chosen], self.outlines.displacements(self.model, fields[chosen]), ends
+        moved = self.outlines.displacements(self.model, fields[chosen])
+        more = len(self.points) - moved.shape[1]  # of grains, which are a point before the fall
+        return times[chosen], np.pad(moved, ((0, 0), (0, more), (0, 0))), ends
 
     @cached_property
     def fallen(self) -> tuple[Array, Array] | None:
@@ -187,8 +189,24 @@ class Scene:
         if self.falls is None:
             return None
         points, block = self.outlines.points, self.outlines.block
-        places = [self.falls.places(points, block, float(time)) for time in self.falls.times]
-        return self.falls.times, np.array(places) - points
+        places = []
+        for time in self.falls.times.tolist():
+            blocks, grains = self.falls.places(points, block, time), self.grains(time)
+            if grains:  # the body in their place becomes a point within one of them
+                blocks[np.isin(block, self.falls.broken)] = grains[0].mean(axis=0)
+            places.append(np.concatenate([blocks, *grains]))
+        return self.falls.times, np.array(places) - self.points
+
+    def grains(self, time: float) -> list[Array]:
+        """Return the outlines of the grains of fill at a time of the fall, each (k, 2) [m]."""
+        return [] if self.falls is None else self.falls.grain_outlines(time)
+
+    @cached_property
+    def points(self) -> Array:
+        """Corners at rest (p, 2) [m]: of blocks, and those of grains in one point below these."""
+        structure, count = self.structure, sum(len(each) for each in self.grains(0.0))
+        hidden = np.tile(structure.centroids[structure.free[0]], (count, 1))
+        return np.concatenate([self.outlines.points, hidden])
 
     @cached_property
     def magnification(self) -> float:
@@ -259,7 +277,7 @@ class Scene:
     @cached_property
     def box(self) -> tuple[Array, Array]:
         """Lower left and upper right corner of the visible region (2,) [m]."""
-        points, size = self.outlines.points, self.structure.size
+        points, size = self.points, self.structure.size
         margin, visible = 0.04 * size, [points]
         if self.moved is not None:
             # the reader may magnify displacements somewhat more
@@ -274,6 +292,19 @@ class Scene:
             low[1] = min(low[1], self.falls.level - margin)
         return low, high
 
+    def _blocks(self) -> list[dict[str, Any]]:
+        """Return name, kind and number of corners of the blocks, and of the grains of fill."""
+        names = [block.name for block in self.structure.blocks]
+        kinds, rings = block_kinds(self.structure), self.outlines.rings
+        if self.falls is not None and (grains := self.grains(0.0)):
+            owners = self.falls.owners[-len(grains) :]
+            names += [f"grain of {names[number]}" for number in owners]
+            kinds, rings = kinds + ["soil"] * len(grains), rings + grains
+        return [
+            {"name": name, "kind": kind, "count": len(ring)}
+            for name, kind, ring in zip(names, kinds, rings, strict=True)
+        ]
+
     @cached_property
     def data(self) -> dict[str, Any]:
         """All data of the page."""
@@ -283,13 +314,8 @@ class Scene:
         return {
             "title": self.title or str(run.dataset.attrs.get("title", structure.name)),
             "box": _round(self.box),
-            "points": _round(self.outlines.points),
-            "blocks": [
-                {"name": block.name, "kind": kind, "count": len(ring)}
-                for block, kind, ring in zip(
-                    structure.blocks, block_kinds(structure), self.outlines.rings, strict=True
-                )
-            ],
+            "points": _round(self.points),
+            "blocks": self._blocks(),
             "joints": _joints(structure, run.joints),
             "links": joint_pairs(structure, run.joints["judged"].values).tolist(),
             "hinge": run.criteria.hinge,
