@@ -35,6 +35,7 @@ from archfem.limit.rating import Rating
 from archfem.masonry.structure import (
     Structure,
     describe_spans,
+    join_joint_names,
     join_names,
     list_or_count,
 )
