@@ -137,6 +137,7 @@ def print_page(page: Path, target: Path) -> Path:
         command += ["--disable-dev-shm-usage", f"--user-data-dir={profile}"]
         # time for the players to unpack and draw their data
         command += ["--virtual-time-budget=30000", "--no-pdf-header-footer"]
+        command += ["--generate-pdf-document-outline"]
         command += [f"--print-to-pdf={draft}", page.resolve().as_uri()]
         done = run(command, capture_output=True, timeout=300, check=False)
         if done.returncode or not draft.is_file():

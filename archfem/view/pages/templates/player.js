@@ -94,12 +94,12 @@
       element("text", { x: this.left, y: 13 }, this.svg).textContent = title;
       for (const tick of ticks) {
         element("path", { class: "zero", d: `M${this.left} ${this.y(tick)}H${this.right}` }, this.svg);
-        element("text", { x: this.left - 6, y: this.y(tick) + 4, "text-anchor": "end" }, this.svg).textContent = words(tick);
+        element("text", { x: this.left - 6, y: this.y(tick), "text-anchor": "end", "dominant-baseline": "central" }, this.svg).textContent = words(tick);
       }
       const apart = step(this.end, this.right - this.left > 600 ? 10 : 5);
       for (let time = 0; time <= this.end * 1.0001; time += apart) {
         const last = time + apart > this.end * 1.0001;
-        element("text", { x: this.x(time), y: this.bottom + 16, "text-anchor": last && this.x(time) > this.right - 20 ? "end" : "middle" }, this.svg).textContent = words(time) + (last ? " s" : "");
+        element("text", { x: this.x(time), y: this.bottom + 6, "dominant-baseline": "hanging", "text-anchor": last && this.x(time) > this.right - 20 ? "end" : "middle" }, this.svg).textContent = words(time) + (last ? " s" : "");
       }
       let end = this.right + 4; // of the room for a name: later ones push earlier ones aside
       for (const [time, name] of [...instants].reverse()) {
