@@ -225,9 +225,7 @@ def test_counts_beyond_the_room_are_refused_before_they_take_any():
 
 
 def test_a_density_is_no_key_where_weights_are():
-    with pytest.raises(
-        af.InvalidInput, match="materials.stone.density': give unit_weight"
-    ):
+    with pytest.raises(af.InvalidInput, match=r"materials\.stone\.density': give unit_weight"):
         refuse_unknown({"density": 2300}, ["unit_weight", "young"], "materials.stone")
     with pytest.raises(af.InvalidInput, match="the keys are"):
         refuse_unknown({"density": 2300}, ["young"], "materials.stone")

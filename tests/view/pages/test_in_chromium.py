@@ -116,6 +116,36 @@ def test_a_report_prints_without_cutting_a_figure(small, tmp_path):
         assert complaints(driver) == []
 
 
+LABELS = """
+return [...document.querySelectorAll(".player-ground, .player-joint svg")].map(svg => {
+  const axis = svg.querySelector(".axis").getBBox();
+  const below = [...svg.querySelectorAll("text")].map(each => each.getBBox())
+    .filter(box => box.y + box.height / 2 > axis.y + axis.height + 3);  // not the zero beside it
+  return [axis.y + axis.height, Math.min(...below.map(box => box.y)), below.length];
+});
+"""
+
+
+def test_motions_are_whole_on_paper_and_labels_lie_beside_the_plots(small, tmp_path):
+    """Also where type is larger, in the small panels of several motions."""
+    folder, report = tmp_path / "out", tmp_path / "report.html"
+    case = af.Case.read(small)
+    with replace_run(case, folder) as draft:
+        list(carry_out(case, draft))
+    af.cases.open_results(folder).report(report)
+    with browser(wide=665) as driver:  # the width of the text on A4
+        driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print"})
+        opened(driver, report)
+        panels = driver.execute_script(LABELS)
+        parts = driver.execute_script(
+            "return [...document.querySelectorAll('.part')].map(p => "
+            "[getComputedStyle(p).breakInside, p.querySelectorAll('.player').length])"
+        )
+    assert len(panels) == 6
+    assert all(count > 2 and top >= bottom for bottom, top, count in panels)
+    assert parts == [["avoid", 1], ["avoid", 1]]
+
+
 TYPE_ON_PAPER = """
 const sizes = [];
 for (const each of document.querySelectorAll("body *")) {
@@ -231,8 +261,14 @@ def test_a_report_is_printed_as_pdf(small, tmp_path):
         pytest.skip("there is no chromium")
     *_, run = af.cases.run_case(af.Case.read(small), pairs=["first"])
     page = run.report(tmp_path / "report.html")
-    pages = pypdf.PdfReader(print_page(page, tmp_path / "report.pdf")).pages
+    printed_file = pypdf.PdfReader(print_page(page, tmp_path / "report.pdf"))
+    pages = printed_file.pages
     assert len(pages) > 2
+    # the contents are bookmarks, and take no room of the first page
+    (title,) = [mark.title for mark in printed_file.outline if not isinstance(mark, list)]
+    assert title == "a column under two pairs"
+    assert "1. Conclusion" not in pages[0].extract_text()
+    assert "signature" in pages[0].extract_text()
     assert "a column under two pairs" in pages[0].extract_text()
     text = "".join(each.extract_text() for each in pages)
     # players have drawn their data before the page is printed
