@@ -4,19 +4,26 @@ Numbers are SI (angles in degrees), or quantities with a unit such as "1.48 MPa/
 a wrong unit or an impossible geometry is an error that names the key and the remedy.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from copy import deepcopy
 from dataclasses import dataclass, field, replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 from archfem._files import atomic_write
-from archfem._validation import check_words, validate_arguments
+from archfem._validation import check_words, declared_keys, validate_arguments
 from archfem.cases import analysis_keys, motion_keys, provenance
 from archfem.cases.analysis_keys import AssessmentSettings, LimitAnalysis, PushoverSettings
-from archfem.cases.analysis_tables import complete_path, read_analysis, write_analysis_tables
-from archfem.cases.risk_keys import RiskSettings, parse_risk
+from archfem.cases.analysis_tables import (
+    DEAD_LOAD_KEYS,
+    SECTION_FIELDS,
+    complete_path,
+    read_analysis,
+    write_analysis_tables,
+)
+from archfem.cases.risk_keys import RISK_KEYS, RiskSettings, parse_risk
 from archfem.cases.structure_keys import cached_structure, write_structure
 from archfem.cases.toml_file import (
     Table,
@@ -29,7 +36,9 @@ from archfem.cases.toml_file import (
     set_value,
 )
 from archfem.dynamics.analysis import Analysis
+from archfem.dynamics.recorder import Record
 from archfem.errors import ArchfemError, InvalidInput
+from archfem.joints.criteria import Criteria
 from archfem.masonry.structure import Structure
 from archfem.motion.design_spectra import DesignSpectrum
 from archfem.motion.motion import Motion
@@ -130,6 +139,7 @@ class Case:
         """
         if "structure" not in settings and {"case", "cases"} & set(settings):
             raise InvalidInput("this is a study of cases: compute it by `archfem study`")
+        _refuse_misplaced(settings)
         refuse_unknown(settings, ("title", "extensions", *SECTIONS))
         provenance.load_extensions_of(settings, folder)
         check_words(settings.get("title", ""), "title", 'write words in quotes: title = "…"')
@@ -323,6 +333,39 @@ def read_settings(path: Path, changes: Sequence[str] = ()) -> dict[str, Any]:
         path_of_value, value = parse_change(text)
         set_value(settings, complete_path(path_of_value), value)
     return settings
+
+
+@cache
+def _section_keys() -> Mapping[str, frozenset[str]]:
+    """Return the keys of each section whose keys do not depend on others in it."""
+    keys: dict[str, Iterable[str]] = {
+        **SECTION_FIELDS,
+        "motion": motion_keys.motion_keys(),
+        "suite": motion_keys.suite_keys(),
+        "criteria": declared_keys(Criteria),
+        "record": declared_keys(Record),
+        "limit": analysis_keys.limit_keys(),
+        "pushover": analysis_keys.pushover_keys(),
+        "rating": analysis_keys.rating_keys(),
+        "assessment": analysis_keys.assessment_keys(),
+        "risk": RISK_KEYS,
+        "dead_load": DEAD_LOAD_KEYS,
+        "output": OUTPUT_KEYS,
+        "report": REPORT_KEYS,
+    }
+    return {section: frozenset(own) for section, own in keys.items()}
+
+
+def _refuse_misplaced(settings: Table) -> None:
+    """Refuse keys that only other sections have; the message names these."""
+    known = _section_keys()
+    tables = {"": settings, **{name: settings.get(name, {}) for name in known}}
+    for section, table in tables.items():
+        own = known[section] if section else {"title", "extensions", "base", "remove", *SECTIONS}
+        for key in set(table).difference(own) if isinstance(table, Mapping) else ():
+            if homes := [f"{name}.{key}" for name, keys in known.items() if key in keys]:
+                place = f"{section}.{key}" if section else key
+                raise InvalidInput(f"unknown key '{place}': it is {' or '.join(homes)}")
 
 
 def _read_report(settings: Table) -> dict[str, str]:

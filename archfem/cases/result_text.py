@@ -221,6 +221,8 @@ def describe_dead_load(result: DeadLoadResult, *, explain: bool = False) -> str:
     # without equilibrium there is no result; doubts may be about it, and are printed below
     doubted = ", in doubt as below" if result.doubts else ""
     lines.append(f"dead load: stands under its own weight{doubted}: {_describe_largest(joints)}")
+    if (idle := joints["name"][joints["N"] <= 1e-6 * joints["N"].max()]).size:
+        lines[-1] += f", as nothing is carried by {join_joint_names(idle.values.tolist())}"
     if structure.heads.any():
         heads = result.dead.joints.isel(joint=structure.heads)
         lines[-1] += f"; of head joints, which do not count, {_describe_largest(heads)}"
@@ -232,15 +234,10 @@ def describe_dead_load(result: DeadLoadResult, *, explain: bool = False) -> str:
 
 def _describe_largest(joints: xr.Dataset) -> str:
     """Return the largest |e| and V / N of joints, and their smallest compression."""
-    least = float(joints["N"].min())
-    text = (
+    return (
         f"|e| ≤ {float(abs(joints['eccentricity']).max()):.3f}, "
-        f"V/N ≤ {float(joints['friction'].max()):.3f}, N ≥ {least / kN:.2f} kN"
+        f"V/N ≤ {float(joints['friction'].max()):.3f}, N ≥ {float(joints['N'].min()) / kN:.2f} kN"
     )
-    if abs(least) > 1e-6 * float(joints["N"].max()):
-        return text
-    idle = joints["name"][joints["N"] <= 1e-6 * joints["N"].max()].values.tolist()
-    return f"{text}: nothing is carried by {join_joint_names(idle)}"
 
 
 def describe_supports(structure: Structure, max_names: int = 4) -> str:
@@ -259,12 +256,18 @@ def describe_supports(structure: Structure, max_names: int = 4) -> str:
 
 
 def describe_depths(structure: Structure) -> str:
-    """Describe the depths of the assessed joints, and clear spans and piers, in two lines."""
+    """Describe depths of the assessed joints by part, and clear spans and piers, in two lines."""
     depths = np.where(structure.judged, structure.depths, np.inf)
-    median = float(np.median(depths[structure.judged]))
+    parts = np.array([joint.part for joint in structure.joints])
+    names = dict.fromkeys(parts[structure.judged].tolist())
+    medians = [
+        format_mm(float(np.median(depths[(parts == part) & structure.judged])))
+        + (f" of '{part}'" if len(names) > 1 else "")
+        for part in names
+    ]
     return (
         f"depth of joints: {format_mm(float(depths.min()))} at least, at "
-        f"{structure.joints[int(depths.argmin())].name}; median {format_mm(median)}\n"
+        f"{structure.joints[int(depths.argmin())].name}; median {join_names(medians)}\n"
         f"{describe_spans(structure)}"
     )
 

@@ -89,34 +89,35 @@ class VerdictRange(ResultDisplay):
         return tuple(str(name) for name in np.atleast_1d(self.dataset.attrs["properties"]))
 
     def importance(self) -> dict[str, float]:
-        """Return the share of the variance of the damage that each property explains [-].
+        """Return the share of the variance of the outcomes that each property explains [-].
 
-        Damage is the rank of a run by its outcome and residual displacement. The share is the
-        correlation ratio of the ranks, numbers in three parts of their range (a first-order index
-        of sensitivity; Saltelli and others, Global Sensitivity Analysis, 2008, section 1.2.6).
+        An outcome is 1 for a fall and 0 without; where all or none fall, it is the rank of a run by
+        its residual displacement. The share is the correlation ratio, numbers in three parts of
+        their range (a first-order index of sensitivity; Saltelli and others, Global Sensitivity
+        Analysis, 2008, section 1.2.6).
 
         Returns:
             By property, in descending order; chance alone explains about 2 / runs.
         """
-        ranks = self._damage_ranks()
+        falls = self.falls[self.answered]
+        outcomes = falls.astype(float) if self.is_mixed else self._residual_ranks()
         shares = {
-            name: _correlation_ratio(self.dataset[name].values[self.answered], ranks)
+            name: _correlation_ratio(self.dataset[name].values[self.answered], outcomes)
             for name in self.properties
         }
         return dict(sorted(shares.items(), key=lambda item: -item[1]))
 
-    def _damage_ranks(self) -> Array:
-        """Return the rank of each answered run by outcome and residual displacement (runs,)."""
-        rows = self.answers
-        kind = np.array([COLLAPSE_STATES.index(str(name)) for name in rows["outcome"].values])
-        # among fallen structures distances to the ground say nothing
-        fallen = np.isin(rows["outcome"].values, FALLEN_STATES)
-        residual = np.where(fallen, 0.0, rows["residual"].values)
-        damage = np.where(fallen, 10.0 + kind, residual / max(residual.max(), 1e-12))
+    @property
+    def is_mixed(self) -> bool:
+        """Whether some runs fall, and others do not."""
+        return len(np.unique(self.falls[self.answered])) > 1
+
+    def _residual_ranks(self) -> Array:
+        """Return the rank of each answered run by its residual displacement (runs,)."""
         from scipy.stats import rankdata  # slow to import, and of no use to a single run
 
-        # runs of equal damage share the mean of their ranks
-        return rankdata(damage)
+        # among fallen structures distances to the ground say nothing; equal runs share a mean rank
+        return rankdata(np.where(self.falls, 0.0, self.dataset["residual"].values)[self.answered])
 
     @property
     def doubts(self) -> tuple[Doubt, ...]:
@@ -157,16 +158,17 @@ class VerdictRange(ResultDisplay):
     @property
     def sentence(self) -> str:
         """How often the structure falls, and where."""
-        falls = self.falls[self.answered]
         if not (self.answered & self.dataset["sampled"].values).any():
             errors = [error for error in self.dataset["error"].values if error]
             return f"{len(errors)} of {len(self.answered)} runs have no answer: {errors[0]}"
-        text = self.count
-        if 0 < falls.sum() < len(falls):
-            text += f": {self._where}"
-        text += self._count_groups()
+        text = self.headline + self._count_groups()
         text += f", under '{motion}' alone" if (motion := self.dataset.attrs.get("motion")) else ""
         return text + self.unanswered
+
+    @property
+    def headline(self) -> str:
+        """How often the structure falls, and where, without the falls among sampled runs."""
+        return f"{self.count}: {self._where}" if self.is_mixed else self.count
 
     def _count_groups(self) -> str:
         """Return the falls of runs that vary one property, and of the sample with its interval."""
@@ -174,7 +176,8 @@ class VerdictRange(ResultDisplay):
         words, (low, high) = [], self.interval()
         for name, group in ("one property", ~sampled), ("all", sampled):
             if own := int((self.answered & group).sum()):
-                words.append(f"of {own} that vary {name} {int(falls[self.answered & group].sum())}")
+                fallen = int(falls[self.answered & group].sum())
+                words.append(f"{fallen} of the {own} that vary {name}")
         return f"; {', '.join(words)} ({low:.0%} to {high:.0%} at 95%)"
 
     @cached_property
@@ -232,7 +235,7 @@ class VerdictRange(ResultDisplay):
         return cls(read_dataset(path, "file of a verdict's range"))
 
     def table(self) -> str:
-        """Return falls by value, and what each property explains of the damage if any falls."""
+        """Return falls by value, and what each property explains of them if some fall."""
         falls, rows = self.falls[self.answered], []
         data = self.answers
         for name, share in self.importance().items():
@@ -241,9 +244,9 @@ class VerdictRange(ResultDisplay):
                 f"{label}: {int(falls[chosen].sum())} of {int(chosen.sum())}"
                 for label, chosen in groups
             ]
-            explained = [f"{share:.0%}"] if falls.any() else []
+            explained = [f"{share:.0%}"] if self.is_mixed else []
             rows.append([property_text(name), *explained, ", ".join(cells)])
-        head = ["share of the damage's variance"] if falls.any() else []
+        head = ["explains, of the variance of fall or none"] if self.is_mixed else []
         return align_columns(["property", *head, "falls"], rows)
 
     def __str__(self) -> str:
@@ -345,11 +348,11 @@ def _group_values(values: Array, groups: int = 3) -> list[tuple[str, NDArray[np.
     ]
 
 
-def _correlation_ratio(values: Array, ranks: Array) -> float:
-    """Return the variance of the group means of ranks over their variance [-]."""
-    total = float(np.sum((ranks - ranks.mean()) ** 2))
+def _correlation_ratio(values: Array, outcomes: Array) -> float:
+    """Return the variance of the group means of outcomes over their variance [-]."""
+    total = float(np.sum((outcomes - outcomes.mean()) ** 2))
     between = sum(
-        float(chosen.sum() * (ranks[chosen].mean() - ranks.mean()) ** 2)
+        float(chosen.sum() * (outcomes[chosen].mean() - outcomes.mean()) ** 2)
         for _, chosen in _group_values(values)
     )
     return between / total if total > 0.0 else 0.0

@@ -512,7 +512,7 @@ def draw_verdict_range(verdicts: VerdictRange) -> Figure:
         verdicts: runs, as by `archfem.verdict_range`.
 
     Returns:
-        The figure, with panels of the properties that explain most of the damage, the first most.
+        The figure, with panels of the properties that explain most, the first most.
     """
     rows, max_panels = verdicts.answers, 6
     falls, parted = (x[verdicts.answered] for x in (verdicts.falls, verdicts.dislocated))
@@ -530,7 +530,6 @@ def draw_verdict_range(verdicts: VerdictRange) -> Figure:
         "sign": "sign of the motion",
         "scale": "scale of the motion [-]",
     }
-    others = list(shares.values())[max_panels:]
     shares = dict(islice(shares.items(), max_panels))
     columns = min(3, len(shares), int(Size.PAGE / 1.6))
     lines = -(-len(shares) // columns)
@@ -542,16 +541,16 @@ def draw_verdict_range(verdicts: VerdictRange) -> Figure:
         first = axes in panels[::columns]
         label = labels.get(name, name.replace("_", " "))
         style_axes(axes, label, "residual\ndisplacement [mm]" if first else "")
-        if falls.any():
-            set_title(axes, f"{share:.0%} of the damage")
+        if verdicts.is_mixed:
+            set_title(axes, f"explains {share:.0%}")
         _draw_property(axes, rows[name].values, heights, falls, parted)
         axes.axhline(top, color=Colour.GREY, lw=0.9, ls="--")
         axes.set_yscale("log")
         axes.set_ylim(0.7e-3 * top, 4.0 * top)
     add_legend_below(figure, 3, handles=panels[0].get_legend_handles_labels()[0])
-    text = verdicts.sentence
-    if others and falls.any():
-        text += f"\neach other property explains {max(others):.0%} of it at most"
+    text = verdicts.headline
+    if verdicts.is_mixed:
+        text += "; shares are of the variance of fall or none"
     set_figure_title(figure, text)
     return figure
 

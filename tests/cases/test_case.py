@@ -81,6 +81,15 @@ def test_changes_from_the_command_line():
         ("analysis.until=maybe", "analysis.until = 'maybe' is not known: use one of"),
         ("analysis.stop_at_mechanism=true", "unknown key 'analysis.stop_at_mechanism'"),
         ("model.points=3", "unknown key 'model.points'"),
+        (
+            "analysis.displacements='large'",
+            r"unknown key 'analysis\.displacements': it is model\.displacements$",
+        ),
+        ("model.damping=1", r"unknown key 'model\.damping': it is analysis\.damping$"),
+        (
+            "horizontal=1.0",
+            r"unknown key 'horizontal': it is limit\.horizontal or pushover\.horizontal",
+        ),
         ("output.every=2", "unknown key 'output.every'"),
         ("criteria.hinge=0.7", r"criteria hinge \[-\] = 0.7 is not between 0 and 0.5"),
         ("criteria.limit=0.4", "unknown key 'criteria.limit'"),

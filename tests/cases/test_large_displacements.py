@@ -133,7 +133,7 @@ def test_a_range_in_the_folder_stands_in_place_of_what_a_run_cannot_know(held):
     # the share alone would be surer than four runs are: beta.ppf(0.975, 2, 3)
     assert " In variations of its properties it falls in 1 of 4: no property" in lead
     moved = "argest displacements 1 mm to 3 mm, in 95 % of 3 runs 3 mm or less"
-    assert f"; of 4 that vary all 1 (1% to 81% at 95%). L{moved}. " in lead
+    assert f"; 1 of the 4 that vary all (1% to 81% at 95%). L{moved}. " in lead
     changes = lead.partition("raise no doubt. ")[2]
     assert changes == "Motion, lengths, size of the motions and fidelity were not varied."
     words = [piece.text for piece in _build_mechanism(data, held) if hasattr(piece, "text")]

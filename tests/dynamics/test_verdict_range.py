@@ -45,25 +45,43 @@ def test_runs_beside_the_sample_count_for_the_sentence_alone():
     found = made_up([True, False, False, True], [False, False, True, True], sign=list("aabb"))
     assert found.share == 0.5
     assert found.sentence.startswith("falls in 2 of 4: ")
-    shares = "; of 2 that vary one property 1, of 2 that vary all 1 (1% to 99% at 95%)"
+    shares = "; 1 of the 2 that vary one property, 1 of the 2 that vary all (1% to 99% at 95%)"
     assert shares in found.sentence
 
 
-def test_no_share_of_the_damage_is_given_where_nothing_falls():
+def test_no_share_is_given_where_no_run_falls_or_every_one_does():
     columns = {"residual": [0.0, 1.0, 2.0, 3.0], "sign": list("aabb")}
-    none, one = (made_up([falls, False, False, False], **columns) for falls in (False, True))
+    none, all_fall = (made_up([falls] * 4, **columns) for falls in (False, True))
+    one = made_up([True, False, False, False], **columns)
     assert none.table().split() == [
         "property",
         "falls",
         "sign",
         *("a:", "0", "of", "2,", "b:", "0", "of", "2"),
     ]
-    assert "share of the damage's variance" in one.table()
-    assert "%" in one.table()
-    for found, shown in ((none, False), (one, True)):
-        (axes, *_) = found.plot().axes
-        titles = [axes.get_title(loc=place) for place in ("left", "center", "right")]
-        assert any("of the damage" in title for title in titles) == shown
+    assert "%" not in all_fall.table()
+    assert one.table().startswith("property  explains, of the variance of fall or none")
+    assert "33%" in one.table()  # between groups 1/4, of all 3/4
+    for found, shown in ((none, False), (all_fall, False), (one, True)):
+        figure = found.plot()
+        titles = [figure.axes[0].get_title(loc=place) for place in ("left", "center", "right")]
+        assert any("explains 33%" in title for title in titles) == shown
+        assert ("shares are of the variance of fall or none" in figure.get_suptitle()) == shown
+
+
+def test_shares_agree_with_the_sentence():
+    """All falls have one damping; friction explains how far the others move, and no fall."""
+    rows = np.arange(240)
+    damping, friction = np.where(rows % 2, "stiffness", "none"), np.linspace(-0.1, 0.1, 240)
+    falls = (rows % 2 == 1) & (rows % 8 == 1)
+    residual = np.where(falls, 9.0, 1.0 + friction)
+    found = made_up(falls, residual=residual, damping_kind=damping, friction=friction)
+    assert "all falls with damping kind 'stiffness', where 30 of 120 fall" in found.sentence
+    shares = found.importance()
+    assert shares["damping_kind"] == pytest.approx(1.0 / 7.0)  # (1/8)² over 1/8 · 7/8
+    assert shares["friction"] < 0.01
+    stand = made_up(np.zeros(240, bool), residual=residual, damping_kind=damping, friction=friction)
+    assert stand.importance()["friction"] > 0.5
 
 
 def test_doubts_follow_the_sentence_and_are_kept(tmp_path):
@@ -113,7 +131,7 @@ def test_displacements_of_the_runs_that_hold_are_a_range():
 def test_the_sentence_names_the_only_motion():
     """An interval of one motion holds for that motion; without a name motions are varied."""
     found = made_up([False] * 4, sign=list("aabb"))
-    assert found.sentence == "falls in 0 of 4; of 4 that vary all 0 (0% to 60% at 95%)"
+    assert found.sentence == "falls in 0 of 4; 0 of the 4 that vary all (0% to 60% at 95%)"
     found.dataset.attrs["motion"] = "synthetic 1"
     assert found.sentence.endswith("(0% to 60% at 95%), under 'synthetic 1' alone")
 
@@ -177,8 +195,8 @@ def test_a_deciding_property_explains_all_and_a_constant_one_nothing():
     assert found.importance()["sign"] == pytest.approx(1.0)
     assert found.importance()["dt"] == 0.0
     # distances to the ground say nothing about fallen structures
-    far = made_up(label == "a", residual=np.where(label == "a", range(20), 0.0), sign=label)
-    assert far.importance()["sign"] == pytest.approx(1.0)
+    far = made_up(np.ones(20, bool), residual=np.arange(20.0), scale=np.arange(20.0))
+    assert far.importance() == {"scale": 0.0}
     same = made_up(np.ones(4, bool), sign=list("aabb"))
     assert same.importance() == {"sign": 0.0}
 
@@ -286,4 +304,7 @@ def test_each_property_has_a_panel():
     found = made_up([True, False, False], sign=list("aab"), k_n=[0.5, 1.0, 2.0])
     figure = found.plot()
     assert len([axes for axes in figure.axes if axes.get_visible()]) == 2
-    assert " ".join(figure.get_suptitle().split()) == found.sentence
+    title = " ".join(figure.get_suptitle().split())
+    # without what the sentence says of sampled runs
+    assert title.startswith(f"{found.headline}; shares are of ")
+    assert found.sentence.startswith(f"{found.headline}; 1 of the 3 that vary all (")

@@ -13,6 +13,7 @@ import pytest
 from drawn import assert_same, dxf, geojson, layers_of, square
 
 import archfem as af
+from archfem.cases.result_text import describe_depths
 from archfem.masonry.survey import drawings
 from archfem.masonry.survey.drawings import read_drawing
 
@@ -477,3 +478,14 @@ fidelity = "rigid"
     assert re.search(
         r"depth of joints: 1000 mm at least, at WALL, \w+ ?\d?; median 1000 mm", said
     ), said
+
+
+def test_median_depths_are_by_part():
+    """A pier is twice as deep as the ring: one median would be of neither."""
+    portal = af.arch_on_piers(
+        radius=1.5, thickness=0.35, voussoirs=9, pier_breadth=0.7, courses=[0.5]
+    )
+    (depths, *_) = describe_depths(portal).splitlines()
+    assert depths.endswith("median 700 mm of 'left pier', 350 mm of 'arch', 700 mm of 'right pier'")
+    ring = af.circular_arch(radius=1.0, thickness=0.2, embrace=150.0, voussoirs=7)
+    assert describe_depths(ring).splitlines()[0].endswith("; median 200 mm")

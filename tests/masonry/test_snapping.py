@@ -93,6 +93,13 @@ LOWER = {"rock": square(0, -1)}
             },
             r"are 4 mm apart .* touch; or is the unit wrong\? By unit = 'm' .* 0.03 × 0.06 m$",
         ),
+        (  # as of inches for feet: the unit comes first where stones are metres large
+            {
+                "rock": [[0, -5], [4, -5], [4, 0], [0, 0]],
+                "a": [[0, -0.01], [4, 0], [4, 5], [0, 5]],
+            },
+            r": is the unit wrong\? By unit = 'm' the drawing is 4 × 10 m; or else 'rock' ",
+        ),
         (
             LOWER | {"a": square(0, 0), "b": square(0, 0)},
             r"'a' and 'b' at \(0.5, 0.5\) m are the same: leave one out$",

@@ -264,7 +264,7 @@ def test_a_fixed_course_on_one_that_moves_is_a_doubt(tmp_path, capsys):
         assert af.commands.main([command[0], str(path), *command[1:]]) == 3
         said = capsys.readouterr().out
         assert said.count("m cannot move, but lies on '") == 2
-        assert ("N ≥ 0.00 kN: nothing is carried by " in said) == (command[0] != "limit")
+        assert ("N ≥ 0.00 kN, as nothing is carried by " in said) == (command[0] != "limit")
 
 
 def test_a_fixed_wall_on_pieces_of_fill_is_none():

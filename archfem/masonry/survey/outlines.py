@@ -43,6 +43,8 @@ from archfem.units import G, in_unit
 # Gaps and contacts up to this multiple of the tolerance are taken for errors of the survey [-]
 AMBIGUOUS_GAP_RATIO = 5.0
 
+LARGE_STONE = 3.0  # median diagonal above which the unit is probably wrong [m]
+
 # Numbers of places: both ends of an edge, and those around each outline
 Edge = tuple[int, int]
 Boundaries = list[list[int]]
@@ -341,7 +343,11 @@ def _close_or_advise(outlines: list[Outline], snap: float) -> Closed:
             break
     if asks_unit:
         size = _say_size(_measure(outlines))
-        advice += f"; or is the unit wrong? By unit = '{frame.unit}' the drawing is {size}"
+        question = f"is the unit wrong? By unit = '{frame.unit}' the drawing is {size}"
+        breadths = [np.hypot(*np.ptp(outline.points, axis=0)) for outline in outlines]
+        # no stone is that large: what is said first is what a reader tries first
+        is_huge = np.median(breadths) > LARGE_STONE
+        advice = f"{question}; or else {advice}" if is_huge else f"{advice}; or {question}"
     raise InvalidStructure(advice)
 
 
