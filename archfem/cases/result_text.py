@@ -220,6 +220,9 @@ def describe_dead_load(result: DeadLoadResult, *, explain: bool = False) -> str:
     # without equilibrium there is no result; doubts may be about it, and are printed below
     doubted = ", in doubt as below" if result.doubts else ""
     lines.append(f"dead load: stands under its own weight{doubted}: {_describe_largest(joints)}")
+    used = result.dead.joints["friction"].values >= (1.0 - 1e-3) * structure.friction
+    if spent := np.count_nonzero(used & structure.judged):
+        lines[-1] += f"; friction is used up at {spent} joints, and their neighbours hold"
     if structure.heads.any():
         heads = result.dead.joints.isel(joint=structure.heads)
         lines[-1] += f"; of head joints, which do not count, {_describe_largest(heads)}"
