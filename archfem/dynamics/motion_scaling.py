@@ -12,6 +12,7 @@ from functools import partial
 from itertools import pairwise
 from math import inf, sqrt
 from re import sub
+from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -329,10 +330,12 @@ def search_scales(
     try:
         with ProgressReport("scale", None) as progress:
             while (scale := _next_scale(scales, precision, between, begin)) is not None:
+                began = perf_counter()
                 run = run_scaled(scale)
+                seconds = perf_counter() - began
                 scales = scales.with_run(run)
                 result = run.fall.kind if run.fall else run.outcome
-                progress.show(f"{scale:#.3g} × the motion: {result}", 1)
+                progress.show(f"{scale:#.3g} × the motion: {result}, in {seconds:.2g} s", 1)
     except KeyboardInterrupt:
         scales = replace(scales, interrupted=True)
     return scales

@@ -276,8 +276,8 @@ def kinematic_assessment(  # noqa: PLR0913  (the factors of the codes are argume
             of the limit state by η = √(10/(5 + ξ)) >= 0.55; or a ground motion, whose response
             spectrum is the demand. Beyond 4 s the spectral displacement of European codes is held.
         direction: sense of the horizontal forces along x, 1 or -1.
-        friction: "coulomb", "nonassociated" or None for no sliding, as for `collapse_factor`. Where
-            dilatancy alone lets the mechanism of "coulomb" move, as in walls in bond, that of
+        friction: "coulomb", "nonassociated" or None for no sliding, as for `collapse_factor`. In
+            walls in bond, and where dilatancy alone lets the mechanism of "coulomb" move, that of
             "nonassociated" is taken, if it can be searched. None is no bound for walls in bond.
         part: name of a part; only joints that touch its blocks may move.
         blocks: names or numbers of blocks; only joints that touch them may move.
@@ -374,11 +374,13 @@ class _Search:
     ) -> tuple[MechanismPath, int, str]:
         """Return the path of a mechanism, where it holds to, and the doubt about its factor.
 
-        Where dilatancy alone lets a mechanism move, it is that of the search without dilatancy; of
-        one that has no finite motion even so, the path is the place at rest.
+        In walls in bond, and where dilatancy alone lets a mechanism move, it is that of the search
+        without dilatancy; of one that has no finite motion even so, the path is the place at rest.
         """
         mechanism, doubt, slides = first, "", any(contact.slip for contact in first.contacts)
-        searches = [False, True] if self.friction == "coulomb" else [True]
+        # in walls in bond flat motions are many, and the search finds the weakest
+        first_flow = self.friction == "coulomb" and not self.structure.heads.any()
+        searches = [False, True] if first_flow else [True]
         for searched in searches if slides else [False]:
             if searched:
                 mechanism, doubt = self._search_flat(placed, joints, first)
@@ -674,7 +676,8 @@ class _Oscillator:
         if len(self.path.factors) == 1:
             found.append(
                 "this mechanism begins, and its contacts permit no finite motion: there is no "
-                "displacement check, and what is withstood beyond the start rests on q alone"
+                "displacement check, and what it withstands beyond its start, 1/q of the linear "
+                "ratio, rests on q alone"
             )
         elif self.path.end is not PathEnd.FALLS:
             found.append(

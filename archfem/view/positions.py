@@ -10,6 +10,7 @@ from archfem._typing import Array, Numbers
 from archfem.dynamics.history import History
 from archfem.dynamics.rigid_body.bodies import make_bodies
 from archfem.joints.criteria import Criteria, assessed_joints
+from archfem.limit.mechanism_count import counted_mechanism, leave_out_walls
 from archfem.masonry.block import measure_polygon, rotate
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import Structure
@@ -35,14 +36,22 @@ def first_motion_instant(run: History) -> float:
     """Return the time of the first mechanism, else of the largest |e| of a joint [s].
 
     Joints that are hinges at the start, such as a stone's on two others of unequal height, say
-    nothing of the motion, and do not count.
+    nothing of the motion, and do not count. No joint of a wall in bond counts: a wall alone has
+    the instant at which a joint is farthest open or has slid farthest.
     """
     # enough joints may fail while no block can move: a verified motion comes first
     verified = run.verified if run.structure is not None else None
-    found = run.mechanism if verified is None else verified.moved
+    counted = leave_out_walls(run.joints)
+    found = counted_mechanism(counted) if verified is None else verified.moved
     if found is not None and found.time is not None:
         return found.time
-    e = abs(assessed_joints(run.joints)["eccentricity"])
+    joints = assessed_joints(counted)
+    if not joints.sizes["joint"]:
+        joints = assessed_joints(run.joints)
+        apart = joints[["opening", "slip"]].to_array()
+        apart = abs(apart - apart.isel(time=0)).max(["variable", "joint"])
+        return float(run.time[int(apart.argmax("time"))])
+    e = abs(joints["eccentricity"])
     e = e.where(e.isel(time=0) < Criteria.of(run.joints).hinge).max("joint")
     return float(run.time[int(e.fillna(0.0).argmax("time"))])
 

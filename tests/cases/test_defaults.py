@@ -1,5 +1,7 @@
 """Deciding values that a case does not give are marked as defaults."""
 
+import numpy as np
+
 import archfem as af
 from archfem.cases.case import case_of
 from archfem.cases.defaults import (
@@ -91,13 +93,22 @@ def test_head_joints_are_apart_in_the_line_of_the_dead_load(tmp_path):
         blocks.append(af.Block(outline, af.STONE, name, fixed=fixed, part=part, role=role))
     wall = af.masonry.assembled(blocks, af.Contact(1e9, 4e8, friction=0.6))
     case = af.Case.read(af.Analysis(wall, fidelity="rigid").write(tmp_path / "wall.toml"))
-    text = describe_dead_load(af.cases.DeadLoadResult.of(case))
+    at_rest = af.cases.DeadLoadResult.of(case)
+    text = describe_dead_load(at_rest)
     (line,) = [each for each in text.splitlines() if each.startswith("dead load: ")]
     assert line.startswith("dead load: stands under its own weight: |e| ≤ ")
     beds, heads = line.split("; of head joints, which do not count, ")
     assert beds.endswith(f"N ≥ {1e-3 * af.STONE.unit_weight:.2f} kN")  # c rests on a and b
     assert heads.endswith("N ≥ 0.00 kN")
     assert "not assessed: a to b" in text
+    head = int(np.flatnonzero(case.structure.heads)[0])
+    # within a thousandth all of the friction; a head joint does not count
+    for number, used, said in ((0, 0.5995, True), (0, 0.599, False), (head, 0.6, False)):
+        joints = at_rest.dead.joints.copy(deep=True)
+        joints["friction"][number] = used
+        vars(at_rest.dead)["joints"] = joints
+        text = describe_dead_load(at_rest)
+        assert ("friction is used up at 1 joint, and its neighbours hold" in text) is said
 
 
 def test_check_explains_each_default_by_its_key(tmp_path, capsys):

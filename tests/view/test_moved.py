@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from bonded import bonded_wall
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 import archfem as af
@@ -139,6 +140,24 @@ def test_the_instant_that_decides_is_the_fall_or_else_a_motion(toppled, ring):
     assert decisive_instant(af.History(dataset, ring)) == 2.0
     assert decisive_instant(af.History(dataset)) == 1.0  # by count alone
     assert decisive_instant(af.History(dataset.isel(time=[0, 3]), ring)) == 0.0
+
+
+def test_a_wall_shows_the_instant_at_which_it_is_farthest_apart():
+    """Four beds slide at rest, which says nothing of the motion; one slips on at 2 s."""
+    wall = bonded_wall(3)
+    resultants = np.tile([1e4, 0.0, 0.0], (4, len(wall.joints), 1))
+    resultants[:, np.flatnonzero(~wall.heads)[::6][:4], 1] = 0.6e4
+    dataset = af.joints.joint_dataset(wall, resultants, np.arange(4.0))
+    still = dataset["N"] * 0.0
+    slip = still.copy()
+    slip[:, 3] = -2e-3  # by the dead load
+    slip[2, 4] = -1e-3
+    dataset = dataset.assign(slip=slip, opening=still)
+    assert af.History(dataset, wall).mechanism.time == 0.0  # by count, which says nothing
+    assert decisive_instant(af.History(dataset, wall)) == 2.0
+    assert decisive_instant(af.History(dataset)) == 2.0
+    dataset["opening"][3, 5] = 1.5e-3
+    assert decisive_instant(af.History(dataset, wall)) == 3.0
 
 
 def test_a_joint_that_is_open_at_rest_does_not_decide(ring):
