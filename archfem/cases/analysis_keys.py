@@ -17,6 +17,7 @@ from archfem.limit.fill_strength import Fill, PlasticFill
 from archfem.limit.rating import ASSUMED_STRENGTH, Rating, rate
 from archfem.limit.vehicles import VEHICLES, VEHICLES_OF_CODES, Vehicle
 from archfem.masonry.loads import Action, AttachedLoad, BodyForce, PointLoad, Settlement
+from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import Structure, join_names
 from archfem.motion.design_spectra import DesignSpectrum
 from archfem.motion.motion import Motion
@@ -127,7 +128,7 @@ class LimitAnalysis:
             direction: sense of the push along x, 1 or -1.
         """
         given: dict[str, Any] = {"live": BodyForce(direction), "fill": self.fill}
-        given["friction"] = self.friction and "coulomb"  # as assessments slide
+        given["friction"] = self.friction and "coulomb"  # as assessments slide by default
         crushing, without = (
             collapse_factor(structure, strength=strength, **given).factor
             for strength in (self.strength, np.inf)
@@ -336,6 +337,7 @@ class AssessmentSettings:
     spectrum: DesignSpectrum | None  # of the demand; None for that of the case's suite or motion
     directions: tuple[float, ...]  # of the horizontal forces, 1 to the right and -1 to the left
     options: dict[str, Any]  # other arguments of `kinematic_assessment`
+    of_limit: tuple[str, ...] = ()  # names of those options that are of the limit analysis
 
     def solve(
         self, structure: Structure, demand: DesignSpectrum | Motion | None, parts: bool = False
@@ -352,6 +354,9 @@ class AssessmentSettings:
             side, options = ("right", "left")[direction < 0.0], {**self.options}
             options["direction"] = direction
             if parts:
+                # without dilatancy the whole alone is searched
+                if "friction" in self.of_limit:
+                    del options["friction"]
                 each = assess_parts(structure, spectrum, **options)
                 found |= {f"{name or 'part'}, {side}": result for name, result in each.items()}
             else:
@@ -359,8 +364,10 @@ class AssessmentSettings:
         return {name: result.least or result for name, result in found.items()}
 
 
-def parse_assessment(table: Any, fill: Fill | PlasticFill | None = None) -> AssessmentSettings:
-    """Return the kinematic assessment of a case, by default with the fill of its limit analysis."""
+def parse_assessment(
+    table: Any, limit: LimitAnalysis | None = None, structure: Structure | None = None
+) -> AssessmentSettings:
+    """Return the kinematic assessment of a case, by default with fill and sliding of its limit."""
     options = check_table(table, assessment_keys(), "assessment")
     spectrum = None
     if "spectrum" in options:
@@ -375,14 +382,22 @@ def parse_assessment(table: Any, fill: Fill | PlasticFill | None = None) -> Asse
         options["friction"] = _check_friction(options["friction"], "assessment.friction")
     if isinstance(state := options.get("limit_state"), dict):
         options["limit_state"] = read_object(LimitState, state, "assessment.limit_state")
+    of_limit = list[str]()
     if "fill" in options:
         options["fill"] = _fill(options["fill"], "assessment.fill")
-    elif isinstance(fill, Fill):  # no finite motion is known with a plastic fill
-        options["fill"] = fill
+    elif limit and isinstance(limit.fill, Fill):  # with a plastic one no finite motion is known
+        options["fill"] = limit.fill
+        of_limit.append("fill")
     if "loads" in options:
         loads = options["loads"]
         options["loads"] = [read_object(AttachedLoad, load, "assessment.loads") for load in loads]
-    return AssessmentSettings(spectrum, directions, options)
+    # sliding without dilatancy is not searched with attached loads or a fill
+    loaded = options.get("loads") or (structure and find_yielding_blocks(structure))
+    flat = limit is not None and limit.friction == "nonassociated"
+    if flat and not loaded and not {"friction", "fill"} & options.keys():
+        options["friction"] = "nonassociated"
+        of_limit.append("friction")
+    return AssessmentSettings(spectrum, directions, options, tuple(of_limit))
 
 
 def _keys_beside(function: Callable[..., Any], *given: str) -> dict[str, Any]:

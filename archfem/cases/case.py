@@ -167,7 +167,7 @@ class Case:
             limit=limit,
             pushover=None if push is None else analysis_keys.parse_pushover(push),
             rating=analysis_keys.parse_rating(settings.get("rating", {})),
-            assessment=analysis_keys.parse_assessment(assessed, limit.fill),
+            assessment=analysis_keys.parse_assessment(assessed, limit, structure),
             risk=None if (risk := settings.get("risk")) is None else parse_risk(risk, folder),
             output=output,
             report=report,

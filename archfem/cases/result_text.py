@@ -395,9 +395,13 @@ def compare_with_site(case: Case, found: Collapse) -> tuple[str, str]:
     if spectrum is None or not found.push or found.outcome is not Outcome.COLLAPSES:
         return "", ""
     ground, rock = float(spectrum.horizontal(0.0)), getattr(spectrum, "ag", None)
+    proved = ""
+    if found.solutions and found.solutions.may_be_less and found.over_fill is None:
+        # the search may have missed a weaker solution
+        proved = f" (proved ≥ {found.solutions.bracket[0] * abs(found.push) / ground:.3g})"
     size = f"{ground:.3g} g" if rock is None else f"{rock:.3g} g × S {ground / rock:.3g}"
     low, high = (f"{bound * abs(found.push) / ground:.3g}" for bound in found.range)
-    return f"the site's {size}", low if low == high else f"{low} to {high}"
+    return f"the site's {size}", f"{low}{proved}" if low == high else f"{low} to {high}"
 
 
 def describe_pushover(push: Pushover) -> str:
@@ -564,8 +568,10 @@ def list_ratios(found: KinematicAssessment) -> list[tuple[AssessmentCheck, str]]
     """List the checks of an assessment with their ratios; with one weight a body if it is less."""
     listed = []
     for check, whole in zip(found.checks, (found.of_bodies or found).checks, strict=True):
-        less = f" ({whole.ratio:.3g} with one weight a body)"
-        listed.append((check, check.ratios + less * (whole.ratio < 0.999 * check.least)))
+        beside = [f"{check.moved:.3g} by displacements"] * (check.at_rest and not check.over_fill)
+        less = whole.ratio < 0.999 * check.least
+        beside += [f"{whole.ratio:.3g} with one weight a body"] * less
+        listed.append((check, check.ratios + f" ({'; '.join(beside)})" * bool(beside)))
     return listed
 
 

@@ -2,7 +2,8 @@
 
     cli      argument parser, exit codes
     records  motion, select
-    run      run, modes, limit, assess, rate, mesh, accuracy, risk, verdict, report, page, compile
+    run      run, modes, limit, assess, rate, mesh, accuracy, risk, report, page, compile
+    margin   verdict, scale
     study    study
     tools    check, animate, examples, example, new, schema, doctor
     schema   JSON schema of case files

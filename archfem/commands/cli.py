@@ -190,14 +190,15 @@ def _add_case_commands(commands: Any) -> None:
         "--out", required=True, metavar="FILE.msh", help="the mesh file"
     )
     about = "does it fall, whatever its uncertain properties are?"
-    add_to = add("verdict", about, "folder that keeps all runs (none)", required=False)
+    of_margin = partial(add, required=False, module="margin")
+    add_to = of_margin("verdict", about, "folder that keeps all runs (none)")
     add_to("--workers", type=int, default=1, help="processes for the runs (1)")
     about = "runs beside those of one changed property each (236)"
     add_to("--samples", type=int, default=236, help=about)
-    add_to("--pair", metavar="NAME", help="motion of a [suite] of several")
+    add_to("--pair", metavar="NAME", help="one motion of a [suite] alone (each in turn)")
     about = "at which factor on its motion does it fall, or form a mechanism?"
-    add_to = add("scale", about, "folder for the table (none)", required=False)
-    add_to("--pair", metavar="NAME", help="motion of a [suite] of several")
+    add_to = of_margin("scale", about, "folder for the table (none)")
+    add_to("--pair", metavar="NAME", help="one motion of a [suite] alone (each in turn)")
     about = "annual rate of collapse, from the hazard and the sampling of [risk]"
     add("risk", about)("--workers", type=int, default=1, help="processes for the runs (1)")
     about = "speed against error over fidelities, meshes, quadratures and steps"

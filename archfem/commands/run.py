@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stdout
 from dataclasses import replace
 from functools import partial, wraps
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import Any
 
 import numpy as np
@@ -42,17 +42,10 @@ from archfem.cases.toml_file import format_tables, parse_change
 from archfem.commands.cli import ExitCode
 from archfem.commands.tools import print_motions, show_both_senses
 from archfem.dynamics.history import Ending, History
-from archfem.dynamics.motion_scaling import (
-    CollapseScale,
-    MechanismScales,
-    collapse_scale,
-    mechanism_scales,
-)
 from archfem.errors import ArchfemError, DidNotConverge, InvalidInput
 from archfem.limit.collapse import Collapse, describe_fill
 from archfem.limit.rating import Rating
 from archfem.masonry.structure import Structure
-from archfem.motion.motion import Motion
 from archfem.motion.suite import Suite
 from archfem.statics.equilibrium import structure_doubts
 from archfem.statics.mechanism_assessment import KinematicAssessment
@@ -120,17 +113,34 @@ def _replace_results(command: str, case: Case, folder: Path) -> Iterator[Path]:
         yield draft
 
 
-def _write_results(
-    command: str, case: Case, out: str | None, text: str, draw: Callable[[], Files]
+def write_results(
+    command: str,
+    case: Case,
+    out: str | None,
+    text: str,
+    draw: Callable[[], Files],
+    pair: str | None = None,
 ) -> None:
-    """Write the results of a command to its folder, if one is given, and then print its text."""
+    """Write the results of a command to its folder, if one is given, and then print its text.
+
+    Those of a pair of a suite are written to its own folder, and replace none of another pair.
+    """
     output = io.StringIO()
+    name = name_group(command, pair)
+    if pair is not None:
+        place = PurePath(pair)
+        draw = partial(lambda given: {str(place / key): x for key, x in given().items()}, draw)
     try:
         # a reader of the text, such as `head`, may leave before its end
         with redirect_stdout(output):
-            _replace_files(command, case, out, draw)
+            _replace_files(name, case, out, draw)
     finally:
         print(f"{text}\n{output.getvalue()}", end="")
+
+
+def name_group(command: str, pair: str | None) -> str:
+    """Return the name of a command's results in the list of a folder, as the command is called."""
+    return command if pair is None else f"{command} --pair {pair}"
 
 
 def _replace_files(command: str, case: Case, out: str | None, draw: Callable[[], Files]) -> None:
@@ -158,7 +168,7 @@ def _name_published_files(text: str, folder: Path, command: str) -> str:
 
 
 @contextmanager
-def _record_doubts(structure: Structure) -> Iterator[list[str]]:
+def record_doubts(structure: Structure) -> Iterator[list[str]]:
     """Yield doubts about a structure, and then the warnings of a block, as lines."""
     doubts = [f"{DOUBT_MARK}{doubt}" for doubt in structure_doubts(structure)]
     handler = logging.Handler(logging.WARNING)
@@ -170,7 +180,7 @@ def _record_doubts(structure: Structure) -> Iterator[list[str]]:
         logger.removeHandler(handler)
 
 
-def _keep_attempt(name: str) -> Callable[[Command], Command]:
+def keep_attempt(name: str) -> Callable[[Command], Command]:
     """Let a command that finds no answer leave the reason in its folder, which a report states."""
 
     def decorate(command: Command) -> Command:
@@ -180,10 +190,11 @@ def _keep_attempt(name: str) -> Callable[[Command], Command]:
                 return command(options)
             except DidNotConverge as error:
                 case = Case.read(options.case, options.changes)
-                text = f"no answer: {error}"
-                stated = result_text.state_outcome(RESULTS[name], text).as_file(name)
-                files: Files = {f"{name}.txt": text, **stated}
-                _write_results(command.__name__, case, options.out, text, lambda: files)
+                text, pair = f"no answer: {error}", getattr(options, "pair", None)
+                demand = f"'{pair}'" if pair else "-"
+                stated = result_text.state_outcome(RESULTS[name], text, demand=demand)
+                files: Files = {f"{name}.txt": text, **stated.as_file(name)}
+                write_results(command.__name__, case, options.out, text, lambda: files, pair)
                 raise
 
         return attempt
@@ -191,7 +202,7 @@ def _keep_attempt(name: str) -> Callable[[Command], Command]:
     return decorate
 
 
-def _doubt_code(lines: Iterable[str]) -> int:
+def doubt_code(lines: Iterable[str]) -> int:
     """Return the exit code of printed doubts and notes."""
     return ExitCode.DOUBTFUL if any(line.startswith(DOUBT_MARK) for line in lines) else 0
 
@@ -212,7 +223,7 @@ def modes(options: argparse.Namespace) -> int:
     return ExitCode.DOUBTFUL if at_rest.doubts else 0
 
 
-@_keep_attempt("limit")
+@keep_attempt("limit")
 def limit(options: argparse.Namespace) -> int:
     """Find the collapse factor of the loads in [limit], and the mechanism."""
     case = Case.read(options.case, options.changes)
@@ -221,22 +232,22 @@ def limit(options: argparse.Namespace) -> int:
         lines = [*dict.fromkeys(doubts)]  # the other sense may have the same
         text = "\n".join([text, *lines])
         files = partial(results.limit_files, case, found, text, lines)
-        _write_results("limit", case, options.out, f"{case.title}\n{text}", files)
+        write_results("limit", case, options.out, f"{case.title}\n{text}", files)
 
-    with _record_doubts(case.structure) as doubts:
+    with record_doubts(case.structure) as doubts:
         show_both_senses(case, case.limit.solve(case.structure), show)
-    return _doubt_code(doubts)
+    return doubt_code(doubts)
 
 
-@_keep_attempt("assessment")
+@keep_attempt("assessment")
 def assess(options: argparse.Namespace) -> int:
     """Assess the collapse mechanisms of a case against a design spectrum, in both directions."""
     case = Case.read(options.case, options.changes)
     motion = case.ground_motion() if case.motion is not None else None
     demand = case.target if case.target is not None else motion
-    with _record_doubts(case.structure) as doubts:
+    with record_doubts(case.structure) as doubts:
         found = case.assessment.solve(case.structure, demand, options.parts)
-    with _record_doubts(case.structure):  # which are those of the assessment
+    with record_doubts(case.structure):  # which are those of the assessment
         doubts += _compare_crushing(case, found.values())
     doubts += [f"{DOUBT_MARK}{doubt}" for result in found.values() for doubt in result.doubts]
     doubts += result_text.note_band(case, found.values())
@@ -255,8 +266,8 @@ def assess(options: argparse.Namespace) -> int:
         stated = result_text.state_assessments(found, doubts).as_file("assessment")
         return {"assessment.txt": text, **stated, **figures}
 
-    _write_results("assess", case, options.out, f"{case.title}\n{text}", draw)
-    return _doubt_code(doubts)
+    write_results("assess", case, options.out, f"{case.title}\n{text}", draw)
+    return doubt_code(doubts)
 
 
 def _compare_crushing(case: Case, found: Iterable[KinematicAssessment]) -> list[str]:
@@ -274,7 +285,7 @@ def _compare_crushing(case: Case, found: Iterable[KinematicAssessment]) -> list[
     ]
 
 
-@_keep_attempt("rating")
+@keep_attempt("rating")
 def rate(options: argparse.Namespace) -> int:
     """Rate the bridge of a case for vehicles, by the joints and the fill of its [limit]."""
     keys = ("live", "impact", "dead", "width", "area_load")
@@ -303,10 +314,10 @@ def rate(options: argparse.Namespace) -> int:
             drawn |= {"vehicles.png": draw_ratings(found), "places.png": draw_worst_places(found)}
         return {**files, **drawn}
 
-    _write_results("rate", case, options.out, f"{case.title}\n{text}", draw)
+    write_results("rate", case, options.out, f"{case.title}\n{text}", draw)
     if interrupted:
         raise KeyboardInterrupt
-    return _doubt_code([doubt for _, doubts in ratings for doubt in doubts])
+    return doubt_code([doubt for _, doubts in ratings for doubt in doubts])
 
 
 def _vary(
@@ -336,7 +347,7 @@ def _rate_each(
         for number, table in enumerate(tables):
             progress.show(f"vehicle {number + 1} of {count}")
             try:
-                with _record_doubts(case.structure) as doubts:
+                with record_doubts(case.structure) as doubts:
                     found = rate_case(case.structure, parse_rating(table), case.limit)
             except KeyboardInterrupt:
                 if not rated:
@@ -363,7 +374,7 @@ def mesh(options: argparse.Namespace) -> None:
     print(f"wrote {options.out}")
 
 
-@_keep_attempt("accuracy")
+@keep_attempt("accuracy")
 def accuracy(options: argparse.Namespace) -> int:
     """Run a case over fidelities, meshes, quadratures and steps: table and picture."""
     from archfem.studies.convergence import case_accuracy
@@ -373,11 +384,11 @@ def accuracy(options: argparse.Namespace) -> int:
     compared = case_accuracy(case, path_inside(folder, "settings"), workers=options.workers)
     text = result_text.describe_accuracy(compared)
     files: Files = {"accuracy.txt": text, "accuracy.png": draw_accuracy(compared)}
-    _write_results("accuracy", case, options.out, text, lambda: files)
+    write_results("accuracy", case, options.out, text, lambda: files)
     return 0
 
 
-@_keep_attempt("risk")
+@keep_attempt("risk")
 def risk(options: argparse.Namespace) -> int:
     """Compute the annual rate at which the structure of a case falls, by its [risk]."""
     from archfem.studies.collapse_risk import collapse_risk
@@ -402,55 +413,8 @@ def risk(options: argparse.Namespace) -> int:
     )
     files: Files = {"risk.txt": str(found), "risk.nc": found.save, "risk.png": found.plot()}
     files |= result_text.state_risk(found).as_file("risk")
-    _write_results("risk", case, options.out, str(found), lambda: files)
+    write_results("risk", case, options.out, str(found), lambda: files)
     return ExitCode.DOUBTFUL if found.doubts else 0
-
-
-@_keep_attempt("verdict_range")
-def verdict(options: argparse.Namespace) -> int:
-    """Run a case over joint rules, stiffness, friction and damping: how often does it fall?"""
-    from archfem.studies.variations import verdict_range
-
-    case = Case.read(options.case, options.changes)
-    motion = _choose_motion(case, options)
-    print(case.title)
-    folder = None if options.out is None else path_inside(Path(options.out), "variations")
-    sampling = {"workers": options.workers, "samples": options.samples, "folder": folder}
-    computed = verdict_range(case.analysis, motion, fidelity="rigid", **sampling)
-    own: Files = {"verdict_range.nc": computed.save, "verdict_range.txt": str(computed)}
-
-    def draw() -> Files:
-        return own | {"verdict_range.png": computed.plot()}
-
-    _write_results("verdict", case, options.out, str(computed), draw)
-    return ExitCode.DOUBTFUL if computed.doubts else 0
-
-
-def _choose_motion(case: Case, options: argparse.Namespace) -> Motion:
-    """Return the motion of a case, or the pair of its suite that is named; make the folder."""
-    from archfem.studies.cache import ground_motion
-
-    if options.out is not None:  # a folder that cannot be written is refused before the runs
-        create_result_folder(options.out)
-    return ground_motion(case if options.pair is None else case.alone(options.pair))
-
-
-@_keep_attempt("scale")
-def scale(options: argparse.Namespace) -> int:
-    """Scale the motion of a case until it falls, or forms a mechanism in small displacements."""
-    case = Case.read(options.case, options.changes)
-    motion = _choose_motion(case, options)
-    found: CollapseScale | MechanismScales
-    search = collapse_scale if case.analysis.displacements == "large" else mechanism_scales
-    with _record_doubts(case.structure) as doubts:
-        found = search(case.analysis, motion)
-    doubts += [f"{DOUBT_MARK}{doubt}" for doubt in found.doubts]
-    text = "\n".join([f"{motion.name}: {found}", *dict.fromkeys(doubts), "", found.table()])
-    files: Files = {"scale.txt": text, **result_text.state_scale(found, motion, doubts)}
-    _write_results("scale", case, options.out, f"{case.title}\n{text}", lambda: files)
-    if found.interrupted:
-        raise KeyboardInterrupt
-    return _doubt_code(doubts)
 
 
 def report(options: argparse.Namespace) -> None:
@@ -497,7 +461,7 @@ def print_results(case: Case, found: Iterable[Result], folder: Path) -> tuple[st
     of_limit: list[str] = []
     if (survey := read_survey(case.settings, case.folder)) is not None:
         print(survey)
-    with _record_doubts(case.structure) as doubts:
+    with record_doubts(case.structure) as doubts:
         supports = len(doubts)
         for result in found:
             if isinstance(result, Collapse):

@@ -43,6 +43,9 @@ from archfem.units import STANDARD_GRAVITY
 # Limit state of large displacements, in place of a definition of mechanisms
 COLLAPSE_DEFINITION = "collapse"
 
+# Doubt of a search that Ctrl-C has ended
+INTERRUPTED_SEARCH = "the search was interrupted"
+
 # Step of a search that is given none, and the least to which it is shortened for sliding [s]
 OWN_STEP, LEAST_STEP = 0.005, 0.0005
 
@@ -283,7 +286,7 @@ def _doubts_of_searches(
             broken = next(run for run in scales.runs if run.scale == bracket.unanswered[0])
             doubts[-1] += f": the first {broken.outcome}" if broken.outcome else ""
         if scales.interrupted:
-            doubts.append(f"the search was interrupted after {len(scales.runs)} runs{settings}")
+            doubts.append(f"{INTERRUPTED_SEARCH} after {len(scales.runs)} runs{settings}")
         for run in scales.runs:
             if run.scale in (bracket.lower, bracket.upper):
                 for doubt in run.doubts:
@@ -447,8 +450,8 @@ class CollapseScale:
             kind == "dislocated" and at < self.lower for at, kind in made
         )
         return (
-            f"; stands{parted} at every smaller scale that was run, from {gaps[0][0]:#.3g} × on up "
-            f"to a factor of {ratio:.2f} apart; those between were not run"
+            f"; stands{parted} at every smaller scale that was run: from {gaps[0][0]:#.3g} × on "
+            f"they are up to a factor of {ratio:.2f} apart, and none between was run"
         )
 
     @property

@@ -147,7 +147,13 @@ class VerdictRange(ResultDisplay):
             f"largest displacements {ends}, in 95 % of {len(sizes)} runs {format_mm(usual)} or less"
         )
         # runs that rest, as under a joint rule without a mechanism, say little of the others
-        return f"{text}, in {hardly} below 1 % of the largest" if hardly else text
+        if not hardly:
+            return text
+        held = rows.isel(run=np.flatnonzero(~self.falls[self.answered]))
+        small = held.isel(run=np.flatnonzero(sizes < largest / 100))
+        alike = "joint_rule" in small and bool((small["joint_rule"] == "rigid").all())
+        which = " with rigid joints" * alike
+        return f"{text}; {hardly} of them{which} moved by less than 1 % of the largest"
 
     @property
     def unanswered(self) -> str:

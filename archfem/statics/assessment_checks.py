@@ -124,9 +124,14 @@ class AssessmentCheck:
         return self.ratio if self.over_fill is None else self.over_fill.ends[0]
 
     @property
+    def moved(self) -> float:
+        """Ratio of capacity and demand, which counts once the mechanism is in motion [-]."""
+        return self.capacity / self.demand
+
+    @property
     def at_rest(self) -> bool:
         """Whether the ratio is that up to which the mechanism is not set in motion."""
-        return self.ratio > (1.0 + 1e-9) * self.capacity / self.demand  # but for round-off
+        return self.ratio > (1.0 + 1e-9) * self.moved  # but for round-off
 
     def __str__(self) -> str:
         """Describe capacity, demand and outcome in one line."""

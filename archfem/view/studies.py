@@ -13,6 +13,8 @@ from matplotlib.ticker import LogLocator, NullFormatter
 from archfem._typing import Array, Flags
 from archfem._validation import validate_arguments
 from archfem.dynamics.accuracy import Accuracy
+from archfem.dynamics.collapse_state import COLLAPSE_STATES, FALLEN_STATES
+from archfem.dynamics.motion_scaling import CollapseScale
 from archfem.dynamics.verdict_range import VerdictRange
 from archfem.errors import InvalidInput
 from archfem.motion.hazard import MEASURES, Hazard
@@ -544,9 +546,9 @@ def draw_verdict_range(verdicts: VerdictRange) -> Figure:
         if verdicts.is_mixed:
             set_title(axes, f"explains {share:.0%}")
         _draw_property(axes, rows[name].values, heights, falls, parted)
-        axes.axhline(top, color=Colour.GREY, lw=0.9, ls="--")
-        axes.set_yscale("log")
-        axes.set_ylim(0.7e-3 * top, 4.0 * top)
+        if falls.any():
+            axes.axhline(top, color=Colour.GREY, lw=0.9, ls="--")
+        axes.set(yscale="log", ylim=(0.7e-3 * top, 4.0 * top))
     add_legend_below(figure, 3, handles=panels[0].get_legend_handles_labels()[0])
     text = verdicts.headline
     if verdicts.is_mixed:
@@ -570,12 +572,40 @@ def _draw_property(axes: Axes, values: Array, heights: Array, falls: Flags, part
     groups = (
         (~(falls | parted), "o", Colour.LINES[0], "stands"),
         (parted, "D", Colour.LINES[1], "dislocated"),
-        (falls, "^", Colour.HINGE, "falls, above the line"),
+        (falls, "^", Colour.HINGE, "falls, above the dashed line"),
     )
     for chosen, marker, colour, label in groups:
-        if chosen.any() or marker != "D":
+        if chosen.any():
             style = {"ms": 4, "alpha": 0.8, "label": label}
             axes.plot(places[chosen], heights[chosen], marker, color=colour, **style)
+
+
+def draw_scale(found: CollapseScale, limit: float) -> Figure:
+    """Draw the residual displacement of each run over its scale, and the limit [m] of dislocation.
+
+    A run with lost blocks is drawn above all others, as the distance to the ground says nothing.
+    """
+    labels = "scale of the motion [-]", "residual displacement [mm]"
+    figure, axes = new_axes(Size.COLUMN, 3.0, *labels)
+    axes.set(xscale="log", yscale="log")
+    made = {dt: [(scale, fall) for scale, fall in found.falls(dt) if fall] for dt in found.searches}
+    held = [x.residual for runs in made.values() for _, x in runs if x.kind not in FALLEN_STATES]
+    top = 3.0 * max([limit, *held])
+    for k, (dt, runs) in enumerate(made.items()):
+        for state, marker in zip(COLLAPSE_STATES, "oD^^", strict=True):
+            own = [(scale, fall.residual) for scale, fall in runs if fall.kind == state]
+            x, y = np.array(own).reshape(-1, 2).T
+            heights = np.full(len(x), top) if state in FALLEN_STATES else np.maximum(y, 1e-6)
+            style = {"color": Colour.LINES[k % len(Colour.LINES)], "ms": 4, "alpha": 0.8}
+            label = f"{state}, {1e3 * dt:g} ms" if own else None
+            axes.plot(x, 1e3 * heights, marker, label=label, **style)
+    axes.axhline(1e3 * limit, color=Colour.GREY, lw=0.9, ls="--", label="limit of dislocation")
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_minor_formatter(NullFormatter())
+        axis.set_major_formatter(lambda value, _: f"{value:g}")
+    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 1.5, 2.0, 3.0, 5.0, 7.0)))
+    add_legend_below(figure, 2)
+    return figure
 
 
 def draw_convergence(

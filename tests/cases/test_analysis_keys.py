@@ -1,6 +1,7 @@
 """Limit analysis and damping of case files, against the functions of Python."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -317,15 +318,40 @@ def test_assessment_of_a_case_has_the_arguments_of_python():
     assert settings.directions == (-1.0,)
     assert parse_assessment({}).directions == (1.0, -1.0)
     # the fill is that of the limit analysis, but for one of its own or a plastic one
-    fill, own = af.limit.Fill(friction_angle=35.0), {"fill": {"friction_angle": 30}}
-    assert parse_assessment({}, fill).options["fill"] is fill
-    assert parse_assessment(own, fill).options["fill"].friction_angle == 30.0
-    assert not parse_assessment({}, af.limit.PlasticFill(friction_angle=35.0)).options
+    own = {"fill": {"friction_angle": 30}}
+    limit = parse_limit({"fill": {"friction_angle": 35}})
+    assert parse_assessment({}, limit).options["fill"] is limit.fill
+    assert parse_assessment({}, limit).of_limit == ("fill",)
+    assert parse_assessment(own, limit).options["fill"].friction_angle == 30.0
+    plastic = replace(limit, fill=af.limit.PlasticFill(friction_angle=35.0))
+    assert not parse_assessment({}, plastic).options
     assert settings.options == {
         "friction": None,
         "loads": [af.masonry.AttachedLoad(1, (0.0, 2.0), weight=5e3)],
         "limit_state": af.statics.LimitState("own", 0.5, 2.0, 1.0, 0.05, "a test"),
     }
+
+
+def test_assessment_slides_as_the_limit_analysis_but_for_its_own_keys(monkeypatch):
+    limit = parse_limit({"friction": "nonassociated"})
+    found = parse_assessment({}, limit)
+    assert found.options == {"friction": "nonassociated"}
+    assert found.of_limit == ("friction",)
+    for table in (
+        {"friction": "coulomb"},
+        {"fill": {"friction_angle": 30}},
+        {"loads": [{"block": 1, "point": ["0 m", "2 m"], "weight": "5 kN"}]},
+    ):
+        found = parse_assessment(table, limit)
+        assert found.options.get("friction") != "nonassociated"
+        assert not found.of_limit
+    given = []
+    monkeypatch.setattr(
+        "archfem.cases.analysis_keys.assess_parts",
+        lambda *_, **options: given.append(options) or {},
+    )
+    parse_assessment({}, limit).solve(None, af.Eurocode8(ag=0.2, ground="B"), parts=True)
+    assert given == [{"direction": 1.0}, {"direction": -1.0}]
 
 
 @pytest.mark.parametrize(

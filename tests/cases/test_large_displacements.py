@@ -127,7 +127,7 @@ def test_a_range_in_the_folder_stands_in_place_of_what_a_run_cannot_know(held):
         in without[0]
     )
     data = ReportData(data.case, data.runs)
-    vars(data)["verdict_range"] = af.dynamics.VerdictRange(xr.Dataset(rows, attrs=attrs))
+    vars(data)["verdict_ranges"] = (af.dynamics.VerdictRange(xr.Dataset(rows, attrs=attrs)),)
     assert summarise_outcomes(data, [held]) == "stands; falls in 1 of 4 variations"
     (lead,) = sentences_of(data)
     # the share alone would be surer than four runs are: beta.ppf(0.975, 2, 3)
@@ -142,7 +142,7 @@ def test_a_range_in_the_folder_stands_in_place_of_what_a_run_cannot_know(held):
     doubted = ReportData(data.case, data.runs)
     reason = json.dumps([("fill is rigid", "cut it")])
     range_ = af.dynamics.VerdictRange(xr.Dataset(rows, attrs=attrs | {"doubts": reason}))
-    vars(doubted)["verdict_range"] = range_
+    vars(doubted)["verdict_ranges"] = (range_,)
     pieces = build_conclusion(doubted).pieces
     assert "In doubt, variations: Fill is rigid." in [getattr(x, "text", "") for x in pieces]
     (table,) = (each for each in pieces[:-1] if each.kind == "grid")
@@ -153,7 +153,7 @@ def test_a_range_in_the_folder_stands_in_place_of_what_a_run_cannot_know(held):
     for motion, own in ((held.dataset.attrs["motion"], True), ("another", False), (None, False)):
         named = {} if motion is None else {"motion": motion}
         computed = af.dynamics.VerdictRange(xr.Dataset(rows, attrs=attrs | named))
-        vars(both)["verdict_range"] = computed
+        vars(both)["verdict_ranges"] = (computed,)
         assert ("1 of 4 variations" in summarise_outcomes(both, [held])) == own
 
 

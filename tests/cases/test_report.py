@@ -180,9 +180,11 @@ def test_demand_and_capacity_stand_beside_their_doubts(kept, undrawn):
     assert texts[0] == (
         "For 0.25 g, 475 years: the structure forms no mechanism under all 2 motions of PGA "
         "0.05 g. The least margin is 0.5 (0.45 with one weight a body), on the spectrum of the "
-        "motion, by a code, right and left, which it fails. The doubts below, on limit analysis, "
-        "kinematic assessment, may change this. Lengths, stiffness, friction, damping, time step "
-        "and fidelity were not varied, and displacements have no range."
+        "motion, by a code, right and left, which it fails. The runs have a vertical motion "
+        "too, of up to 0.03 g; limit analysis and kinematic assessment have none. The "
+        "doubts below, on limit analysis, kinematic assessment, may change this. Lengths, "
+        "stiffness, friction, damping, time step and fidelity "
+        "were not varied, and displacements have no range."
     )
     assert texts[1:] == [
         "In doubt, limit analysis: A made one.",
@@ -239,7 +241,7 @@ def test_a_check_that_passes_at_rest_says_so():
     found = SimpleNamespace(checks=[resting], notes=(), of_bodies=None)
     (row,) = result_text.state_assessments({"right": found}, []).rows
     outcome = "0.11 m, passes, for the mechanism does not begin to move"
-    assert row == ("assessment: a code, right", "0.22 m", outcome, "1.5")
+    assert row == ("assessment: a code, right", "0.22 m", outcome, "1.5 (0.5 by displacements)")
 
 
 @pytest.mark.parametrize("kind", ["without values", "with others", "of another case"])
@@ -858,7 +860,7 @@ def test_an_attempt_without_an_answer_states_its_reason(kept, unplotted, capsys,
     assert "no answer: no sample falls; raise the scales" in capsys.readouterr().out
     assert af.commands.main(["report", str(kept)]) == 0
     words = words_of(kept / "report.html")
-    row = "range of the verdict over uncertain properties - no answer: no sample falls; raise the"
+    row = "range of the verdict over uncertain properties 'first' no answer: no sample falls; raise"
     assert row in " ".join(words.replace("–", "-").split())
 
 

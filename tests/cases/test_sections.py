@@ -95,7 +95,7 @@ def test_the_extremes_of_each_part_are_those_of_its_joints(piers):
 
 
 def test_the_first_lines_of_a_report_have_the_largest_of_all_runs(piers, runs):
-    data = report_data.ReportData(SimpleNamespace(structure=piers, report={}), runs)
+    data = report_data.ReportData(SimpleNamespace(structure=piers, report={}, suite=None), runs)
     facts = dict(conclusion.list_facts(data))
     assert facts["structure"] == f"{len(piers.free)} blocks, {len(piers.joints)} joints"
     assert facts["motions"] == "PGA 0.03 to 0.06 g"
@@ -110,18 +110,22 @@ def test_the_first_lines_of_a_report_have_the_largest_of_all_runs(piers, runs):
 
 def test_the_assumptions_name_the_law_of_the_joints(piers):
     limit = SimpleNamespace(strength=None)
-    data = report_data.ReportData(SimpleNamespace(structure=piers, limit=limit), {"first": None})
+    data = report_data.ReportData(
+        SimpleNamespace(structure=piers, limit=limit, suite=None), {"first": None}
+    )
     words = sections._describe_joints(data)
     assert "; joints close linearly with 1.48 MPa/mm, which was not varied; no cru" in words
     for properties, varied in ((("damping_ratio",), "not varied"), (("finish",), "varied")):
-        vars(data)["verdict_range"] = SimpleNamespace(properties=properties)
+        vars(data)["verdict_ranges"] = (SimpleNamespace(properties=properties),)
         assert f", which was {varied}; " in sections._describe_joints(data)
 
 
 def test_the_pga_of_older_files_is_that_at_their_steps(piers, runs):
     old = af.History(runs["first"].dataset.drop_attrs(), piers)
     old.dataset.attrs |= {k: v for k, v in runs["first"].dataset.attrs.items() if k != "pga"}
-    data = report_data.ReportData(SimpleNamespace(structure=piers, report={}), {"only": old})
+    data = report_data.ReportData(
+        SimpleNamespace(structure=piers, report={}, suite=None), {"only": old}
+    )
     assert dict(conclusion.list_facts(data))["motion"] == "PGA 0.06 g"
 
 
@@ -129,7 +133,9 @@ def test_the_pga_of_a_report_is_that_of_the_motion_and_not_of_the_steps(piers):
     motion = af.Motion(np.array([0.0, 2.0, -1.0, 0.0]), 0.005)
     run = af.time_history(af.build(piers, fidelity="rigid"), motion, dt=0.003)
     assert np.abs(run.dataset["ground"]).max() < 1.9
-    data = report_data.ReportData(SimpleNamespace(structure=piers, report={}), {"only": run})
+    data = report_data.ReportData(
+        SimpleNamespace(structure=piers, report={}, suite=None), {"only": run}
+    )
     assert dict(conclusion.list_facts(data))["motion"] == "PGA 0.20 g"
     del run.dataset.attrs["pga"]  # as in files of older versions
     largest = float(np.abs(run.dataset["ground"][:, 0]).max())

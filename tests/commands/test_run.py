@@ -16,6 +16,7 @@ from pages import read_page
 
 import archfem as af
 from archfem.cases.run import carry_out
+from archfem.commands import margin
 from archfem.commands.run import print_results
 from archfem.studies import variations
 
@@ -176,7 +177,9 @@ def test_a_range_in_doubt_has_the_exit_code_of_doubts(small, unplotted, monkeypa
     out = small.parent / "out"
     given = ["verdict", str(small), "--samples", "1", "--pair", "first", "--out", str(out)]
     assert af.commands.main(given) == 3
-    assert "fill is rigid; cut it" in (out / "verdict_range.txt").read_text(encoding="utf-8")
+    assert "fill is rigid; cut it" in (out / "first" / "verdict_range.txt").read_text(
+        encoding="utf-8"
+    )
 
 
 @pytest.mark.parametrize("out", [[], ["--out", "out"]])
@@ -190,19 +193,33 @@ def test_a_range_keeps_its_runs_in_its_folder(small, monkeypatch, capsys, out):
     assert af.commands.main(["verdict", str(small), "--pair", "first", *out]) == 130
 
 
-def test_a_range_is_of_one_motion_of_a_suite(small, unplotted, capsys):
+def test_a_range_is_of_each_motion_of_a_suite_and_replaces_none_of_another(
+    small, unplotted, capsys
+):
     out = small.parent / "out"
     given = ["verdict", str(small), "--samples", "1", "--out", str(out)]
-    assert af.commands.main(given) == 1
-    assert "2 pairs, and one motion is needed: take one of ['first', 'second'] by --pair NAME" in (
-        capsys.readouterr().err
-    )
-    assert af.commands.main([*given, "--pair", "first"]) == 0
-    assert xr.load_dataset(out / "verdict_range.nc").attrs["motion"] == "first"
+    assert af.commands.main([*given, "--pair", "second"]) == 0
+    assert not (out / "first").exists()
     assert run(small) == 0
+    capsys.readouterr()
+    assert af.commands.main(given) == 0
+    said = capsys.readouterr().err
+    assert "verdict: pair 1 of 2, 'first'\n" in said
+    assert "verdict: pair 2 of 2, 'second'\n" in said
+    for pair in ("first", "second"):
+        assert xr.load_dataset(out / pair / "verdict_range.nc").attrs["motion"] == pair
+        assert (out / pair / "history.nc").is_file()
+    assert not (out / "verdict_range.nc").exists()
     assert af.commands.main(["report", str(out)]) == 0
-    page = (out / "report.html").read_text(encoding="utf-8")
-    assert re.search(r"variations under \S*first\S*</td>", page)
+    words = " ".join(read_page((out / "report.html").read_text(encoding="utf-8")).words)
+    count = r"falls in 0 of \d+"
+    assert re.search(
+        rf"In variations of its properties it {count} under 'first'; {count} under", words
+    )
+    for pair in ("first", "second"):
+        assert f"variations under '{pair}'" in words
+        assert f"Under '{pair}': residual displacement over the properties" in words
+    assert "properties under" not in words
 
 
 @pytest.mark.parametrize(
@@ -236,7 +253,7 @@ motion = {{ file = "tap.txt", dt = 0.01, units = "m/s2" }}
     assert said.startswith("Block\n" + text.rstrip())
     assert re.match(says.replace("tap", "tap.*"), text), text
     assert f"\n\n{head} " in text
-    runs = {"scale.csv"} if displacements == "large" else set()
+    runs = {"scale.csv", "scale.png"} if displacements == "large" else set()
     assert {path.name for path in (tmp_path / "out").iterdir()} == runs | {
         *("archfem.json", "case.toml", "scale.json", "scale.txt")
     }
@@ -254,6 +271,89 @@ motion = {{ file = "tap.txt", dt = 0.01, units = "m/s2" }}
     assert re.search(margin, words)
     shown = words.split("Scale of the motion")[-1]  # the section
     assert ("at the scales [× the motion]" if runs else head) in shown
+
+
+PAIRS = """
+title = "Block"
+structure = { shape = "column", breadth = 0.25, heights = [1.0] }
+model = { fidelity = "rigid", displacements = "large" }
+suite.pairs.weak = { file = "tap.txt", dt = 0.01, units = "m/s2" }
+suite.pairs.strong = { file = "tap.txt", dt = 0.01, units = "m/s2", scale = 2.0 }
+suite.pairs.middle = { file = "tap.txt", dt = 0.01, units = "m/s2", scale = 1.5 }
+"""
+
+
+@pytest.fixture
+def searched(tmp_path, undrawn, monkeypatch):
+    """A slender block under three motions, whose searches are counted, and its result folder."""
+    pulse = 2.5 * np.sin(np.pi * np.linspace(0.0, 1.0, 41))
+    np.savetxt(tmp_path / "tap.txt", [*pulse, *np.zeros(60)])
+    (tmp_path / "block.toml").write_text(PAIRS, encoding="utf-8")
+    made, compute = [], margin.collapse_scale
+
+    def search(analysis, motion):
+        made.append(motion.name)
+        return compute(analysis, motion, precision=0.5)
+
+    monkeypatch.setattr(margin, "collapse_scale", search)
+    return ["scale", str(tmp_path / "block.toml"), "--out", str(tmp_path / "out")], made
+
+
+def test_scales_of_the_pairs_of_a_suite_stand_side_by_side(searched, tmp_path, capsys):
+    """The report has the least of all, and names those that were not scaled."""
+    given, made = searched
+    out = tmp_path / "out"
+    for pair in ("strong", "weak"):
+        assert af.commands.main([*given, "--pair", pair]) in (0, 3)
+    factors = {}
+    for pair in ("strong", "weak"):
+        (row,) = json.loads((out / pair / "scale.json").read_text(encoding="utf-8"))["rows"]
+        assert row[1].startswith(f"'{pair}', PGA ")
+        factors[pair] = row[3]
+    assert float(factors["strong"]) < 0.7 * float(factors["weak"])
+    assert not (out / "scale.json").exists()
+    assert af.commands.main(["report", str(out)]) == 0
+    words = " ".join(read_page((out / "report.html").read_text(encoding="utf-8")).words)
+    least = f"The least margin is {factors['strong']} on 'strong', PGA "
+    assert least in words
+    assert "the least of 2 motions; 'middle' was not scaled." in words
+    for pair in ("strong", "weak"):
+        assert f"Residual displacement under '{pair}' over the scale" in words
+        assert f"Runs of the search under '{pair}'" in words
+    # without a pair each is searched that has no result of the same case
+    capsys.readouterr()
+    assert af.commands.main(given) in (0, 3)
+    assert made == ["strong", "weak", "middle"]
+    said = capsys.readouterr()
+    assert [said.out.count(f"\n{pair}: ") for pair in ("weak", "strong", "middle")] == [1, 1, 1]
+    assert "scale: pair 3 of 3, 'middle'\n" in said.err
+    assert af.commands.main(["report", str(out)]) == 0
+    words = " ".join(read_page((out / "report.html").read_text(encoding="utf-8")).words)
+    assert least in words
+    assert "the least of 3 motions." in words
+    assert "not scaled" not in words
+    assert af.commands.main([*given, "--set", "materials.stone.unit_weight=21e3"]) in (0, 3)
+    assert made[3:] == ["weak", "strong", "middle"]
+
+
+def test_an_interrupted_search_of_a_pair_is_made_again(searched, tmp_path, monkeypatch):
+    given, made = searched
+    compute = margin.collapse_scale
+
+    def stopped(analysis, motion):
+        found = compute(analysis, motion)
+        if motion.name == "weak":
+            return found
+        searches = {dt: replace(each, interrupted=True) for dt, each in found.searches.items()}
+        return replace(found, searches=searches)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(margin, "collapse_scale", stopped)
+        assert af.commands.main(given) == 130
+    assert made == ["weak", "strong"]
+    (tmp_path / "out" / "weak" / "scale.txt").unlink()
+    assert af.commands.main(given) in (0, 3)
+    assert made[2:] == ["weak", "strong", "middle"]
 
 
 @pytest.mark.slow

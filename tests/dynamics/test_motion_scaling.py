@@ -328,8 +328,8 @@ def test_the_second_step_begins_near_the_fall_of_the_first(monkeypatch):
     assert max(min(scales) for scales in made.values()) <= 0.5 * found.upper
     away = [min(abs(one / other - 1.0) for other in made[0.01]) for one in made[0.005]]
     assert min(away) > 0.015
-    assert "; stands at every smaller scale that was run, from " in str(found)
-    assert str(found).endswith("; those between were not run")
+    assert "; stands at every smaller scale that was run: from " in str(found)
+    assert str(found).endswith(" apart, and none between was run")
 
 
 def fallen(*scales):
@@ -349,8 +349,8 @@ def test_collapse_is_between_a_stable_and_a_falling_run_at_every_step():
     assert found.bracket(0.005).upper == 2.5
     assert str(found) == (
         "stands at 1.00 × the motion, falls at 2.00 × the motion, the other time step first falls "
-        "at 2.50 ×; stands at every smaller scale that was run, from 0.500 × on up to a factor of "
-        "2.00 apart; those between were not run"
+        "at 2.50 ×; stands at every smaller scale that was run: from 0.500 × on they are up to a "
+        "factor of 2.00 apart, and none between was run"
     )
     assert found.doubts == (
         "it is not monotonic: it survives also at 3.00 × the motion by 10 ms",

@@ -104,7 +104,7 @@ def test_dislocated_runs_are_counted_and_drawn_apart():
     assert dict(zip(drawn, sizes, strict=True)) == {
         "stands": 2,
         "dislocated": 1,
-        "falls, above the line": 1,
+        "falls, above the dashed line": 1,
     }
     # apart in grey, and by their marks
     greys = [np.dot(to_rgb(line.get_color()), (0.299, 0.587, 0.114)) for line in drawn.values()]
@@ -112,7 +112,8 @@ def test_dislocated_runs_are_counted_and_drawn_apart():
     assert len({line.get_marker() for line in drawn.values()}) == 3
     upright = made_up([False] * 2, sign=list("ab"))
     assert "dislocated" not in upright.sentence
-    assert len(upright.plot().axes[0].get_lines()) == 3
+    # neither the line nor the words of falls where none is
+    assert [x.get_label() for x in upright.plot().axes[0].get_lines()] == ["stands"]
 
 
 def test_displacements_of_the_runs_that_hold_are_a_range():
@@ -124,7 +125,11 @@ def test_displacements_of_the_runs_that_hold_are_a_range():
     assert found.displacements == usual
     sizes[:7] = 1e-6
     few = made_up(falls, residual=sizes, error=error, sign=["a"] * 102).displacements
-    assert few.endswith("95 mm or less, in 7 below 1 % of the largest")
+    assert few.endswith("95 mm or less; 7 of them moved by less than 1 % of the largest")
+    for count, which in (7, " with rigid joints"), (6, ""):
+        rules = ["rigid"] * count + ["exact"] * (102 - count)
+        found = made_up(falls, residual=sizes, error=error, joint_rule=rules)
+        assert f"; 7 of them{which} moved by" in found.displacements
     assert made_up([True], sign=["a"]).displacements == ""
 
 

@@ -135,10 +135,14 @@ def summarise_outcomes(data: ReportData, runs: Sequence[History]) -> str:
     if verdict.fall is not None:
         # lost blocks have a line of their own
         verdict = replace(verdict, fall=replace(verdict.fall, time=None))
-    own, found = runs[0].dataset.attrs.get("motion"), data.verdict_range
+    own = runs[0].dataset.attrs.get("motion")
+    ranges = {each.dataset.attrs.get("motion"): each for each in data.verdict_ranges}
+    found = ranges.get(own)
+    if found is None and len(data.runs) == 1:  # a range over several motions has no name
+        found = next(iter(ranges.values()), None)
     # a run cannot know that a range was computed after it; the conclusion says what was not varied
     text = verdict.headline.removesuffix(f"; {NO_RANGE}")
-    if found is None or (len(data.runs) > 1 and found.dataset.attrs.get("motion") != own):
+    if found is None:
         return text
     return f"{text}; {found.count} variations{found.unanswered}"
 
@@ -182,13 +186,13 @@ def build_conclusion(data: ReportData) -> Section:
 def _list_outdated(data: ReportData) -> Iterator[str]:
     """Yield sentences on results that another version, or another case, has left, or no answer."""
     listed = {} if data.folder is None else read_file_list(data.folder)
-    shown = [name for name in SHOWN_RESULTS if f"{name}.txt" in data.files]
+    shown = [name for name in SHOWN_RESULTS if data.list_parts(f"{name}.txt")]
     unstated = RESULTS.keys() - {*shown, *data.statements}
     absent = {f"{name}.txt": RESULTS[name] for name in unstated}
     earlier = [
         f"{absent[name]} (run `archfem {command}` again)"
         for command, group in listed.items()
-        for name in group.files
+        for name in (path.rpartition("/")[2] for path in group.files)
         if name in absent
     ]
     for name in _BEGUN.keys() & absent.values():
@@ -208,40 +212,47 @@ def _build_lead(data: ReportData, rows: Sequence[Row], doubtful: Sequence[str]) 
         # an assessment is stated by the margin; a result that stands alone states all of itself
         stated = [each.sentences for name, each in data.statements.items() if name != "assessment"]
         lead = [*stated[0]] if len(data.statements) == 1 and stated else [x for x, *_ in stated]
-    if data.verdict_range is not None:
-        lead.append(f"in variations of its properties it {data.verdict_range.sentence}")
-        lead += filter(None, [data.verdict_range.displacements])
+    lead += _describe_ranges(data.verdict_ranges)
     if fill := list_elastic_fill(data):
         carries = "is elastic in the runs and carries tension, which soil does not"
         lead.append(f"{join_names(fill)} {carries}")
-    lead += _describe_margin(data, rows)
+    lead += [*_describe_margin(data, rows), *_say_vertical(data)]
     if (study := read_study(data)) is not None:
         lead += say_what_changes(study)
     if data.runs and not doubtful:
         lead.append("the checks of the numbers raise no doubt")
     lead += [f"the doubts below, on {join_names(doubtful)}, may change this"] if doubtful else []
     if single := list_unvaried(data):
-        none = ", and displacements have no range" * (data.verdict_range is None)
+        none = ", and displacements have no range" * (not data.verdict_ranges)
         lead.append(f"{join_words(single)} were not varied{none}")
     return lead
+
+
+def _describe_ranges(ranges: Sequence[VerdictRange]) -> Iterator[str]:
+    """Yield how often the structure falls in variations, and how far it moves; of each motion."""
+    if len(ranges) == 1:
+        yield f"in variations of its properties it {ranges[0].sentence}"
+    elif ranges:
+        counts = [
+            f"{each.count} under '{each.dataset.attrs['motion']}'{each.unanswered}"
+            for each in ranges
+        ]
+        yield f"in variations of its properties it {'; '.join(counts)}"
+    for each in ranges:
+        if moved := each.displacements:
+            yield f"under '{each.dataset.attrs['motion']}' {moved}" if len(ranges) > 1 else moved
 
 
 def _describe_margin(data: ReportData, rows: Sequence[Row]) -> Iterator[str]:
     """Yield the least factor on the demand of an earthquake, maybe as a range, and the others."""
     checks, others = [], []
     for name, demand, outcome, factor in rows:
-        if factor == "-":
+        if factor == "-" or name == RESULTS["scale"]:
             continue
         least, check = float(factor.partition(" ")[0]), name.partition("assessment: ")[2]
         fails = ", which it fails" * (least < 1.0)
         over = " over what is assumed of the fill" * (" to " in factor)
-        if name == RESULTS["scale"]:
-            met = "forms a mechanism" if "mechanism" in outcome else "falls"
-            words = f"{factor} on {demand}{fails}: up to there it {met} in no run"
-            if parted := re.search(r"dislocated.*?([\d.]+ ×)", outcome):
-                words += f", and is dislocated from {parted[1]} on"
-            others.append((least, words))
-        elif name == RESULTS["limit"] and demand.startswith("the site"):
+        if name == RESULTS["limit"] and demand.startswith("the site"):
             words = f"{factor}{over}, for a push by {demand} to begin to move it"
             others.append((least, words + _say_motion(data)))
         elif check:
@@ -249,9 +260,40 @@ def _describe_margin(data: ReportData, rows: Sequence[Row]) -> Iterator[str]:
             only = f", passed only with {assumed}" if only else fails
             ratios, *bodies = factor.partition(" (")
             words = f"{ratios}{over}{''.join(bodies)}, on {name_spectrum(data)}, by {check}{only}"
+            if moved := re.search(r"([\d.]+) by displacements", factor):
+                words += (
+                    f": {ratios} times the spectrum begins to move it, and if it moved, it could "
+                    f"be displaced by {moved[1]} times the demand"
+                )
             checks.append((least, words))
+    others += _describe_scales(data, [row for row in rows if row[0] == RESULTS["scale"]])
     for k, (_, words) in enumerate(sorted([*others, *sorted(checks)[:1]])):
         yield f"{('the least margin is', 'the next is', 'then follows')[min(k, 2)]} {words}"
+
+
+def _describe_scales(data: ReportData, rows: Sequence[Row]) -> Iterator[tuple[float, str]]:
+    """Yield the least scale of all motions up to which it holds, and the motions without any."""
+    motions = [row[1].partition(",")[0] for row in rows]
+    named = list(zip(rows, motions, strict=True))
+    made = [(float(row[3]), row, name) for row, name in named if row[3] != "-"]
+    if not made:
+        return
+    least, (_, demand, outcome, factor), _ = min(made, key=lambda each: each[0])
+    met = "forms a mechanism" if "mechanism" in outcome else "falls"
+    fails = ", which it fails" * (least < 1.0)
+    words = f"{factor} on {demand}{fails}: up to there it {met} in no run"
+    found = [(re.search(r"dislocated.*?([\d.]+ ×)", row[2]), name) for _, row, name in made]
+    parted = [(float(at[1].split()[0]), at[1], name) for at, name in found if at]
+    if parted:
+        _, scale, name = min(parted)
+        words += f", and is dislocated from {scale}{f' under {name}' * (len(made) > 1)} on"
+    # a search without a scale that holds may have the least of all
+    none = [name for row, name in named if row[3] == "-"]
+    left = [name for name in (f"'{pair}'" for pair in data.pairs) if name not in motions]
+    parts = [f"the least of {len(made)} motions"] * (len(made) > 1)
+    parts += [f"no scale is known up to which it holds under {join_words(none)}"] * bool(none)
+    parts += [f"{join_words(left)} {'were' if left[1:] else 'was'} not scaled"] * bool(left)
+    yield least, "; ".join([words, *parts])
 
 
 def _say_motion(data: ReportData) -> str:
@@ -260,6 +302,16 @@ def _say_motion(data: ReportData) -> str:
     moves = any(verdict.mechanisms.get("verified") for verdict in verdicts)
     held = all(verdict.outcome in COLLAPSE_STATES[:2] for verdict in verdicts)
     return "; in the runs it begins to move, and falls in none" if moves and held else ""
+
+
+def _say_vertical(data: ReportData) -> Iterator[str]:
+    """Say that runs have a vertical motion, where results beside them leave it out."""
+    checks = [RESULTS[x] for x in ("limit", "assessment", "pushover") if x in data.statements]
+    peaks = [np.abs(run.dataset["ground"].values[:, 1]).max() for run in data.runs.values()]
+    if checks and max(peaks, default=0.0) > 0.0:
+        size = f"{max(peaks) / STANDARD_GRAVITY:.2f} g"
+        text = f"the runs have a vertical motion too, of up to {size}; {join_words(checks)} "
+        yield text + ("have none" if checks[1:] else "has none")
 
 
 def name_spectrum(data: ReportData) -> str:
@@ -302,7 +354,7 @@ def _capacity_rows(data: ReportData) -> Iterator[tuple[str, Row]]:
             largest, residual = map(format_mm, sizes.max(axis=0))
             outcome += f"; displaced by up to {largest}, {residual} at the end"
         yield _HISTORIES, (_HISTORIES, demand, outcome, "-")
-    if (computed := data.verdict_range) is not None:
+    for computed in data.verdict_ranges:
         motion = computed.dataset.attrs.get("motion")
         name = f"{_VARIATIONS} under '{motion}'" if motion else _VARIATIONS
         outcome = "; ".join(filter(None, [computed.count, computed.displacements]))
@@ -360,21 +412,19 @@ def describe_lost(fall: CollapseState, max_names: int = 3) -> str:
 
 def list_varied(data: ReportData) -> tuple[str, ...]:
     """Return the properties that the range of the verdict varies; none without a range."""
-    return () if data.verdict_range is None else data.verdict_range.properties
+    return data.verdict_ranges[0].properties if data.verdict_ranges else ()
 
 
 def list_doubts(data: ReportData) -> list[tuple[str, str]]:
     """Return each result in doubt with its doubt, once; of runs with the number that have it."""
     verdicts = [run.verdict for run in data.runs.values()]
     doubts = [(_HISTORIES, text) for text in _merge_doubts([v.doubts for v in verdicts])]
-    if data.verdict_range is not None:
-        doubts += [(_VARIATIONS, text) for text in _doubt_displacement(data, data.verdict_range)]
-        doubts += [(_VARIATIONS, doubt.cause) for doubt in data.verdict_range.doubts]
-        if fill := list_elastic_fill(data):
-            text = (
-                f"variations take {', '.join(fill)} as rigid: as an elastic body it was not varied"
-            )
-            doubts.append((_VARIATIONS, text))
+    for found in data.verdict_ranges:
+        doubts += [(_VARIATIONS, text) for text in _doubt_displacement(data, found)]
+        doubts += [(_VARIATIONS, doubt.cause) for doubt in found.doubts]
+    if data.verdict_ranges and (fill := list_elastic_fill(data)):
+        text = f"variations take {', '.join(fill)} as rigid: as an elastic body it was not varied"
+        doubts.append((_VARIATIONS, text))
     for name, stated in data.statements.items():
         doubts += [(RESULTS[name], doubt) for doubt in stated.doubts]
     return list(dict.fromkeys(doubts))
@@ -454,13 +504,13 @@ def list_unvaried(data: ReportData) -> list[str]:
     if not data.runs:
         return []
     single = ["motion"] if len(data.runs) == 1 else []
-    if data.verdict_range is None:
+    if not data.verdict_ranges:
         single += ["lengths", "stiffness", "friction", "damping"]
     else:
         single.append("lengths")
-        motion = data.verdict_range.dataset.attrs.get("motion", "")
-        others = f"displacements under other motions than '{motion}'"
-        single += [others] if motion and len(data.runs) > 1 else []
+        varied = {each.dataset.attrs.get("motion", "") for each in data.verdict_ranges}
+        left = [f"'{name}'" for name in data.runs if name not in varied and len(data.runs) > 1]
+        single += [f"properties under {join_words(left)}"] if left and "" not in varied else []
     single += ["stiffness and strength of the fill"] if list_elastic_fill(data) else []
     # the samples of a rate were scaled until they fell
     single += [] if {"scale", "risk"} & data.statements.keys() else ["size of the motions"]

@@ -185,7 +185,10 @@ def _command_rows(data: ReportData) -> Iterator[Row]:
             if key != "fill":
                 yield f"{section}: {key.replace('_', ' ')}", describe_value(value), "given"
         if section in _FUNCTIONS:
-            yield from _default_rows(section, table)
+            inherited = (
+                dict.fromkeys(data.case.assessment.of_limit) if section == "assessment" else {}
+            )
+            yield from _default_rows(section, {**inherited, **table})
         yield from _further_rows(data, section, table)
     if any(f"{name}.txt" in data.files for name in STATIC_RESULTS):
         for path, text, given in list_fill_values(data.case):
@@ -197,8 +200,9 @@ def _further_rows(data: ReportData, section: str, table: Mapping[str, Any]) -> I
     """Yield what a spectrum, the fill of an assessment and the vehicle of a rating imply."""
     if section == "assessment" and "spectrum" in table:
         yield from _spectrum_rows("assessment: spectrum", data.case.assessment.spectrum)
-    if section == "assessment" and "fill" in data.case.assessment.options.keys() - table:
-        yield "assessment: fill", "that of the limit analysis", "inferred"
+    if section == "assessment":
+        for key in data.case.assessment.of_limit:
+            yield f"assessment: {key}", "that of the limit analysis", "inferred"
     # a vehicle of one's own may have factors
     vehicle = table.get("vehicle")
     of_vehicle = set(vehicle) if isinstance(vehicle, Mapping) else set()

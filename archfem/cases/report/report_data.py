@@ -91,15 +91,25 @@ class ReportData:
     @property
     def is_static(self) -> bool:
         """Whether there are limit analysis, a rating or an assessment alone, without a model."""
-        found = {name for name in RESULTS if f"{name}.txt" in self.files}
+        found = {name for name in RESULTS if self.list_parts(f"{name}.txt")}
         modelled = found & {"pushover", "scale", "risk"} or self.runs
         return not modelled and bool(found.intersection(STATIC_RESULTS))
 
     @cached_property
-    def verdict_range(self) -> VerdictRange | None:
-        """Range of the verdict, if the folder has one."""
-        path = self.files.get("verdict_range.nc")
-        return None if path is None else VerdictRange.read(path)
+    def pairs(self) -> tuple[str, ...]:
+        """Names of the pairs of the case's suite, of which each may have results of its own."""
+        return tuple((self.case.suite or {}).get("pairs", ()))
+
+    def list_parts(self, name: str) -> dict[str, str]:
+        """List the files of a result in the folder, by pair; that of all pairs is under ""."""
+        places = {"": name, **{pair: f"{pair}/{name}" for pair in self.pairs}}
+        return {pair: place for pair, place in places.items() if place in self.files}
+
+    @cached_property
+    def verdict_ranges(self) -> tuple[VerdictRange, ...]:
+        """Ranges of the verdict in the folder, at most one for each motion."""
+        parts = self.list_parts("verdict_range.nc").values()
+        return tuple(VerdictRange.read(self.files[place]) for place in parts)
 
     def read_result(
         self, name: str, caption: str = "", figure: str = "", table: str = ""
@@ -118,10 +128,14 @@ class ReportData:
     @cached_property
     def statements(self) -> dict[str, Statement]:
         """What the commands state of their results, by the names of their files."""
-        read = {name: json.loads(self.read_text(f"{name}.json") or "{}") for name in RESULTS}
-        # that of an earlier version may have others
-        known = (each for each in read.items() if each[1].keys() == set(Statement._fields))
-        return {name: Statement(**values) for name, values in known}
+        found: dict[str, dict[str, Statement]] = {name: {} for name in RESULTS}
+        for name, by_pair in found.items():
+            for pair, place in self.list_parts(f"{name}.json").items():
+                values = json.loads(self.read_text(place) or "{}")
+                # that of an earlier version may have others
+                if values.keys() == set(Statement._fields):
+                    by_pair[pair] = Statement(**values)
+        return {name: _join_statements(by_pair) for name, by_pair in found.items() if by_pair}
 
     @cached_property
     def files(self) -> dict[str, Path]:
@@ -153,6 +167,19 @@ class ReportData:
             return []
         check_listed(self.files[name], self.files[name].read_bytes())
         return [FigureBlock.read(self.files[name], caption)]
+
+
+def _join_statements(by_pair: Mapping[str, Statement]) -> Statement:
+    """Join what is stated of a result under each pair of a suite; doubts are of their pair."""
+    named = [
+        (f"under '{pair}': " if pair else "", statement) for pair, statement in by_pair.items()
+    ]
+    return Statement(
+        [text for _, each in named for text in each.sentences],
+        [row for _, each in named for row in each.rows],
+        [f"{under}{doubt}" for under, each in named for doubt in each.doubts],
+        [f"{under}{note}" for under, each in named for note in each.notes],
+    )
 
 
 def rebuild_motion(run: History, name: str) -> Motion:

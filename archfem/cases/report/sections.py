@@ -337,9 +337,19 @@ def _define_assessment(data: ReportData) -> Grid:
 
 
 def _build_scale(data: ReportData) -> list[Any]:
-    """Build the text of a search of scales, with its runs by time step and outcome."""
-    blocks = data.read_result("scale")
-    if (runs := data.read_text("scale.csv")) is None:
+    """Build text and picture of each search of scales, with its runs by time step and outcome."""
+    return [
+        block
+        for pair, place in data.list_parts("scale.txt").items()
+        for block in _build_search(data, place.removesuffix(".txt"), pair)
+    ]
+
+
+def _build_search(data: ReportData, name: str, pair: str) -> list[Any]:
+    """Build text, picture and runs of a search of scales under one motion."""
+    under = f" under '{pair}'" if pair else ""
+    blocks = data.read_result(name, f"Residual displacement{under} over the scale of the motion.")
+    if (runs := data.read_text(f"{name}.csv")) is None:
         return blocks
     scales: dict[tuple[str, str], list[str]] = {}
     for step, scale, outcome, *_ in [*reader(runs.splitlines())][1:]:
@@ -347,7 +357,8 @@ def _build_scale(data: ReportData) -> list[Any]:
     rows = [(*key, ", ".join(found)) for key, found in scales.items()]
     head = ("time step", "the structure", "at the scales [× the motion]")
     text = blocks[0].text.rpartition("\n\n")[0]
-    return [TextBlock(text, "lines"), Grid(head, rows, "Runs of the search", "words")]
+    table = Grid(head, rows, f"Runs of the search{under}", "words")
+    return [TextBlock(text, "lines"), *blocks[1:], table]
 
 
 def _build_study(data: ReportData) -> list[Any]:
@@ -375,18 +386,25 @@ def _build_range(data: ReportData) -> list[Any]:
     """Build text and picture of the range; without a fall its table says nothing."""
     caption = (
         "Residual displacement over the properties that explain most of it, at most six; falls are "
-        "above the line, and displacements below the axis at its lower end."
+        "above a dashed line, and displacements below the axis at its lower end."
     )
     table = (
         "Falls by the value of each property: of k_n, k_s and damping ratio factors on the values "
         "of the case, of friction what is added"
     )
-    blocks, found = data.read_result("verdict_range", caption, table=table), data.verdict_range
-    if found is not None and not found.falls.any():
-        told = filter(None, [found.sentence, found.displacements])
-        words = f"{'; '.join(told)}; varied: {', '.join(found.properties)}"
-        return [TextBlock(sentence(words.replace("_", " "))), *blocks[1:]]
-    return blocks
+    built, ranges = list[Any](), iter(data.verdict_ranges)
+    for pair, place in data.list_parts("verdict_range.txt").items():
+        # the picture of a pair is named by it, since there may be several
+        named = f"Under '{pair}': {caption[:1].lower()}{caption[1:]}" if pair else caption
+        blocks = data.read_result(place.removesuffix(".txt"), named, table=table)
+        # a command without an answer leaves its reason alone
+        found = next(ranges) if place.replace(".txt", ".nc") in data.files else None
+        if found is not None and not found.falls.any():
+            told = filter(None, [found.sentence, found.displacements])
+            words = f"{'; '.join(told)}; varied: {', '.join(found.properties)}"
+            blocks[:1] = [TextBlock(sentence(words.replace("_", " ")))]
+        built += blocks
+    return built
 
 
 def build_method_section(data: ReportData) -> Section:
@@ -395,7 +413,7 @@ def build_method_section(data: ReportData) -> Section:
     suite, assessment = (data.case.settings.get(key, {}) for key in ("suite", "assessment"))
     given = filter(None, [suite.get("target"), assessment.get("spectrum")])
     spectra = [("design spectrum", text) for text in dict.fromkeys(map(describe_value, given))]
-    used = [row[1:] for row in _METHODS if not row[0] or row[0] in data.files]
+    used = [row[1:] for row in _METHODS if not row[0] or data.list_parts(row[0])]
     used = [row for row in used if data.runs or row[0] != "joints, criteria"]
     return Section("Norms and methods", [Grid((), [*norm, *spectra, *used])])
 

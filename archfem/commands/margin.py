@@ -1,0 +1,121 @@
+"""Commands on the margin under each motion of a case: range of the verdict, scale of a fall."""
+
+import argparse
+from functools import wraps
+from pathlib import Path
+
+from archfem._display import DOUBT_MARK, write_progress_line
+from archfem._files import create_result_folder, intact_file_list, path_inside, read_listed
+from archfem.cases import result_text
+from archfem.cases.case import Case
+from archfem.commands.cli import ExitCode
+from archfem.commands.run import (
+    Command,
+    doubt_code,
+    keep_attempt,
+    name_group,
+    record_doubts,
+    write_results,
+)
+from archfem.dynamics.collapse_state import DISLOCATION, shallowest_part
+from archfem.dynamics.motion_scaling import (
+    INTERRUPTED_SEARCH,
+    CollapseScale,
+    MechanismScales,
+    collapse_scale,
+    mechanism_scales,
+)
+from archfem.errors import InvalidInput
+from archfem.motion.motion import Motion
+from archfem.view.style import Files
+
+# Modules of studies are slow to import, and imported where they are needed.
+
+
+def _for_each_pair(command: Command) -> Command:
+    """Let a command of one motion follow each pair of a suite, unless one is named."""
+
+    @wraps(command)
+    def follow(options: argparse.Namespace) -> int:
+        suite = Case.read(options.case, options.changes).suite
+        if suite is None or options.pair is not None:
+            return command(options)
+        codes = []
+        for number, pair in enumerate(suite["pairs"]):
+            words = f"pair {number + 1} of {len(suite['pairs'])}, '{pair}'"
+            write_progress_line(command.__name__, words)
+            codes.append(command(argparse.Namespace(**{**vars(options), "pair": pair})))
+        return max(codes)
+
+    return follow
+
+
+@_for_each_pair
+@keep_attempt("verdict_range")
+def verdict(options: argparse.Namespace) -> int:
+    """Run a case over joint rules, stiffness, friction and damping: how often does it fall?"""
+    from archfem.studies.variations import verdict_range
+
+    case = Case.read(options.case, options.changes)
+    motion = _choose_motion(case, options)
+    print(case.title)
+    folder = None if options.out is None else path_inside(Path(options.out), "variations")
+    sampling = {"workers": options.workers, "samples": options.samples, "folder": folder}
+    computed = verdict_range(case.analysis, motion, fidelity="rigid", **sampling)
+    own: Files = {"verdict_range.nc": computed.save, "verdict_range.txt": str(computed)}
+
+    def draw() -> Files:
+        return own | {"verdict_range.png": computed.plot()}
+
+    write_results("verdict", case, options.out, str(computed), draw, options.pair)
+    return ExitCode.DOUBTFUL if computed.doubts else 0
+
+
+def _choose_motion(case: Case, options: argparse.Namespace) -> Motion:
+    """Return the motion of a case, or the pair of its suite that is named; make the folder."""
+    from archfem.studies.cache import ground_motion
+
+    if options.out is not None:  # a folder that cannot be written is refused before the runs
+        create_result_folder(options.out)
+    return ground_motion(case if options.pair is None else case.alone(options.pair))
+
+
+@_for_each_pair
+@keep_attempt("scale")
+def scale(options: argparse.Namespace) -> int:
+    """Scale the motion of a case until it falls, or forms a mechanism in small displacements."""
+    case = Case.read(options.case, options.changes)
+    if (kept := _read_finished_scale(case, options)) is not None:
+        print(f"{case.title}\n{kept}")
+        return doubt_code(kept.splitlines())
+    motion = _choose_motion(case, options)
+    found: CollapseScale | MechanismScales
+    search = collapse_scale if case.analysis.displacements == "large" else mechanism_scales
+    with record_doubts(case.structure) as doubts:
+        found = search(case.analysis, motion)
+    doubts += [f"{DOUBT_MARK}{doubt}" for doubt in found.doubts]
+    text = "\n".join([f"{motion.name}: {found}", *dict.fromkeys(doubts), "", found.table()])
+    files: Files = {"scale.txt": text, **result_text.state_scale(found, motion, doubts)}
+    if isinstance(found, CollapseScale):
+        from archfem.view.studies import draw_scale
+
+        limit = DISLOCATION * shallowest_part(case.structure)[0]
+        files["scale.png"] = draw_scale(found, limit)
+    write_results("scale", case, options.out, f"{case.title}\n{text}", lambda: files, options.pair)
+    if found.interrupted:
+        raise KeyboardInterrupt
+    return doubt_code(doubts)
+
+
+def _read_finished_scale(case: Case, options: argparse.Namespace) -> str | None:
+    """Return the text of a finished search under the same pair of the same case, or None."""
+    if options.out is None or options.pair is None:
+        return None
+    group = intact_file_list(Path(options.out)).get(name_group("scale", options.pair))
+    if group is None or group.inputs != case.hash_inputs():
+        return None
+    try:
+        text = read_listed(Path(options.out), f"{options.pair}/scale.txt").decode("utf-8").strip()
+    except InvalidInput:  # deleted, or changed
+        return None
+    return None if text.startswith("no answer") or INTERRUPTED_SEARCH in text else text
