@@ -139,13 +139,10 @@ class Case:
         """
         if "structure" not in settings and {"case", "cases"} & set(settings):
             raise InvalidInput("this is a study of cases: compute it by `archfem study`")
-        _refuse_misplaced(settings)
+        _check_sections(settings)
         refuse_unknown(settings, ("title", "extensions", *SECTIONS))
         provenance.load_extensions_of(settings, folder)
         check_words(settings.get("title", ""), "title", 'write words in quotes: title = "…"')
-        for key in SECTIONS:
-            if not isinstance(settings.get(key, {}), dict):
-                raise InvalidInput(f"{key} = {settings[key]!r} is not a table: write [{key}]")
         output = check_table(settings.get("output", {}), OUTPUT_KEYS, "output")
         report = _read_report(settings)
         motion, suite, push = (settings.get(key) for key in ("motion", "suite", "pushover"))
@@ -356,13 +353,16 @@ def _section_keys() -> Mapping[str, frozenset[str]]:
     return {section: frozenset(own) for section, own in keys.items()}
 
 
-def _refuse_misplaced(settings: Table) -> None:
-    """Refuse keys that only other sections have; the message names these."""
+def _check_sections(settings: Table) -> None:
+    """Refuse sections that are no tables, and keys that only other sections have."""
+    for key in SECTIONS:
+        if not isinstance(settings.get(key, {}), dict):
+            raise InvalidInput(f"{key} = {settings[key]!r} is not a table: write [{key}]")
     known = _section_keys()
     tables = {"": settings, **{name: settings.get(name, {}) for name in known}}
     for section, table in tables.items():
         own = known[section] if section else {"title", "extensions", "base", "remove", *SECTIONS}
-        for key in set(table).difference(own) if isinstance(table, Mapping) else ():
+        for key in set(table).difference(own):
             if homes := [f"{name}.{key}" for name, keys in known.items() if key in keys]:
                 place = f"{section}.{key}" if section else key
                 raise InvalidInput(f"unknown key '{place}': it is {' or '.join(homes)}")

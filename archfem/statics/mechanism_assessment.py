@@ -31,21 +31,17 @@ from archfem._files import align_columns
 from archfem._typing import Array
 from archfem._validation import check_between, check_choice, validate_arguments
 from archfem.errors import DidNotConverge, InvalidInput, logger
-from archfem.limit.backfill import BlocksWithFill, FillProfile, attach_fill
+from archfem.limit.backfill import attach_fill
 from archfem.limit.collapse import collapse_factor
 from archfem.limit.displaced_blocks import (
     TOUCHING,
-    FillPressure,
     KinematicChain,
     PlacedBlocks,
     classify_motion,
-    find_mechanism,
 )
 from archfem.limit.fill_range import FillAssumption, vary_fill
 from archfem.limit.fill_strength import Fill, PlasticFill
 from archfem.limit.finite_mechanism import MechanismPath, PathEnd, PathFollower
-from archfem.limit.linear_programme import NoEquilibrium
-from archfem.limit.mechanism_kinematics import find_rigid_regions
 from archfem.limit.mechanism_names import name_mechanism
 from archfem.masonry.loads import AttachedLoad, BodyForce
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
@@ -70,6 +66,13 @@ from archfem.statics.assessment_checks import (
     AssessmentCheck,
     LimitState,
     add_fill_ranges,
+)
+from archfem.statics.first_mechanism import (
+    DoesNotStand,
+    find_first_mechanism,
+    press_stones,
+    select_joints,
+    take_fill_as_loads,
 )
 from archfem.units import STANDARD_GRAVITY
 
@@ -355,13 +358,13 @@ class _Search:
         """Return the assessment with a fill, whose horizontal forces act at a lever."""
         filled = None if fill is None else attach_fill(self.structure, fill)
         whole = self.structure if filled is None else filled.whole
-        stones, weights = _take_fill_as_loads(whole, lever)
-        joints = _select_joints(stones, self.part, self.blocks)
-        pressure = None if filled is None else _press_stones(filled)
+        stones, weights = take_fill_as_loads(whole, lever)
+        joints = select_joints(stones, self.part, self.blocks)
+        pressure = None if filled is None else press_stones(filled)
         loads = (*weights, *self.loads)
         placed = PlacedBlocks.at_rest(stones, loads, self.direction, pressure)
         friction = stones.friction if self.friction else np.full(len(stones.joints), np.inf)
-        mechanism = _find_first_mechanism(placed, joints, friction)
+        mechanism = find_first_mechanism(placed, joints, friction)
         given = self.spectrum, self.rules, self.confidence_factor
         if mechanism is None:
             return _Oscillator(placed, None, 0, bool(weights), *given).assess(self.q)
@@ -443,13 +446,9 @@ class _Search:
             if (place, assumed) != (lever, fill):
                 try:
                     others[assumption] = self.assess(place, assumed)
-                except _DoesNotStand:
+                except DoesNotStand:
                     others[assumption] = None
         return others
-
-
-class _DoesNotStand(InvalidInput):
-    """The structure does not stand under its own weight and the attached loads."""
 
 
 @validate_arguments
@@ -515,78 +514,6 @@ def _check_structure(
             "the safe side, and joints slide that might hold; collapse_factor counts cohesion",
             cohesion,
         )
-
-
-def _take_fill_as_loads(
-    structure: Structure, lever: float
-) -> tuple[Structure, tuple[AttachedLoad, ...]]:
-    """Return the stones without yielding bodies, and the weight of these on each stone."""
-    if not find_yielding_blocks(structure):
-        return structure, ()
-    regions = find_rigid_regions(structure)
-    stones = np.isin(np.arange(len(structure.blocks)), regions.blocks)
-    stone, place, weight = FillProfile(structure, stones).columns(lever)
-    loads = []
-    for number in np.unique(stone):
-        own = stone == number
-        if not structure.blocks[number].fixed and weight[own].sum() > 0.0:
-            x, y = np.average(place[own], axis=0, weights=weight[own])
-            name = structure.blocks[number].name
-            loads.append(AttachedLoad(name, (float(x), float(y)), float(weight[own].sum())))
-    return regions.structure, tuple(loads)
-
-
-def _press_stones(filled: BlocksWithFill) -> FillPressure:
-    """Return the forces of a fill on the stones, from its active pressure to its passive one."""
-    contacts, width = filled.contacts, filled.whole.width
-    ranges = contacts.least, contacts.most - contacts.least
-    points, forces = zip(*(contacts.thrust(each, width) for each in ranges), strict=True)
-    return FillPressure(contacts.block, np.array(points), np.array(forces), contacts.shared)
-
-
-def _select_joints(
-    structure: Structure, part: str | None, blocks: Sequence[int | str] | None
-) -> list[int]:
-    """Return the joints that may open or slip."""
-    if part is not None and blocks is not None:
-        raise InvalidInput("part and blocks are both given: name either a part or its blocks")
-    if part is not None:
-        parts = list(dict.fromkeys(structure.blocks[k].part for k in structure.free))
-        if part not in parts:
-            raise InvalidInput(f"there is no part {part!r} that moves: use one of {parts}")
-        chosen = {k for k in structure.free if structure.blocks[k].part == part}
-    elif blocks is not None:
-        chosen = {structure.block_number(block) for block in blocks} & set(structure.free)
-        if not chosen:
-            raise InvalidInput(
-                f"blocks {list(blocks)} has none that moves: name some of "
-                f"{join_names([structure.blocks[k].name for k in structure.free])}"
-            )
-    else:
-        chosen = set(structure.free)
-    return [k for k, pair in enumerate(structure.pairs.tolist()) if chosen & set(pair)]
-
-
-def _find_first_mechanism(
-    placed: PlacedBlocks, joints: list[int], coefficient: Array
-) -> KinematicChain | None:
-    """Return the mechanism of least factor at rest; None where there is none."""
-    refusal = _DoesNotStand(
-        f"{placed.structure.name} does not stand under its own weight and the attached loads: "
-        "af.stands and `archfem check` say why"
-    )
-    # At rest constant forces may be missing: a tie pulls only once the mechanism moves.
-    weights = tuple(replace(load, force=(0.0, 0.0)) for load in placed.loads)
-    opposite = replace(placed, loads=weights, direction=-placed.direction)
-    try:
-        mechanism = find_mechanism(placed, joints, coefficient)
-        # The least factor in the other direction is below zero where it stands only if pushed.
-        others = [find_mechanism(opposite, joints, coefficient)]
-    except NoEquilibrium as error:
-        raise refusal from error
-    if any(found is not None and found.factor <= 1e-9 for found in (mechanism, *others)):
-        raise refusal
-    return mechanism
 
 
 @dataclass(frozen=True, eq=False)
