@@ -258,9 +258,8 @@ class Rating(ResultDisplay):
         every = {float(self.moving.position + sense * ahead) for ahead in axles[:, 1]}
         others = _name_places(every - {*stand})
         only = [name.strip("'") for name in over] if over else list(spans)
-        apart = [x - spans[only[0]][0] for x in stand]
-        inside = len(only) == 1 and min(apart) >= 0.0
-        clear = f", {_name_places(apart)} m from the left clear springing" if inside else ""
+        apart = _name_places([x - spans[only[0]][0] for x in stand])
+        clear = f", {apart} m from the left clear springing" if len(only) == 1 else ""
         count = f"{len(stand)} axle{'s'[: len(stand) - 1]}"
         count += f" of {len(axles)}" if len(axles) > len(stand) else ""
         ends = np.array([*spans.values()])

@@ -218,7 +218,7 @@ def draw_worst_places(ratings: Sequence[Rating]) -> Figure:
     low, high = outline_bounds(structure)
     # a page prints figures as high as 94 mm in full width
     tall = (0.5 * Size.PAGE - 0.2) * (high[1] - low[1]) / (high[0] - low[0]) + 0.3
-    figure = new_figure(Size.PAGE, 0.4 + count * tall)
+    figure = new_figure(Size.PAGE, 0.4 + min(count * tall, 3.25))
     rows = [figure.add_subplot(count, 2, 1 + k) for k in range(len(drawn))]
     for found, axes in zip(drawn, rows, strict=True):
         worst, factors, strips = _take_axles_as_given(found)

@@ -177,8 +177,9 @@ def test_demand_and_capacity_stand_beside_their_doubts(kept, undrawn):
         ),
     ]
     texts = [each.text for each in sentences if each.kind == "words"]
-    assert texts[0] == (
-        "For 0.25 g, 475 years: the structure forms no mechanism under all 2 motions of PGA "
+    assert texts[0] == "Demand, as stated: 0.25 g, 475 years."
+    assert texts[1] == (
+        "The structure forms no mechanism under all 2 motions of PGA "
         "0.05 g. The least margin is 0.5 (0.45 with one weight a body), on the spectrum of the "
         "motion, by a code, right and left, which it fails. The runs have a vertical motion "
         "too, of up to 0.03 g; limit analysis and kinematic assessment have none. The "
@@ -186,7 +187,7 @@ def test_demand_and_capacity_stand_beside_their_doubts(kept, undrawn):
         "stiffness, friction, damping, time step and fidelity "
         "were not varied, and displacements have no range."
     )
-    assert texts[1:] == [
+    assert texts[2:] == [
         "In doubt, limit analysis: A made one.",
         "In doubt, kinematic assessment: An upper bound.",
         "Note, kinematic assessment: Faces slide flat.",
@@ -195,8 +196,9 @@ def test_demand_and_capacity_stand_beside_their_doubts(kept, undrawn):
     assert facts["in doubt"] == "limit analysis, kinematic assessment"
     assert facts["verdict"] == "no mechanism in 2 of 2 runs; fails a code, right and left"
     alone = report_data.ReportData(case, {}, found.folder)
-    lead = build_conclusion(alone).pieces[0].text
-    assert lead.startswith("For 0.25 g, 475 years: limit analysis: it turns, at 4.8 times the load")
+    question, lead = (piece.text for piece in build_conclusion(alone).pieces[:2])
+    assert question == texts[0]
+    assert lead.startswith("Limit analysis: it turns, at 4.8 times the load")
     assert "The least margin is 0.5 (0.45 with one weight a body), on the spectrum of the" in lead
     outcomes = "the given load: it turns, at 4.8 times the load, factor 4.8; LM1: passes without "
     outcomes += "all, factor 1.25; 2.844 m/s² of the spectrum of the motion: 8.212 m/s², passes, "
@@ -782,9 +784,17 @@ def test_of_several_vehicles_a_table_has_the_factors(small, undrawn):
         texts = "vehicle  factor", "Rating of 'it'", "Rating of other"
         files = {"rating.txt": "\n\n".join(texts), "vehicles.csv": "\n".join(rows)}
         files["rating.toml"] = '[rating]\nvehicle = "LM71"'
+        files["rating_variations.csv"] = "with,factor\nrings a tenth thinner,1.3"
         write_files(files, draft)
+        for name in ("vehicles", "places", "rating"):
+            (draft / f"{name}.png").write_bytes(b"\x89PNG" + bytes(20))
     data = report_data.ReportData(case, {}, folder)
-    grid, *found = _build_rating(data)
+    grid, every, places, *found, varied, figure = _build_rating(data)
+    assert every.caption == "Factor of each vehicle over its place."
+    assert places.caption == "Each vehicle at its worst place."
+    assert varied.rows == [["rings a tenth thinner", "1.3"]]
+    assert varied.caption == "Factor with one property changed at a time, LM71"
+    assert figure.caption.endswith("mechanism at the worst place, LM71")
     assert data.read_table("rating") == {"vehicle": "LM71, LM1"}
     assert (grid.head, grid.rows) == (["vehicle", "factor"], [["LM71", "1.5"], ["LM1", "1.9"]])
     assert [each.text for each in found] == [*texts[1:]]  # without the same table

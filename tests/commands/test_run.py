@@ -767,34 +767,47 @@ def test_vehicles_are_rated_together(tmp_path, unplotted, capsys, monkeypatch):
     assert {*rows["vehicle"][1:]} == {"LM1", "HL93-tandem", "HL93-truck"}
     assert (np.diff(rows["factor"][1:]) >= 0.0).all()
     assert rows["factor"][0] > rows["factor"][1]
-    case = af.Case.read(path)
+    case, stated = af.Case.read(path), []
     for _, (name, factor, *_) in rows.iterrows():
         vehicle = case.rating["vehicle"] if name == "cart" else name
         found = af.rate(case.structure, vehicle)
         assert factor == float(f"{found.factor:.4g}")
-        assert str(found) in said
+        # what all vehicles have stands once
+        lines = str(found).splitlines()
+        assert {*lines} <= {*said.splitlines()}
+        shared = "every x is that of the case and the picture; "
+        assert said.count(shared) == 1
+        stated += [repr(found), *found.describe_codes()]
         if name == "cart":
             assert (out / "rating.csv").read_text().strip() == found.table()
             table = tomllib.loads((out / "rating.toml").read_text())["rating"]
             assert table["vehicle"]["name"] == name
-            first = [repr(found), *found.describe_codes()]
-        if name == rows["vehicle"][1]:
-            worst = f"least of 4 vehicles: {found!r}"
-    # a conclusion is on the vehicle of the case, and names the worst of all
-    stated = json.loads((out / "rating.json").read_text())
-    assert stated["sentences"] == [*first, worst]
-    assert [row[1] for row in stated["rows"]] == [*rows["vehicle"]]
+            codes = [f"cart {code}" for code in found.by_codes]
+    # a conclusion states each vehicle by itself, that of the case first, by codes too
+    kept = json.loads((out / "rating.json").read_text())
+    assert kept["sentences"] == stated
+    names = [*rows["vehicle"]]
+    assert [row[1] for row in kept["rows"]] == [names[0], *codes, *names[1:]]
+    assert len(codes) == 4
+    assert "left out: a second lorry that meets the vehicle" in str(kept["notes"])
     text = (out / "rating.txt").read_text().strip()
     assert text in said
     assert [line.split()[0] for line in text.splitlines()[1:5]] == [*rows["vehicle"]]
     assert af.commands.main(["rate", str(path), "--out", str(out)]) == 0
     assert [*pd.read_csv(out / "vehicles.csv")["vehicle"]] == ["van", "cart"]
+    # a code's vehicle is no one's own, though the case names it first
+    path.write_text(path.read_text().replace(own, f'"LM1", {own}'))
+    assert af.commands.main(["rate", str(path), "--out", str(out)]) == 0
+    assert [*pd.read_csv(out / "vehicles.csv")["vehicle"]] == ["van", "cart", "LM1"]
+    path.write_text(path.read_text().replace('"LM1", ', ""))
     assert af.commands.main(["rate", str(path), "--vehicle", "bus"]) == 1
     said = capsys.readouterr().err
     assert "'bus' is not known: use one of 'cart' of the case, 'van' of the case, LM1, " in said
     assert said.endswith("HL93-truck; or Eurocode, CS454, HL93, each for all of a code\n")
     assert af.commands.main(["rate", str(path), "--vehicle", "van", "--out", str(out)]) == 0
-    assert not {"vehicles.csv", "vehicles.png"} & {each.name for each in out.iterdir()}
+    assert not {"vehicles.csv", "vehicles.png", "places.png"} & {
+        each.name for each in out.iterdir()
+    }
     assert "van" in (out / "rating.toml").read_text()
 
 

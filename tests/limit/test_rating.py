@@ -8,7 +8,8 @@ import pytest
 from backfilled import arch_bridge
 
 import archfem as af
-from archfem.cases.result_text import state_ratings, tabulate_ratings
+from archfem.cases.analysis_keys import LimitAnalysis
+from archfem.cases.result_text import doubt_rating, state_ratings, tabulate_ratings
 from archfem.limit import VEHICLES, Vehicle, rating
 from archfem.limit.rating import _places_along as places_along
 
@@ -230,6 +231,17 @@ def test_a_vehicle_spreads_over_its_wheels_and_the_fill_up_to_a_lane():
         bridge = arch_bridge(voussoirs=4, cover=cover, width=4.0)
         assert VEHICLES[name].spread_over(bridge) == pytest.approx(width, abs=1e-6), (name, cover)
         assert VEHICLES[name].spread_over(replace(bridge, width=1.2)) == 1.2
+    single = VEHICLES["CS454-single"]
+    for cover, words in (
+        (0.3, "1.8 m of width: 1.5 m over the wheels and 0.3 m of fill above the crown, never "),
+        (1.2, "2.5 m of width: all of a lane, never more than a lane of 2.5 m (BD 21/01: "),
+    ):
+        bridge = arch_bridge(voussoirs=4, cover=cover, width=4.0)
+        said = single.describe_width(bridge, single.spread_over(bridge))
+        assert said.startswith(f"over {words}")
+    assert single.describe_width(replace(bridge, width=1.2), 1.2).startswith(
+        "over 1.2 m of width: all of the bridge, never more than"
+    )
 
 
 def test_the_depth_of_fill_is_found_beside_its_ends_too():
@@ -301,7 +313,7 @@ def test_the_least_factor_of_bare_stones_is_at_the_end_of_one(spacings, monkeypa
     assert factors[0] == pytest.approx(factors[1], rel=1e-4)  # within hundredths of a millimetre
     around = np.linspace(-0.05, 0.05, 41) + found.moving.position
     near = af.moving_load(ring, vehicle.axles, spacings=spacings, positions=around.tolist()).worst
-    assert factors[0] <= (1.0 + EXACT) * near.factor / vehicle.live
+    assert factors[0] <= (1.0 + EXACT) * near.factor
     assert near.factor == pytest.approx(factors[0], rel=0.02)
 
 
@@ -329,7 +341,8 @@ def test_words_and_table(lorry_rating):
     places = sorted(lorry_rating.moving.position + sense * np.array([1.6, -1.6]))
     (beside,) = (x for x in places if not 0.0 < x < 9.0)  # ends of the fill
     (x,) = {*places} - {beside}
-    stands = f"1 axle of 2 at x = {x:.2f} m (the other at {beside:.2f} m), "
+    clear = f"{x - CLEAR_FROM:.2f} m from the left clear springing"
+    stands = f"1 axle of 2 at x = {x:.2f} m, {clear} (the other at {beside:.2f} m), "
     assert f"factor {lorry_rating.factor:.4g} with {stands}" in repr(lorry_rating)
     assert ("passes" in repr(lorry_rating)) == (lorry_rating.factor >= 1.0)
     head, *rows = lorry_rating.table().splitlines()
@@ -474,7 +487,7 @@ def test_places_of_axles_are_of_the_span_that_is_loaded(monkeypatch):
     assert f"with 2 axles of 3 over '{fails}' at x = " in repr(found)
     sense = 1.0 if found.moving.direction == "right" else -1.0
     tractor = found.moving.position + 2.5 * sense
-    assert f" m (the other at {tractor:.2f} m), " in repr(found)
+    assert f" springing (the other at {tractor:.2f} m), " in repr(found)
     monkeypatch.setattr(rating, "_places_along", lambda *_: (min(inner) - 20.0,))
     found = af.rate(bridge, Vehicle("long", (1e3, 1e3, 1e3), (2.0, 40.0)))
     assert f"with 1 axle of 3 over 'right arch' at x = {min(inner) + 1.0:.2f} m" in repr(found)
@@ -502,6 +515,24 @@ def test_a_verdict_says_which_parts_of_the_fill_it_rests_on(lorry_rating):
     assert "over what is assumed" not in replace(least, full_pressure=np.nan).outcome
 
 
+@pytest.mark.parametrize(
+    ("given", "noted"),
+    [
+        ({"mobilisation": 0.14}, True),
+        ({"mobilisation": 0.15}, False),
+        ({"mobilisation": 0.0}, True),
+        ({"mobilisation": 0.0, "active": 0.0}, False),
+    ],
+)
+def test_a_mobilisation_below_the_active_pressure_is_noted(lorry_rating, given, noted):
+    """Of 27° the active pressure is 1 / K_p² = 0.141 of the passive one."""
+    other = af.limit.Fill(friction_angle=27.0, **given)
+    notes = doubt_rating(replace(lorry_rating, fill=other), LimitAnalysis([], "coulomb", 1e7))
+    words = f"note: mobilisation {given['mobilisation']:.2g} counts as 0.14, the active pressure"
+    assert any(note.startswith(words) for note in notes) == noted
+    assert notes[-1].startswith("note: left out: a second lorry that meets the vehicle")
+
+
 def test_a_rating_with_backing_has_the_factor_without_it(monkeypatch):
     monkeypatch.setattr(rating, "_places_along", lambda *_: (6.5,))
     backed, axle = replace(GRAVEL, backing=0.6), Vehicle("axle", (1e4,))
@@ -520,62 +551,97 @@ def test_a_rating_with_backing_has_the_factor_without_it(monkeypatch):
         pytest.param("own", {"live": 1.5}, "impact", marks=pytest.mark.slow),
         pytest.param("own", {"impact": 1.3}, "live", marks=pytest.mark.slow),
         ("own", {"live": 1.5, "impact": 1.3}, ""),
+        ("own", {"live": 1.1, "impact": 1.0}, ""),
+        ("alone", {}, ""),
         ("by span", {"live": 1.45}, "impact"),
         ("LM2", {}, ""),
     ],
 )
 def test_a_vehicle_without_factors_passes_on_a_condition(vehicle, given, missing):
     """Those of LM2 are in its weights, and the one of LM71 depends on the span."""
-    stone = column_under_axle(width=100.0)
+    stone = column_under_axle(width=10.0)
     own, light = Vehicle("axle", (10e3,)), VEHICLES["LM2"]
+    alone = replace(own, live=1.0, impact=1.0)
     by_span = replace(own, impact_source=VEHICLES["LM71"].impact_source)
-    driven = {"own": own, "by span": by_span, "LM2": light}[vehicle]
-    found = af.rate(stone, replace(driven, wheels=100.0, lane=100.0), **given)
+    driven = {"own": own, "by span": by_span, "LM2": light, "alone": alone}[vehicle]
+    found = af.rate(stone, replace(driven, wheels=10.0, lane=10.0), dead=10.0, **given)
     condition = f" if the code's {missing} is at most {found.factor:.4g}" if missing else ""
     assert str(found).splitlines()[0].endswith(f"(the vehicle's middle), passes{condition}")
-    assert ("no code's live × impact is in it" in str(found)) == (missing == "live × impact")
     (live, impact) = (line for line in str(found).splitlines() if line[:6] in ("live l", "impact"))
     assert ("(none" in live) == ("live" in missing)
     assert ("(none" in impact) == ("impact" in missing)
 
 
-def _say_codes(found):
-    """Return the line of a rating on the factors of codes."""
-    (line,) = (line for line in str(found).splitlines() if "in traffic" in line)
-    return line
-
-
-def test_factors_of_codes_are_stated_beside_given_ones():
+def test_factors_of_codes_are_stated_with_outcome_and_range():
     """Against ratings with these factors; those of CS 454 search the axle that has the impact."""
-    bridge, fill = arch_bridge(width=3.0, voussoirs=9), replace(GRAVEL, mobilisation=0.5)
+    bridge, fill = (
+        arch_bridge(width=3.0, voussoirs=9),
+        replace(GRAVEL, mobilisation=0.5, backing=0.6),
+    )
     lorry = Vehicle("lorry", (60e3, 115e3, 80e3), (2.2, 1.3), live=1.35, impact=1.4)
     on_worst_axle = replace(lorry, live=1.9, impact=1.8, impact_on="worst axle")
-    given, bare, good, by_cs454 = (
+    given, bare, good, alone, by_cs454 = (
         af.rate(bridge, each, fill=fill, **factors)
         for each, factors in (
             (lorry, {}),
-            (replace(lorry, live=1.0, impact=1.0), {}),
+            (replace(lorry, live=None, impact=None), {}),
             (lorry, {"impact": 1.2}),
+            (lorry, {"live": 1.1, "impact": 1.0}),
             (on_worst_axle, {}),
         )
     )
-    assert given.by_cs454 == pytest.approx(by_cs454.factor, rel=1e-3)  # nearest bounds alone
-    assert by_cs454.by_cs454 == pytest.approx(by_cs454.factor, rel=1e-3)
+    names = ("by Eurocodes on a good road (1.35 × 1.2, from memory)",)
+    names += ("by Eurocodes on a fair road (1.35 × 1.4, from memory)",)
+    names += ("alone at walking pace (1.1 × 1, from memory)",)
+    expected = dict(zip(names, (good, given, alone), strict=True))
+    code = "by CS 454 (1.9, and 1.8 on the worst axle, from memory)"
+    for found in (bare, given, good, alone):
+        assert [*found.by_codes] == [*names, code]
+        for name, other in expected.items():
+            factor, outcome = found.by_codes[name]
+            assert factor == pytest.approx(other.factor, rel=EXACT)
+            assert outcome == other.outcome  # with the ends of the range
+    least = f"{alone.without_either:.4g} to {alone.full_pressure:.4g} over what is assumed"
+    assert least in bare.by_codes[names[2]][1]
+    # in each state of fill and stones, by the nearest bounds alone
+    for state in ("factor", *rating._STATES[:-1]):
+        assert given.by_cs454[state] == pytest.approx(getattr(by_cs454, state), rel=1e-3), state
+    of_code = given.by_codes[code]
+    assert of_code[0] == given.by_cs454["factor"]
+    assert of_code[1].partition(" (")[0] == by_cs454.outcome.partition(" (")[0]
+    ends = f"({given.by_cs454['without_either']:.4g} to "
+    assert f"{ends}{given.by_cs454['full_pressure']:.4g} over" in of_code[1]
     assert by_cs454.factor < 0.7 * bare.factor / 1.9  # the impact counts
-    by_eurocodes = f"{given.factor:.4g} to {good.factor:.4g} by Eurocodes (1.89 to 1.62)"
-    by = f"{given.by_cs454:.4g} by CS 454 (1.9, and 3.42 on the worst axle), from memory"
-    codes = f"; as a lorry in traffic {by_eurocodes}, and {by}"
-    assert _say_codes(given) == f"bare axles {bare.factor:.4g}, live × impact 1.89 given{codes}"
-    assert _say_codes(bare) == f"no code's live × impact is in it{codes}"
-    assert _say_codes(by_cs454).startswith("live 1.9 and impact 1.8 given; as a lorry in traffic ")
-    assert "Eurocodes" not in _say_codes(by_cs454)  # another axle may be the worst
-    assert repr(given) in state_ratings([(given, [])]).sentences
-    assert _say_codes(given) in state_ratings([(given, [])]).sentences
+    factors = f"bare axles {bare.factor:.4g}, live × impact 1.89 given"
+    lines = [f"lorry {name}: factor {x:.4g}, {says}" for name, (x, says) in given.by_codes.items()]
+    assert given.describe_codes() == [factors, *lines]
+    assert bare.describe_codes()[0].startswith(f"lorry {names[0]}: factor ")
+    assert [*by_cs454.by_codes] == [code]  # for Eurocodes another axle may be the worst
+    (row, *rows), sentences = state_ratings([(given, [])])[1::-1]
+    assert [repr(given), factors, *lines] == sentences[:6]
+    assert row[1:3] == ("lorry", f"{given.outcome}, {given.place}")
+    assert rows == [
+        ("rating", f"lorry {name}", says, f"{x:.4g}") for name, (x, says) in given.by_codes.items()
+    ]
     # the impact is not on a distributed load, so that no multiple of the factor is that of a code
-    beside = replace(given, area_load=1e3)
-    assert _say_codes(beside).startswith("live 1.35 and impact 1.4 given; as a lorry in traffic ")
-    assert "Eurocodes" not in _say_codes(beside)
-    assert "in traffic" not in str(replace(given, vehicle=VEHICLES["LM2"]))
+    assert [*replace(given, area_load=1e3).by_codes] == [code]
+    assert not replace(given, vehicle=VEHICLES["LM2"]).by_codes
+
+
+def test_an_axle_that_loads_no_ring_does_not_count(monkeypatch):
+    """One behind the springing stands on the fill over the abutment alone, and changes nothing."""
+    monkeypatch.setattr(rating, "_places_along", lambda *_: (3.5, 4.5))
+    bridge = arch_bridge(voussoirs=9)
+    alone = af.rate(bridge, Vehicle("axle", (5e4,)), fill=GRAVEL)
+    x = alone.moving.position
+    far = 8.9 if x < 4.5 else 8.99
+    lorry = Vehicle("lorry", (5e4, 5e4), (far - x,))
+    monkeypatch.setattr(rating, "_places_along", lambda *_: (0.5 * (x + far),))
+    found = af.rate(bridge, lorry, fill=GRAVEL)
+    assert found.factor == pytest.approx(alone.factor, rel=1e-3)
+    assert float(found.moving.factors["axles"].max()) == 2.0  # it is on the bridge
+    clear = f"{x - CLEAR_FROM:.2f} m from the left clear springing"
+    assert f"with 1 axle of 2 at x = {x:.2f} m, {clear} (the other at {far:.2f} m)" in repr(found)
 
 
 def test_a_bridge_that_is_too_weak_would_carry_with_deeper_joints():

@@ -326,11 +326,11 @@ def test_gravity_width_and_material_are_passed_on():
         ),
         (
             {"backfill": af.shapes.Backfill(cover=0.5, erosion=0.6, hump=0.0)},
-            r"the fill is -0.\d+ m above .* less erosion or lower sidewalls",
+            r"the fill is -0.\d+ m above .* less erosion, or less of `above`",
         ),
         (
             {"backfill": af.shapes.Backfill(cover=0.5), "sidewalls": walls(above=3.0)},
-            "the fill is -0.7.* lower sidewalls",
+            "the fill is -0.7.* or less of `above`, the height of sidewalls over the springing",
         ),
         (
             {"backfill": af.shapes.Backfill(cover=0.5, spandrels=1.0)},

@@ -164,8 +164,8 @@ def build_conclusion(data: ReportData) -> Section:
     lead = [*map(sentence, _build_lead(data, rows, doubtful))]
     lead = lead if data.statements.keys() == {"rating"} else [" ".join(lead)]
     demand = data.case.report.get("demand", "")
-    asked = demand and sentence(f"demand, as stated: {demand}")
-    texts = filter(None, [asked, *lead, " ".join(_describe_ends(data))])
+    question = demand and sentence(f"demand, as stated: {demand}")
+    texts = filter(None, [question, *lead, " ".join(_describe_ends(data))])
     blocks: list[Any] = [*map(TextBlock, texts)]
     for result in filter(doubts.get, doubtful):
         ordered = sorted(doubts[result], key=_weigh)
