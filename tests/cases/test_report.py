@@ -30,6 +30,7 @@ from archfem.cases.report.sections import (
 from archfem.cases.result_text import ResultTable
 from archfem.cases.run import carry_out, replace_run
 from archfem.limit import rating
+from archfem.limit.collapse import Outcome
 from archfem.statics.assessment_checks import AssessmentCheck
 from archfem.studies.fragility import Rate
 from archfem.units import format_mm
@@ -234,6 +235,19 @@ def test_a_rate_is_stated_beside_the_hazard_at_its_return_periods():
     ):
         (row,) = state_each(site)["risk", "risk"].rows
         assert (row[1], row[3][:4]) == (demand, "2.78")
+
+
+@pytest.mark.parametrize(("may_be_less", "factor"), [(True, "2 (proved ≥ 1.5)"), (False, "2")])
+def test_a_multiple_of_the_site_says_what_is_proved(may_be_less, factor):
+    """A search may have missed a weaker solution, down to its proved bound."""
+    case = SimpleNamespace(assessment=SimpleNamespace(spectrum=None), target=af.Eurocode8(ag=0.2))
+    ground = float(case.target.horizontal(0.0))
+    found = SimpleNamespace(
+        solutions=SimpleNamespace(may_be_less=may_be_less, bracket=(1.5 * ground, 2.0 * ground)),
+        **{"push": -1.0, "over_fill": None, "outcome": Outcome.COLLAPSES},
+        range=(2.0 * ground, 2.0 * ground),
+    )
+    assert result_text.compare_with_site(case, found)[1] == factor
 
 
 def test_a_check_that_passes_at_rest_says_so():
