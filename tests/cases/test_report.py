@@ -240,7 +240,9 @@ def test_a_rate_is_stated_beside_the_hazard_at_its_return_periods():
 @pytest.mark.parametrize(("may_be_less", "factor"), [(True, "2 (proved ≥ 1.5)"), (False, "2")])
 def test_a_multiple_of_the_site_says_what_is_proved(may_be_less, factor):
     """A search may have missed a weaker solution, down to its proved bound."""
-    case = SimpleNamespace(assessment=SimpleNamespace(spectrum=None), target=af.Eurocode8(ag=0.2))
+    case = SimpleNamespace(
+        assessment=SimpleNamespace(spectrum=None), target=af.Eurocode8(ag=0.2, ground="B")
+    )
     ground = float(case.target.horizontal(0.0))
     found = SimpleNamespace(
         solutions=SimpleNamespace(may_be_less=may_be_less, bracket=(1.5 * ground, 2.0 * ground)),
