@@ -219,7 +219,8 @@ def _doubt_joints(structure: Structure, motion: Motion, start: float) -> Iterato
         frames = simulation.frames(at_rest, end, motion, spacing=0.02)
         if not any(find_lost(frame.poses).any() for frame in frames):
             yield Doubt(
-                "blocks fall with these joints, and as rigid blocks none falls under this motion",
+                "blocks fall with these joints, and as rigid blocks none falls under this motion: "
+                "the fall depends on how the joints close, and with stiffer ones it may not occur",
                 f"{RANGE_REMEDY}, and check the stiffness of the joints",
             )
 

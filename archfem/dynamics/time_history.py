@@ -234,7 +234,9 @@ def _resolve_steps(
 
 def _check_motion(motion: Motion) -> None:
     """Refuse all but a motion that lasts."""
-    check_type(motion, Motion, "motion", "give a Motion, e.g. Motion.read(path)")
+    check_type(
+        motion, Motion, "motion", "give a Motion, e.g. Motion.read(path), or .motion of a Match"
+    )
     if motion.duration == 0.0:
         words = f"motion '{motion.name}' is one sample, of which no history can be computed"
         raise InvalidInput(f"{words}: give two or more, or add rest by .with_rest(…)")

@@ -168,7 +168,9 @@ def response_spectrum(
         >>> round(float(af.response_spectrum(motion, 0.0)), 6)
         3.0
     """
-    check_type(motion, Motion, "motion", "give a Motion, e.g. Motion.read(path)")
+    check_type(
+        motion, Motion, "motion", "give a Motion, e.g. Motion.read(path), or .motion of a Match"
+    )
     check_unmasked(periods, "periods [s]")
     natural = as_periods(periods)
     samples = motion.component(component)

@@ -898,3 +898,32 @@ def test_each_file_of_a_folder_swapped_is_refused_and_made_anew(kind, small, tmp
     # figures and tables have the same bytes as before
     assert files(folders[1]) == first
     assert af.commands.main(["report", str(folders[1])]) == 0
+
+
+@pytest.mark.slow
+def test_an_assessment_slides_as_the_limit_analysis_without_a_warning_of_dilatancy(
+    tmp_path, unplotted, caplog
+):
+    path, out = tmp_path / "gate.toml", tmp_path / "out"
+    path.write_text(
+        """
+title = "Gate"
+structure = { shape = "circular_arch", span = 2.6, embrace = 160, thickness = 0.35, voussoirs = 9 }
+contacts."stone to stone".friction = 0.65
+materials.stone.strength = "20 MPa"
+limit = { horizontal = 1.0, friction = "nonassociated" }
+assessment = { spectrum = { code = "EC8", ag = 0.22, ground = "C" }, direction = 1 }
+""",
+        encoding="utf-8",
+    )
+    assert af.commands.main(["limit", str(path), "--out", str(out)]) == 0
+    assert af.commands.main(["assess", str(path), "--out", str(out)]) == 3
+    assert not caplog.records
+    assert af.commands.main(["report", str(out)]) == 0
+    words = " ".join(read_page((out / "report.html").read_text(encoding="utf-8")).words)
+    assert "assessment: friction that of the limit analysis inferred" in words
+    assert "assessment: friction coulomb" not in words
+    # the least that was found, beside what is proved
+    found = re.search(r"is ([\d.]+) \(proved ≥ ([\d.]+)\), for a push by the site's", words)
+    factor, proved = map(float, found.groups())
+    assert 0.5 * factor < proved < factor

@@ -348,7 +348,8 @@ def _build_scale(data: ReportData) -> list[Any]:
 def _build_search(data: ReportData, name: str, pair: str) -> list[Any]:
     """Build text, picture and runs of a search of scales under one motion."""
     under = f" under '{pair}'" if pair else ""
-    blocks = data.read_result(name, f"Residual displacement{under} over the scale of the motion.")
+    caption = f"Residual displacement{under} over the scale of the motion; falls are at the top."
+    blocks = data.read_result(name, caption)
     if (runs := data.read_text(f"{name}.csv")) is None:
         return blocks
     scales: dict[tuple[str, str], list[str]] = {}
