@@ -375,20 +375,25 @@ class _Search:
         """Return the path of a mechanism, where it holds to, and the doubt about its factor.
 
         In walls in bond, and where dilatancy alone lets a mechanism move, it is that of the search
-        without dilatancy; of one that has no finite motion even so, the path is the place at rest.
+        without dilatancy, if it is weaker; of one that has no finite motion even so, the path is
+        the place at rest.
         """
-        mechanism, doubt, slides = first, "", any(contact.slip for contact in first.contacts)
-        # in walls in bond flat motions are many, and the search finds the weakest
-        first_flow = self.friction == "coulomb" and not self.structure.heads.any()
-        searches = [False, True] if first_flow else [True]
+        mechanism, doubt, moved = first, "", None
+        slides = any(contact.slip for contact in first.contacts)
+        searches = [False, True] if self.friction == "coulomb" else [True]
         for searched in searches if slides else [False]:
             if searched:
                 mechanism, doubt = self._search_flat(placed, joints, first)
+                if moved is not None and moved[0].factors[0] <= mechanism.factor:
+                    return (*moved, doubt if mechanism is not first else "")
             follower = PathFollower(placed, joints, friction)
             with suppress(DidNotConverge):  # no mechanism was found whose faces slide flat
                 path = follower.follow(mechanism)
                 if follower.travel > TOUCHING * self.structure.size:
-                    return path, follower.last_equilibrium(path), doubt
+                    moved = path, follower.last_equilibrium(path)
+                    # in walls in bond flat motions are many, and the search may find a weaker one
+                    if searched or not (slides and self.structure.heads.any()):
+                        return (*moved, doubt)
         rest = np.array([mechanism.factor]), np.zeros((1, *mechanism.motion.shape))
         return (
             MechanismPath(placed, *rest, mechanism.motion, (mechanism,), (), PathEnd.LOCKS),
@@ -426,8 +431,8 @@ class _Search:
         flat = np.zeros(len(contacts))
         if found.solutions is not None and found.solutions.may_be_less:
             doubt = (
-                f"alpha_0 <= {found.factor:.4g} is the least that a search without dilatancy "
-                "found, and a weaker mechanism may exist: hold a motion a tenth below"
+                "alpha_0 is an upper bound, the least that a search without dilatancy found, and a "
+                "weaker mechanism may exist: hold a motion a tenth below"
             )
         return classify_motion(placed, joints, found.motion, flat, contacts, found.factor), doubt
 
