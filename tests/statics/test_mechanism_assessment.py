@@ -10,7 +10,7 @@ from bonded import bonded_wall
 
 import archfem as af
 from archfem.statics import LIMIT_STATES, AssessmentCheck, LimitState, mechanism_assessment
-from archfem.statics.mechanism_assessment import spectral_acceleration
+from archfem.statics.assessment_checks import spectral_acceleration
 
 G = 9.81
 SPECTRUM = af.motion.Ntc2018(ag=0.25, f0=2.4, tc_star=0.32, site="B")
