@@ -1,15 +1,29 @@
 """Checks of a kinematic assessment: rules of codes, and capacity against demand."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from archfem._typing import Array
 from archfem._validation import check_between, check_fields
+from archfem.errors import InvalidInput, logger
 from archfem.limit.fill_range import FillAssumption, FillRange
-from archfem.motion.design_spectra import DesignSpectrum, registered_spectra
+from archfem.masonry.loads import AttachedLoad
+from archfem.masonry.stiffness_ratio import find_yielding_blocks
+from archfem.masonry.structure import Structure
+from archfem.motion.design_spectra import (
+    DesignSpectrum,
+    Eurocode8,
+    Eurocode2024,
+    Ntc2018,
+    damping_correction,
+    registered_spectra,
+)
 from archfem.motion.motion import Motion
+from archfem.motion.response_spectra import response_spectrum
+from archfem.units import STANDARD_GRAVITY
 
 
 @dataclass(frozen=True)
@@ -141,6 +155,50 @@ class AssessmentCheck:
             f"{self.name}: capacity {self.capacity:.4g} {self.unit}, demand {self.demand:.4g} "
             f"{self.unit}{period}: {self.outcome}, the spectrum may be "
             f"{self.ratios} times as strong{rest if self.at_rest else ''}"
+        )
+
+
+def spectral_acceleration(
+    spectrum: DesignSpectrum | Motion, periods: Array, damping: float
+) -> Array:
+    """Return the horizontal pseudo-acceleration spectrum at a damping (n,) [m/s²]."""
+    if isinstance(spectrum, Motion):
+        return response_spectrum(spectrum, periods, damping)
+    factor = STANDARD_GRAVITY
+    if is_dataclass(spectrum) and "damping" in {each.name for each in fields(spectrum)}:
+        spectrum = replace(spectrum, damping=damping)
+    else:
+        factor *= damping_correction(damping)
+    # the spectral displacement is held beyond the longest period of European codes
+    longest = 4.0 if isinstance(spectrum, Eurocode8 | Ntc2018 | Eurocode2024) else np.inf
+    held = np.minimum(periods, longest)
+    beyond = np.where(periods > longest, longest / np.maximum(periods, 1e-9), 1.0)
+    return np.asarray(factor * spectrum.horizontal(held) * beyond**2)
+
+
+def check_assessable(
+    structure: Structure, friction: str | None, loads: Sequence[AttachedLoad]
+) -> None:
+    """Refuse structures and options that the method does not cover."""
+    if friction not in ("coulomb", "nonassociated", None):
+        raise InvalidInput(
+            f"friction {friction!r} is not known: use 'coulomb', 'nonassociated' or None"
+        )
+    if friction == "nonassociated" and (loads or find_yielding_blocks(structure)):
+        raise InvalidInput(
+            "friction 'nonassociated' is not searched with attached loads or a fill: use 'coulomb'"
+        )
+    if (structure.tension > 0.0).any():
+        raise InvalidInput(
+            "joints have tensile strength, which breaks before a mechanism forms: give contacts "
+            "with tension 0"
+        )
+    cohesion = max(joint.contact.cohesion for joint in structure.joints)
+    if friction is not None and cohesion > 0.0:
+        logger.warning(
+            "joints have a cohesion of %.3g Pa, which the assessment leaves out: its factor is on "
+            "the safe side, and joints slide that might hold; collapse_factor counts cohesion",
+            cohesion,
         )
 
 

@@ -19,7 +19,7 @@ References:
 
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -30,7 +30,7 @@ from archfem._display import DOUBT_MARK, NOTE_MARK, ResultDisplay
 from archfem._files import align_columns
 from archfem._typing import Array
 from archfem._validation import check_between, check_choice, validate_arguments
-from archfem.errors import DidNotConverge, InvalidInput, logger
+from archfem.errors import DidNotConverge, InvalidInput
 from archfem.limit.backfill import attach_fill
 from archfem.limit.collapse import collapse_factor
 from archfem.limit.displaced_blocks import (
@@ -54,18 +54,15 @@ from archfem.masonry.structure import (
 )
 from archfem.motion.design_spectra import (
     DesignSpectrum,
-    Eurocode8,
-    Eurocode2024,
-    Ntc2018,
-    damping_correction,
 )
 from archfem.motion.motion import Motion
-from archfem.motion.response_spectra import response_spectrum
 from archfem.statics.assessment_checks import (
     LIMIT_STATES,
     AssessmentCheck,
     LimitState,
     add_fill_ranges,
+    check_assessable,
+    spectral_acceleration,
 )
 from archfem.statics.first_mechanism import (
     DoesNotStand,
@@ -325,7 +322,7 @@ def kinematic_assessment(  # noqa: PLR0913  (the factors of the codes are argume
     for name, value, most in (("q", q, 10.0), ("confidence_factor", confidence_factor, 2.0)):
         check_between(value, f"{name} [-]", 1.0, most, ends="[]")
     structure = structure_of(structure)
-    _check_structure(structure, friction, loads)
+    check_assessable(structure, friction, loads)
     search = _Search(
         *(structure, spectrum, float(direction), friction, part, blocks, tuple(loads), rules),
         *(confidence_factor, q),
@@ -378,26 +375,28 @@ class _Search:
         """Return the path of a mechanism, where it holds to, and the doubt about its factor.
 
         In walls in bond, and where dilatancy alone lets a mechanism move, it is that of the search
-        without dilatancy; of one that has no finite motion even so, the path is the place at rest.
+        without dilatancy, if it is weaker; of one that has no finite motion even so, the path is
+        the place at rest.
         """
-        mechanism, doubt, slides = first, "", any(contact.slip for contact in first.contacts)
-        # in walls in bond flat motions are many, and the search finds the weakest
-        first_flow = self.friction == "coulomb" and not self.structure.heads.any()
-        searches = [False, True] if first_flow else [True]
+        mechanism, doubt, moved = first, "", None
+        slides = any(contact.slip for contact in first.contacts)
+        searches = [False, True] if self.friction == "coulomb" else [True]
         for searched in searches if slides else [False]:
             if searched:
                 mechanism, doubt = self._search_flat(placed, joints, first)
+                if moved is not None and moved[0].factors[0] <= mechanism.factor:
+                    return (*moved, doubt if mechanism is not first else "")
             follower = PathFollower(placed, joints, friction)
             with suppress(DidNotConverge):  # no mechanism was found whose faces slide flat
                 path = follower.follow(mechanism)
                 if follower.travel > TOUCHING * self.structure.size:
-                    return path, follower.last_equilibrium(path), doubt
+                    moved = path, follower.last_equilibrium(path)
+                    # in walls in bond flat motions are many, and the search may find a weaker one
+                    if searched or not (slides and self.structure.heads.any()):
+                        return (*moved, doubt)
         rest = np.array([mechanism.factor]), np.zeros((1, *mechanism.motion.shape))
-        return (
-            MechanismPath(placed, *rest, mechanism.motion, (mechanism,), (), PathEnd.LOCKS),
-            0,
-            doubt,
-        )
+        path = MechanismPath(placed, *rest, mechanism.motion, (mechanism,), (), PathEnd.LOCKS)
+        return path, 0, doubt
 
     def _search_flat(
         self, placed: PlacedBlocks, joints: list[int], first: KinematicChain
@@ -414,23 +413,18 @@ class _Search:
                     "friction 'nonassociated' is searched for the whole structure only: leave out "
                     "part and blocks, or use 'coulomb'"
                 )
-            given = "part, blocks, loads and fill"
-            return first, f"{dilates}; a search without dilatancy takes no {given}: leave them out"
+            return first, f"{dilates}; a search without dilatancy takes no part, loads and fill"
         dry = [replace(x, contact=replace(x.contact, cohesion=0.0)) for x in structure.joints]
-        found = collapse_factor(
-            replace(structure, joints=tuple(dry)),
-            live=BodyForce(placed.direction),
-            friction="nonassociated",
-            strength=np.inf,
-        )
+        wall, live = replace(structure, joints=tuple(dry)), BodyForce(placed.direction)
+        found = collapse_factor(wall, live=live, friction="nonassociated", strength=np.inf)
         if not found.motion.any():
             return first, f"{dilates}, and a search without dilatancy found none: hold a motion"
         contacts, doubt = placed.touching(joints), ""
         flat = np.zeros(len(contacts))
         if found.solutions is not None and found.solutions.may_be_less:
             doubt = (
-                f"alpha_0 <= {found.factor:.4g} is the least that a search without dilatancy "
-                "found, and a weaker mechanism may exist: hold a motion a tenth below"
+                "alpha_0 is an upper bound, the least that a search without dilatancy found, and a "
+                "weaker mechanism may exist: hold a motion a tenth below"
             )
         return classify_motion(placed, joints, found.motion, flat, contacts, found.factor), doubt
 
@@ -470,50 +464,6 @@ def assess_parts(
     """
     parts = dict.fromkeys(structure.blocks[number].part for number in structure.free)
     return {part: kinematic_assessment(structure, spectrum, part=part, **options) for part in parts}
-
-
-def spectral_acceleration(
-    spectrum: DesignSpectrum | Motion, periods: Array, damping: float
-) -> Array:
-    """Return the horizontal pseudo-acceleration spectrum at a damping (n,) [m/s²]."""
-    if isinstance(spectrum, Motion):
-        return response_spectrum(spectrum, periods, damping)
-    factor = STANDARD_GRAVITY
-    if is_dataclass(spectrum) and "damping" in {each.name for each in fields(spectrum)}:
-        spectrum = replace(spectrum, damping=damping)
-    else:
-        factor *= damping_correction(damping)
-    # the spectral displacement is held beyond the longest period of European codes
-    longest = 4.0 if isinstance(spectrum, Eurocode8 | Ntc2018 | Eurocode2024) else np.inf
-    held = np.minimum(periods, longest)
-    beyond = np.where(periods > longest, longest / np.maximum(periods, 1e-9), 1.0)
-    return np.asarray(factor * spectrum.horizontal(held) * beyond**2)
-
-
-def _check_structure(
-    structure: Structure, friction: str | None, loads: Sequence[AttachedLoad]
-) -> None:
-    """Refuse structures and options that the method does not cover."""
-    if friction not in ("coulomb", "nonassociated", None):
-        raise InvalidInput(
-            f"friction {friction!r} is not known: use 'coulomb', 'nonassociated' or None"
-        )
-    if friction == "nonassociated" and (loads or find_yielding_blocks(structure)):
-        raise InvalidInput(
-            "friction 'nonassociated' is not searched with attached loads or a fill: use 'coulomb'"
-        )
-    if (structure.tension > 0.0).any():
-        raise InvalidInput(
-            "joints have tensile strength, which breaks before a mechanism forms: give contacts "
-            "with tension 0"
-        )
-    cohesion = max(joint.contact.cohesion for joint in structure.joints)
-    if friction is not None and cohesion > 0.0:
-        logger.warning(
-            "joints have a cohesion of %.3g Pa, which the assessment leaves out: its factor is on "
-            "the safe side, and joints slide that might hold; collapse_factor counts cohesion",
-            cohesion,
-        )
 
 
 @dataclass(frozen=True, eq=False)
