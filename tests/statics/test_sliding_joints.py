@@ -320,7 +320,7 @@ OTHERS = [(make, seed) for make in (ring, wall) for seed in range(16) if (make, 
     [*QUICK, *(pytest.param(*each, marks=pytest.mark.slow) for each in OTHERS)],
 )
 def test_pushover_with_friction_against_limit_analysis(make, seed, caplog):
-    """The curve ends flat; its peak is one of the states whose optimum is the safe theorem's.
+    """The curve ends flat, or where joints slide on; its peak is one of the states whose optimum is the safe theorem's.
 
     Equal to it where the mechanism only turns. Where it slides, associated sliding must dilate and
     so lift what lies on the joint, which sliding along the joint does not: the factor can be lower
@@ -332,7 +332,7 @@ def test_pushover_with_friction_against_limit_analysis(make, seed, caplog):
     pushed = af.pushover(
         af.build(structure, fidelity="rigid", cells=(1, 1), quadrature="lobatto"), load
     )
-    assert "the slope fell" in pushed.outcome
+    assert "the slope fell" in pushed.outcome or "the load cannot grow" in pushed.outcome
     assert pushed.factor <= limit.factor * (1.0 + 1e-7)
     if not limit.sliding:
         assert pushed.factor == pytest.approx(limit.factor, rel=1e-7)
