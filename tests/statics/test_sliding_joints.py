@@ -320,7 +320,7 @@ OTHERS = [(make, seed) for make in (ring, wall) for seed in range(16) if (make, 
     [*QUICK, *(pytest.param(*each, marks=pytest.mark.slow) for each in OTHERS)],
 )
 def test_pushover_with_friction_against_limit_analysis(make, seed, caplog):
-    """The curve ends flat, or where joints slide on; its peak is one of the states whose optimum is the safe theorem's.
+    """The curve ends flat or by sliding; its peak is one of the states of the safe theorem.
 
     Equal to it where the mechanism only turns. Where it slides, associated sliding must dilate and
     so lift what lies on the joint, which sliding along the joint does not: the factor can be lower
