@@ -172,7 +172,7 @@ def test_tables_state_what_is_assessed(other, ring):
         table = result_text.describe_pairs({"one": run, "two": run})
         assert (SENTENCE in table.splitlines()) == said
         assert (of_history(run).get("assessed") == SENTENCE) == said
-        case = SimpleNamespace(structure=model.structure, report={})
+        case = SimpleNamespace(structure=model.structure, suite=None, report={})
         data = report_data.ReportData(case, {"one": run})
         facts = conclusion.list_facts(data)
         assert (("joints", SENTENCE) in facts) == said
