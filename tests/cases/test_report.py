@@ -807,7 +807,8 @@ def test_factors_of_a_vehicle_are_not_those_of_the_code(kept, undrawn):
         write_files({"rating.txt": "it"}, draft)
     rows = {row[0]: row[1:] for row in tabulate_inputs(report_data.ReportData(case, {}, kept)).rows}
     assert "live 1.35; impact 1.4" in rows["rating: vehicle"][0]
-    assert rows["rating: area load, dead, width"] == ("of the code, see below", "default")
+    stated = "1, none or by rule, see below"
+    assert rows["rating: area load, dead, width"] == (stated, "default")
 
 
 def test_long_tables_of_joints_stand_in_two_halves(kept, monkeypatch):

@@ -208,7 +208,8 @@ def _further_rows(data: ReportData, section: str, table: Mapping[str, Any]) -> I
     of_vehicle = set(vehicle) if isinstance(vehicle, Mapping) else set()
     if section == "rating" and (own := _RATING_KEYS - table.keys() - of_vehicle):
         words = ", ".join(sorted(own)).replace("_", " ")
-        yield f"rating: {words}", "of the code, see below", "default"
+        whose = "1, none or by rule" if of_vehicle else "of the code"
+        yield f"rating: {words}", f"{whose}, see below", "default"
 
 
 def _default_rows(section: str, table: Mapping[str, Any]) -> Iterator[Row]:
