@@ -648,7 +648,7 @@ def test_assessment_of_a_case_and_its_page(tmp_path, ring, capsys):
     path, out = tmp_path / "ring.toml", tmp_path / "out"
     path.write_text(LIMIT + ASSESSMENT)
     left = ["--set", "assessment.direction=-1"]
-    assert af.commands.main(["assess", str(path), "--out", str(out), *left]) == 0
+    assert af.commands.main(["assess", str(path), "--out", str(out), *left]) == 3
     said = capsys.readouterr().out
     spectrum = af.motion.Ntc2018(ag=0.25, f0=2.4, tc_star=0.32, site="B")
     options = {"direction": -1, "limit_state": "NTC-2018 SLC", "q": 1.5}
@@ -656,6 +656,8 @@ def test_assessment_of_a_case_and_its_page(tmp_path, ring, capsys):
     assert str(found.displacement) in said
     assert str(found.linear) in said
     assert "pushed to the left" in said
+    assert found.doubts
+    assert all(f"in doubt: {doubt}" in said for doubt in found.doubts)
     assert (out / "assessment.txt").read_text().strip() in said
     assert [file.name for file in out.glob("*.png")] == ["assessment_0.png"]
     assert af.commands.main(["run", str(path), "--out", str(out), *left]) == 0
@@ -670,7 +672,7 @@ def test_assessment_of_a_case_and_its_page(tmp_path, ring, capsys):
     assert "an assessment needs a spectrum: write [assessment]" in capsys.readouterr().err
     given = ["--parts", "--set", "assessment.direction=1"]
     path.write_text(LIMIT + ASSESSMENT)
-    assert af.commands.main(["assess", str(path), *given]) == 0
+    assert af.commands.main(["assess", str(path), *given]) == 3
     said = capsys.readouterr().out
     assert "arch, right:" in said
     assert "pushed to the left" not in said
