@@ -398,7 +398,8 @@ def compare_with_site(case: Case, found: Collapse) -> tuple[str, str]:
     proved = ""
     if found.solutions and found.solutions.may_be_less and found.over_fill is None:
         # the search may have missed a weaker solution
-        proved = f" (proved ≥ {found.solutions.bracket[0] * abs(found.push) / ground:.3g})"
+        least = found.solutions.bracket[0] * abs(found.push) / ground
+        proved = f" (proved ≥ {least:.3g})" if least > 0.0 else " (no lower bound is known)"
     size = f"{ground:.3g} g" if rock is None else f"{rock:.3g} g × S {ground / rock:.3g}"
     low, high = (f"{bound * abs(found.push) / ground:.3g}" for bound in found.range)
     return f"the site's {size}", f"{low}{proved}" if low == high else f"{low} to {high}"

@@ -538,11 +538,13 @@ def largest_displacement(outlines: Sequence[Array], centroids: Array, motion: Ar
 
 def find_clear_spans(structure: Structure) -> dict[str, tuple[float, float]]:
     """Return the clear span of each ring, from its left to its right end [m]."""
-    spans: dict[str, list[float]] = {}
+    # horizontal ends of its joints; a lintel bears from the outer end of a post to the inner one
+    spans: dict[str, list[tuple[float, ...]]] = {}
     for joint in structure.joints:
         if joint.role == "ring":
-            spans.setdefault(joint.part, []).append(joint.intrados[0])
-    return {part: (min(xs), max(xs)) for part, xs in spans.items()}
+            ends = sorted((joint.intrados[0], joint.extrados[0]))
+            spans.setdefault(joint.part, []).append(tuple(ends))
+    return {part: (min(ends)[1], max(x[::-1] for x in ends)[1]) for part, ends in spans.items()}
 
 
 def describe_spans(structure: Structure) -> str:

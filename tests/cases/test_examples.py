@@ -14,6 +14,7 @@ from archfem.cases.examples import (
     list_new_cases,
     read_example,
 )
+from archfem.masonry.structure import find_clear_spans
 
 
 def test_each_has_a_title():
@@ -80,6 +81,8 @@ def test_the_new_cases_are_those_of_the_command():
 
 def test_a_portal_falls_when_its_posts_overturn():
     case = af.Case.read(list_new_cases()["portal"])
+    # 0.5 m of each post bear the lintel
+    assert find_clear_spans(case.structure)["lintel"] == pytest.approx((0.5, 2.5))
     assert case.limit.strength == pytest.approx(20e6)
     # posts of 0.5 m by 2 m turn about their toes, and the lintel translates: b / h
     assert replace(case.limit, strength=np.inf).solve(case.structure).factor == pytest.approx(

@@ -245,7 +245,7 @@ def _describe_ranges(ranges: Sequence[VerdictRange]) -> Iterator[str]:
 
 def _describe_margin(data: ReportData, rows: Sequence[Row]) -> Iterator[str]:
     """Yield the least factor on the demand of an earthquake, maybe as a range, and the others."""
-    checks, others = [], []
+    checks, others, moves = [], [], _say_motion(data)
     for name, demand, outcome, factor in rows:
         if factor == "-" or name == RESULTS["scale"]:
             continue
@@ -253,8 +253,11 @@ def _describe_margin(data: ReportData, rows: Sequence[Row]) -> Iterator[str]:
         fails = ", which it fails" * (least < 1.0)
         over = " over what is assumed of the fill" * (" to " in factor)
         if name == RESULTS["limit"] and demand.startswith("the site"):
-            words = f"{factor}{over}, for a push by {demand} to begin to move it"
-            others.append((least, words + _say_motion(data)))
+            if moves and least >= 1.0:  # shaken it moves before: the push is no margin
+                yield f"a static push of {factor} times {demand}{over} begins to move it{moves}"
+            else:
+                words = f"{factor}{over}, for a push by {demand} to begin to move it"
+                others.append((least, words + moves))
         elif check:
             _, only, assumed = outcome.partition(" only with ")
             only = f", passed only with {assumed}" if only else fails
