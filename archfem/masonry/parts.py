@@ -84,7 +84,7 @@ def infer_role(part: str) -> str:
     role_words = {
         "ring": frozenset({"arch", "ring", "architrave", "beam", "lintel"}),
         "pier": frozenset({"pier", "column", "jamb", "pillar", "post"}),
-        "other": frozenset({"abutment", "base", "foundation", "footing", "ground", "rock"})
+        "other": frozenset({"abutment", "base", "foundation", "footing", "ground", "rock", "slab"})
         | {"backfill", "backing", "earth", "fill", "filling", "infill", "soil"}
         | {"parapet", "sidewall", "spandrel", "wall", "wingwall"}
         | {"ballast", "deck", "pavement", "paver", "paving", "road"},

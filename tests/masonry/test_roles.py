@@ -205,6 +205,7 @@ def test_a_role_of_one_block_holds_for_all_of_its_part(warnings):
         ("door lintels", "ring"),
         ("left post", "pier"),
         ("left abutment", "other"),
+        ("slab", "other"),
         ("backfill", "other"),
         ("spandrel-walls", "other"),
     ],
