@@ -131,7 +131,7 @@ class Rating(ResultDisplay):
     by_pressure: float = np.nan
     by_cs454: Mapping[str, float] = field(default_factory=dict)
     fill: Fill | PlasticFill | None = None
-    missing: tuple[str, ...] = ()
+    missing: Sequence[str] = ()
 
     @property
     def factor(self) -> float:

@@ -169,7 +169,8 @@ def _draw_named_cases(
         style = {"color": Colour.GREY, "lw": 0.9}
         if not pairs:
             axes.axvline(frame[name].iloc[0], ls="--", label=f"{labels[0]}, the first", **style)
-        if name in REQUIRED_FACTORS:
+        # those of a push are accelerations, which pass at that of the site
+        if name in REQUIRED_FACTORS and "without_pressure" in table:
             axes.axvline(1.0, label="a factor of 1", **style)
     panels[0].set_yticks(range(len(labels)), labels)
     panels[0].set_ylim(len(labels) - 0.5, -0.5)
