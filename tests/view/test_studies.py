@@ -127,12 +127,14 @@ def test_names_of_many_ratings_do_not_overlap():
         {
             "position": ("case", factors),
             "factor": ("case", factors),
-            "geometric": ("case", factors),
+            "without_pressure": ("case", factors),
         },
         {"case": names},
     )
+    pushed = draw_findings(table.drop_vars(["position", "without_pressure"]))
+    assert [line.get_xdata()[0] for line in pushed.axes[0].lines] == [2.0]
     figure = draw_findings(table)
-    assert [axes.get_xlabel() for axes in figure.axes] == ["factor", "geometric"]
+    assert [axes.get_xlabel() for axes in figure.axes] == ["factor", "without_pressure"]
     assert [line.get_xdata()[0] for line in figure.axes[0].lines] == [2.0, 1.0]
     figure.draw_without_rendering()
     boxes = [text.get_window_extent() for text in figure.axes[0].get_yticklabels()]
