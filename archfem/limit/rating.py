@@ -48,6 +48,7 @@ from archfem.masonry.structure import (
     describe_spans,
     find_clear_spans,
     join_names,
+    join_words,
     structure_of,
 )
 from archfem.units import MPa
@@ -438,7 +439,7 @@ def _name_places(places: Collection[float]) -> str:
     each = [f"{x:.2f}" for x in sorted(places)]
     if len(each) > 4:
         return f"{each[0]} to {each[-1]}"
-    return " and ".join(filter(None, [", ".join(each[:-1]), *each[-1:]]))
+    return join_words(each)
 
 
 @validate_arguments

@@ -538,13 +538,15 @@ def largest_displacement(outlines: Sequence[Array], centroids: Array, motion: Ar
 
 def find_clear_spans(structure: Structure) -> dict[str, tuple[float, float]]:
     """Return the clear span of each ring, from its left to its right end [m]."""
-    # horizontal ends of its joints; a lintel bears from the outer end of a post to the inner one
-    spans: dict[str, list[tuple[float, ...]]] = {}
+    ends: dict[str, list[tuple[float, float]]] = {}
     for joint in structure.joints:
         if joint.role == "ring":
-            ends = sorted((joint.intrados[0], joint.extrados[0]))
-            spans.setdefault(joint.part, []).append(tuple(ends))
-    return {part: (min(ends)[1], max(x[::-1] for x in ends)[1]) for part, ends in spans.items()}
+            low, high = sorted((joint.intrados[0], joint.extrados[0]))
+            ends.setdefault(joint.part, []).append((low, high))
+    # between the inner ends of the outermost joints: those of a lintel are as long as its bearings
+    return {
+        part: (min(own)[1], max(own, key=lambda joint: joint[1])[0]) for part, own in ends.items()
+    }
 
 
 def describe_spans(structure: Structure) -> str:
