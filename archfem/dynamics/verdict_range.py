@@ -139,21 +139,17 @@ class VerdictRange(ResultDisplay):
         if not np.isfinite(sizes).any():
             return ""
         least, usual, largest = np.quantile(sizes, (0.0, 0.95, 1.0), method="inverted_cdf")
-        ends, hardly = (
-            " to ".join(map(format_mm, (least, largest))),
-            int(sum(sizes < largest / 100)),
-        )
+        ends, hardly = f"{format_mm(least)} to {format_mm(largest)}", sizes < largest / 100
         text = (
             f"largest displacements {ends}, in 95 % of {len(sizes)} runs {format_mm(usual)} or less"
         )
         # runs that rest, as under a joint rule without a mechanism, say little of the others
-        if not hardly:
+        if not hardly.any():
             return text
-        held = rows.isel(run=np.flatnonzero(~self.falls[self.answered]))
-        small = held.isel(run=np.flatnonzero(sizes < largest / 100))
+        small = rows.isel(run=np.flatnonzero(~self.falls[self.answered])[hardly])
         alike = "joint_rule" in small and bool((small["joint_rule"] == "rigid").all())
         which = " with rigid joints" * alike
-        return f"{text}; {hardly} of them{which} moved by less than 1 % of the largest"
+        return f"{text}; {hardly.sum()} of them{which} moved by less than 1 % of the largest"
 
     @property
     def unanswered(self) -> str:

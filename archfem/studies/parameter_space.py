@@ -64,7 +64,7 @@ def parameter_axes(over: Any, samples: Mapping[str, Any] | None = None) -> tuple
             f"{over!r} varies nothing: give a table of keys of the case with lists of values or "
             "distributions, or a list of such tables, one for each point"
         )
-    values = _flatten(over)
+    values = _flatten_axes(over)
     random = {key: value for key, value in values.items() if not _is_list(value)}
     axes = [_value_axis(key, values[key]) for key in values if key not in random]
     if random:
@@ -107,17 +107,13 @@ def _is_list(value: Any) -> bool:
     return row and not isinstance(value, str)
 
 
-def _flatten(over: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
-    """Join the names of nested tables and keys by dots."""
-    flat: dict[str, Any] = {}
-    for key, value in over.items():
-        if isinstance(value, Mapping) and "distribution" not in value:
-            flat |= _flatten(value, f"{prefix}{key}.")
-        elif _is_list(value) or hasattr(value, "ppf") or isinstance(value, Mapping):
-            flat[prefix + key] = value
-        else:
+def _flatten_axes(over: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the values of each key that varies; each is a list or a distribution."""
+    flat = flatten_tables(over)
+    for key, value in flat.items():
+        if not (_is_list(value) or hasattr(value, "ppf") or isinstance(value, Mapping)):
             raise InvalidInput(
-                f"{prefix}{key} = {value!r}: give a list of values, or a distribution; a value "
+                f"{key} = {value!r}: give a list of values, or a distribution; a value "
                 "that stays the same belongs to set"
             )
     return flat
@@ -282,10 +278,10 @@ def list_varied_keys(points: Iterable[StudyPoint]) -> list[str]:
 
 
 def flatten_tables(tables: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
-    """Join the names of nested tables and keys by dots."""
+    """Join the names of nested tables and keys by dots; a distribution is a value."""
     flat: dict[str, Any] = {}
     for key, value in tables.items():
-        own = isinstance(value, Mapping)
+        own = isinstance(value, Mapping) and "distribution" not in value
         flat |= flatten_tables(value, f"{prefix}{key}.") if own else {prefix + key: value}
     return flat
 
