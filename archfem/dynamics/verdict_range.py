@@ -17,6 +17,7 @@ from archfem._netcdf import read_dataset, write_dataset
 from archfem._typing import Array
 from archfem._validation import validate_methods
 from archfem.dynamics.collapse_state import COLLAPSE_STATES, FALLEN_STATES
+from archfem.masonry.structure import join_names
 from archfem.models.model import Doubt, read_doubts
 from archfem.units import format_mm
 
@@ -24,6 +25,11 @@ from archfem.units import format_mm
 # separates them as well [-], and the number of permutations
 MAX_CHANCE, PERMUTATIONS = 0.05, 999
 MAX_EDGES = 250  # conditions of each sense on one property
+
+# Displacements of equal runs of other time steps differ by chance up to here [-]
+MAX_RATIO_OF_DISPLACEMENTS = 1.5
+
+UNVARIED = "unvaried"  # name of the run as given among single changes
 
 
 @validate_methods
@@ -152,6 +158,47 @@ class VerdictRange(ResultDisplay):
         return f"{text}; {hardly.sum()} of them{which} moved by less than 1 % of the largest"
 
     @property
+    def single_changes(self) -> "list[SingleChange]":
+        """The runs that change one property, and that as given, the worst first; maybe none."""
+        rows = self.dataset.isel(run=np.flatnonzero(~self.dataset["sampled"].values))
+        changes = []
+        for k in range(rows.sizes["run"]):
+            run, given = rows.isel(run=k), rows.isel(run=0)
+            changed = [name for name in self.properties if run[name] != given[name]]
+            words = [_name_change(name, run[name].item()) for name in changed] or [UNVARIED]
+            numbers = float(run["displacement"]), float(run["residual"])
+            changes.append(SingleChange(words[0], str(run["outcome"].item()), *numbers))
+        return sorted(changes, key=lambda each: (-each.rank, -each.displacement))
+
+    @property
+    def what_changes(self) -> list[str]:
+        """Clauses on the single changes that decide a fall, and on those that displace most."""
+        made = [each for each in self.single_changes if each.rank >= 0]
+        given = next((each for each in made if each.name == UNVARIED), None)
+        others = [each for each in made if each is not given]
+        if given is None or not others:
+            return []
+        fallen, held = ([x for x in others if (x.rank > 1) is down] for down in (True, False))
+        count = f"of {len(others)} single changes"
+        if given.outcome in FALLEN_STATES:
+            names = join_names([each.name for each in held])
+            few = (
+                f"with {len(held)} {count} it does not: {names}" if held else f"so with all {count}"
+            )
+            return [f"unvaried it falls, and {few}"]
+        names = f"{len(fallen)} {count}: {join_names([each.name for each in fallen])}"
+        clauses = [f"it falls with {names if fallen else f'none {count}'}"]
+        parted = [each.name for each in held if each.rank > given.rank]
+        if parted:
+            clauses.append(f"it is dislocated with {len(parted)}: {join_names(parted)}")
+        moved = sorted(held, key=lambda each: -each.displacement)[:2]
+        far = MAX_RATIO_OF_DISPLACEMENTS * given.displacement
+        larger = [each for each in moved if each.displacement > far] or moved[:1]
+        listed = [f"{format_mm(each.displacement)} with {each.name}" for each in larger]
+        own = f"unvaried it is displaced by {format_mm(given.displacement)}"
+        return [*clauses, ", by ".join([own, *listed])]
+
+    @property
     def unanswered(self) -> str:
         """How many runs have no answer, for the end of a sentence; empty if all have one."""
         missing = int((~self.answered).sum())
@@ -254,11 +301,25 @@ class VerdictRange(ResultDisplay):
     def __str__(self) -> str:
         """Sentence, doubts, displacements, and a line for each property."""
         doubts = [f"{DOUBT_MARK}{doubt}" for doubt in self.doubts]
-        moved = filter(None, [self.displacements])
+        moved = filter(None, [self.displacements, "; ".join(self.what_changes)])
         return "\n".join([self.sentence, *doubts, *moved, self.table()])
 
     def _summary(self) -> str:
         return f"VerdictRange: {self.sentence}"
+
+
+class SingleChange(NamedTuple):
+    """Run in which one property has another value."""
+
+    name: str  # property and value in words
+    outcome: str  # as of `Verdict`; "unknown" without an answer
+    displacement: float  # largest of a corner [m]
+    residual: float  # that at the end [m]
+
+    @property
+    def rank(self) -> int:
+        """Place of the outcome among the states of collapse, the worst last; -1 if unknown."""
+        return COLLAPSE_STATES.index(self.outcome) if self.outcome in COLLAPSE_STATES else -1
 
 
 class Condition(NamedTuple):
@@ -279,6 +340,18 @@ class Condition(NamedTuple):
 def property_text(name: str) -> str:
     """Return the name of a property as users read it; k_n and k_s are symbols."""
     return name if name in ("k_n", "k_s") else name.replace("_", " ")
+
+
+def _name_change(name: str, value: Any) -> str:
+    """Return a property with its changed value in words."""
+    factors = {"k_n": "normal stiffness", "k_s": "shear stiffness", "damping_ratio": "damping"}
+    if name in factors or name == "scale":
+        sign, factor = ("×", value) if value > 1.0 else ("/", 1.0 / value)
+        return f"{factors.get(name, 'motion')} {sign} {factor:.3g}"
+    if name == "friction":
+        return f"friction {'+' if value > 0.0 else '-'} {abs(value):.3g}"
+    labels = {"sign": f"motion {value}", "dt": f"{value} the time step"}
+    return labels.get(name, f"{property_text(name)} '{value}'")
 
 
 def _list_conditions(rows: xr.Dataset, names: Sequence[str]) -> Iterator[Condition]:

@@ -133,6 +133,70 @@ def test_displacements_of_the_runs_that_hold_are_a_range():
     assert made_up([True], sign=["a"]).displacements == ""
 
 
+@pytest.mark.parametrize(
+    ("falls", "parted", "clauses"),
+    [
+        (
+            [],
+            [],
+            [
+                "it falls with none of 4 single changes",
+                "unvaried it is displaced by 10 mm, by 90 mm with normal stiffness / 3, by 30 mm "
+                "with half the time step",
+            ],
+        ),
+        (
+            [1],
+            [4],
+            [
+                "it falls with 1 of 4 single changes: normal stiffness / 3",
+                "it is dislocated with 1: half the time step",
+                "unvaried it is displaced by 10 mm, by 30 mm with half the time step",
+            ],
+        ),
+        (
+            [0, 1, 2, 4],
+            [],
+            ["unvaried it falls, and with 1 of 4 single changes it does not: damping × 2"],
+        ),
+        (
+            [0, 1, 2, 3, 4],
+            [],
+            ["unvaried it falls, and so with all of 4 single changes"],
+        ),
+    ],
+)
+def test_single_changes_say_what_would_change_the_answer(falls, parted, clauses):
+    """The last run varies all properties, and counts as none of them."""
+    properties = {
+        "k_n": [1.0, 1.0 / 3.0, 1.0, 1.0, 1.0, 0.5],
+        "friction": [0.0, 0.0, -0.1, 0.0, 0.0, 0.1],
+        "damping_ratio": [1.0, 1.0, 1.0, 2.0, 1.0, 0.5],
+        "dt": ["as given"] * 4 + ["half"] * 2,
+    }
+    sizes, sampled = [0.01, 0.09, 0.011, 0.002, 0.03, 5.0], np.arange(6) == 5
+    found = made_up(
+        np.isin(np.arange(6), falls), sampled, residual=sizes, parted=parted, **properties
+    )
+    assert found.what_changes == clauses
+    assert "; ".join(clauses) in str(found).splitlines()
+    names = [each.name for each in found.single_changes]
+    if not falls:
+        assert names == [
+            *("normal stiffness / 3", "half the time step", "friction - 0.1", "unvaried"),
+            "damping × 2",
+        ]
+
+
+def test_a_broken_single_change_is_the_last_and_counts_for_none():
+    found = made_up([False] * 3, [False] * 3, residual=[0.02, np.nan, 0.01], sign=list("abc"))
+    found.dataset["outcome"][1] = "unknown"
+    assert [each.name for each in found.single_changes] == ["unvaried", "motion c", "motion b"]
+    assert found.what_changes[0] == "it falls with none of 1 single changes"
+    found.dataset["outcome"][0] = "unknown"
+    assert found.what_changes == []
+
+
 def test_the_sentence_names_the_only_motion():
     """An interval of one motion holds for that motion; without a name motions are varied."""
     found = made_up([False] * 4, sign=list("aabb"))

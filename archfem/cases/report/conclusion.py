@@ -19,7 +19,7 @@ from archfem.cases.result_text import RESULTS, Row
 from archfem.dynamics.collapse_state import COLLAPSE_STATES, FALLEN_STATES, CollapseState
 from archfem.dynamics.history import History
 from archfem.dynamics.verdict import NO_RANGE
-from archfem.dynamics.verdict_range import VerdictRange
+from archfem.dynamics.verdict_range import MAX_RATIO_OF_DISPLACEMENTS, VerdictRange
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import join_names, join_words
 from archfem.models.model import Doubt
@@ -50,9 +50,6 @@ MAX_RATIO_OF_PEAKS = 1.25
 
 # Doubts of a result that the conclusion states; the others stand with the result
 MAX_DOUBTS = 3
-
-# Displacements of a run and of the unvaried one of its variations differ by chance up to here [-]
-MAX_RATIO_OF_DISPLACEMENTS = 1.5
 
 # Doubts that outweigh others, the first most: a conclusion states these before others
 _WEIGHTY = ("as rigid blocks none falls", "fall", "displace")

@@ -32,14 +32,16 @@ from archfem.cases.report.response import (
 )
 from archfem.cases.report.study_findings import read_study, tabulate_study
 from archfem.cases.run import DRAWING_FILE
+from archfem.dynamics.collapse_state import FALLEN_STATES
 from archfem.dynamics.history import SIGN_CONVENTION
 from archfem.dynamics.recorder import library_versions
+from archfem.dynamics.verdict_range import UNVARIED, VerdictRange
 from archfem.errors import InvalidInput
 from archfem.joints.criteria import assessed_joints
 from archfem.masonry.joint_closing import describe_closing
 from archfem.masonry.structure import Structure, join_names
 from archfem.statics.assessment_checks import LIMIT_STATES, LimitState
-from archfem.units import MPa, kN
+from archfem.units import MPa, format_mm, kN
 from archfem.view.pages.document import FigureBlock, Grid, Section, TextBlock
 from archfem.view.structure import draw_names, draw_structure, list_numbers
 from archfem.view.studies import draw_findings
@@ -384,7 +386,7 @@ def _build_study(data: ReportData) -> list[Any]:
 
 
 def _build_range(data: ReportData) -> list[Any]:
-    """Build text and picture of the range; without a fall its table says nothing."""
+    """Build text and pictures of ranges; without a fall, single changes say more than residuals."""
     caption = (
         "Residual displacement over the properties that explain most of it, at most six; falls are "
         "above a dashed line, and displacements below the axis at its lower end."
@@ -400,12 +402,37 @@ def _build_range(data: ReportData) -> list[Any]:
         blocks = data.read_result(place.removesuffix(".txt"), named, table=table)
         # a command without an answer leaves its reason alone
         found = next(ranges) if place.replace(".txt", ".nc") in data.files else None
+        changes = [] if found is None else _build_single_changes(found, pair)
         if found is not None and not found.falls.any():
             told = filter(None, [found.sentence, found.displacements])
             words = f"{'; '.join(told)}; varied: {', '.join(found.properties)}"
-            blocks[:1] = [TextBlock(sentence(words.replace("_", " ")))]
-        built += blocks
+            blocks[: 2 if changes else 1] = [TextBlock(sentence(words.replace("_", " ")))]
+        built += [*blocks, *changes]
     return built
+
+
+def _build_single_changes(found: VerdictRange, pair: str) -> list[Any]:
+    """Build picture and table of the runs in which one property differs, the worst first."""
+    if not found.what_changes:
+        return []
+    changes, under = found.single_changes, f" under '{pair}'" if pair else ""
+    sizes = [np.nan if x.outcome in FALLEN_STATES else 1e3 * x.displacement for x in changes]
+    first = next(k for k, each in enumerate(changes) if each.name == UNVARIED)
+    order = [first, *(k for k in range(len(changes)) if k != first)]
+    table = xr.Dataset(
+        {"largest displacement": ("case", [sizes[k] for k in order], {"units": "mm"})},
+        {"case": [changes[k].name for k in order]},
+    )
+    caption = f"Largest displacement by each single change{under}; a fall has none."
+    head = ("single change", "outcome", "largest displacement", "at the end")
+    rows = [
+        (each.name, each.outcome, *map(format_mm, (each.displacement, each.residual)))
+        for each in changes
+    ]
+    drawn = []
+    with suppress(InvalidInput):  # all are equal, or fall
+        drawn.append(FigureBlock.of(draw_findings(table), caption))
+    return [*drawn, Grid(head, rows, f"Single changes{under}, the worst first")]
 
 
 def build_method_section(data: ReportData) -> Section:
