@@ -521,7 +521,7 @@ def state_scale(
     # what was run between the scales stands in the text
     words, files = repr(found).partition(";")[0], dict[str, str]()
     if isinstance(found, CollapseScale):
-        lower = found.lower
+        lower = found.held
         files["scale.csv"] = ResultTable(*found.rows()).csv
     else:
         lower = min((found[each] for each in found.definitions), key=lambda x: x.upper).lower

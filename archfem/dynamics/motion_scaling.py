@@ -416,7 +416,6 @@ class CollapseScale:
 
     def __repr__(self) -> str:
         """Return scales around the fall, and from which it is dislocated, which is no fall."""
-        made = [(at, fall.kind) for dt in self.searches for at, fall in self.falls(dt) if fall]
         least = min(self.bracket(dt).upper for dt in self.searches)
         met = "falls at no scale that was tried"
         if least < inf:
@@ -427,28 +426,18 @@ class CollapseScale:
         if least < self.upper:
             at = f"first falls at {self.upper:#.3g} ×" if self.upper < inf else "falls at no scale"
             met = f"{met}, {'the other' if len(self.searches) == 2 else 'the last'} time step {at}"
-        state, first = "stands", self.lower
-        parted = min((at for at, kind in made if kind == "dislocated"), default=inf)
-        if (self.lower, "dislocated") in made:
-            first = parted
-            below = max((at for at, kind in made if kind == "stands" and at < first), default=0.0)
-            state = f"stands at {below:#.3g} ×, " * bool(below) + "dislocated, not fallen,"
-            met = f"and up to {self.lower:#.3g} ×, {met}" if first < self.lower else met
-        elif parted < self.lower:
-            state = f"dislocated from {parted:#.3g} ×, stands again"
-        return _say_bracket(state, first, self.pga, met) + self._say_tested()
+        if self.dislocated < inf:
+            met = f"dislocated from {self.dislocated:#.3g} ×, {met}"
+        return _say_bracket("stands", self.held, self.pga, met) + self._say_tested()
 
     def _say_tested(self) -> str:
         """Return in words how closely scales were run up to `lower`; "" where none stands."""
-        made = [(at, fall.kind) for dt in self.searches for at, fall in self.falls(dt) if fall]
-        stood = sorted({scale for scale, _ in made if scale <= self.lower})
+        stood = sorted({scale for scale, _ in self._list_held()})
         gaps = [gap for gap in pairwise(stood) if gap[1] > FILLED_SHARE * self.lower]
         if not gaps:
             return ""
         ratio = max(high / low for low, high in gaps)
-        parted = " or is dislocated" * any(
-            kind == "dislocated" and at < self.lower for at, kind in made
-        )
+        parted = " or is dislocated" * (self.dislocated < self.lower)
         return (
             f"; stands{parted} at every smaller scale that was run: from {gaps[0][0]:#.3g} × on "
             f"they are up to a factor of {ratio:.2f} apart, and none between was run"
@@ -491,6 +480,22 @@ class CollapseScale:
         made = (run.scale for search in self.searches.values() for run in search.runs)
         below = [scale for scale in made if scale <= lower and scale < min(unknown, default=inf)]
         return max(below, default=0.0)
+
+    @property
+    def dislocated(self) -> float:
+        """Smallest scale up to `lower` at which it was dislocated [-]; infinite for none."""
+        return min((at for at, kind in self._list_held() if kind == "dislocated"), default=inf)
+
+    @property
+    def held(self) -> float:
+        """Largest scale at which it stood below any at which it did not [-]; 0 for none."""
+        stood = (at for at, kind in self._list_held() if kind == "stands")
+        return max((at for at in stood if at < self.dislocated), default=0.0)
+
+    def _list_held(self) -> list[tuple[float, str]]:
+        """List the scales up to `lower`, each with the state of collapse."""
+        made = [pair for dt in self.searches for pair in self.falls(dt)]
+        return [(at, fall.kind) for at, fall in made if fall and at <= self.lower]
 
     @property
     def upper(self) -> float:

@@ -377,7 +377,7 @@ def test_smaller_scales_at_which_it_is_dislocated_are_said():
         for run in found.runs
     ]
     said = str(CollapseScale({0.005: replace(found, runs=tuple(runs))}))
-    assert said.startswith("dislocated from 1.10 ×, stands again at 1.30 × the motion, falls at 1")
+    assert said.startswith("stands at 1.00 × the motion, dislocated from 1.10 ×, falls at 1.40")
     assert "; stands or is dislocated at every smaller scale that was" in said
     bound = CollapseScale({0.005: replace(found, runs=(*runs[:1], runs[1], found.runs[-1]))})
     assert "; stands at every smaller scale that was run" in str(bound)
@@ -399,8 +399,8 @@ def test_scales_without_an_answer_bound_what_is_known():
         " | ".join(said.doubts)
     )
     assert str(said).partition(";")[0] == (
-        "stands at 2.00 ×, dislocated, not fallen, at 1.50 g (3.00 × the motion), and up to 4.00 "
-        "×, falls in no run that has an answer (3 have none, the first at 5.00 ×)"
+        "stands at 1.00 g (2.00 × the motion), dislocated from 3.00 ×, falls in no run that has an "
+        "answer (3 have none, the first at 5.00 ×)"
     )
 
 
@@ -411,7 +411,7 @@ def test_scales_without_an_answer_bound_what_is_known():
         (
             "dislocated",
             (1.0, -2.0),
-            "dislocated, not fallen, at 0.500 g (1.00 × the motion), falls",
+            "dislocated from 1.00 ×, falls at 1.00 g (2.00 × the motion); no smaller scale is ",
         ),
         ("stands", (1.0, 2.0), "stands at 1.00 g (2.00 × the motion), falls at no scale that was"),
         ("stands", (-1.0, -2.0), "falls at 0.500 g (1.00 × the motion); no smaller scale is kno"),
