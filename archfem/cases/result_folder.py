@@ -13,7 +13,7 @@ from archfem._optional import can_film
 from archfem._validation import validate_arguments, validate_methods
 from archfem.cases.case import Case
 from archfem.cases.provenance import list_input_files
-from archfem.cases.result_text import compare_with_site, state_outcome
+from archfem.cases.result_text import compare_push, compare_with_site, state_outcome
 from archfem.cases.run import (
     CASE_FILE,
     HISTORY_FILE,
@@ -27,6 +27,7 @@ from archfem.cases.toml_file import read_tables
 from archfem.dynamics.history import History
 from archfem.errors import ArchfemError, InvalidInput, logger
 from archfem.limit.collapse import Collapse, Outcome
+from archfem.masonry.loads import find_push
 from archfem.statics.pushover import Pushover
 from archfem.statics.stress import strength_use_table
 from archfem.view.collapse import draw_fall
@@ -200,11 +201,19 @@ def limit_files(case: Case, collapse: Collapse, text: str, doubts: Sequence[str]
     return {"limit.txt": text, "limit.csv": joints, "collapse.png": collapse.plot(), **stated}
 
 
-def pushover_files(push: Pushover, text: str) -> Files:
+def pushover_files(case: Case, push: Pushover, text: str) -> Files:
     """Return text, curve and picture of a pushover."""
     curve = push.curve.to_dataframe().to_csv().rstrip()
-    stated = state_outcome("pushover", repr(push).removeprefix("Pushover: ")).as_file("pushover")
-    return {"pushover.txt": text, "pushover.csv": curve, "pushover.png": push.plot(), **stated}
+    peak = push.factor * abs(find_push(case.pushover.live if case.pushover else []))
+    demand, factor = compare_push(case, peak, peak) if peak else ("", "")
+    words = repr(push).removeprefix("Pushover: ")
+    stated = state_outcome("pushover", words, demand=demand or "-", factor=factor or "-")
+    return {
+        "pushover.txt": text,
+        "pushover.csv": curve,
+        "pushover.png": push.plot(),
+        **stated.as_file("pushover"),
+    }
 
 
 def dead_load_files(result: DeadLoadResult) -> Files:

@@ -386,23 +386,36 @@ def _compare_senses(found: Collapse, opposite: Collapse) -> str:
     return f"{rank}, as far as a search can tell" if searched else rank
 
 
+def site_acceleration(case: Case) -> float:
+    """Return the ground acceleration of the site's spectrum [g]; undefined (NaN) without one."""
+    spectrum = case.assessment.spectrum or case.target
+    return float(spectrum.horizontal(0.0)) if spectrum is not None else np.nan
+
+
 def compare_with_site(case: Case, found: Collapse) -> tuple[str, str]:
     """Return the site's ground acceleration, and its multiple at collapse; both empty if unknown.
 
     The multiple is that of a push by the weight, over what is assumed of a fill.
     """
-    spectrum = case.assessment.spectrum or case.target
-    if spectrum is None or not found.push or found.outcome is not Outcome.COLLAPSES:
+    if not found.push or found.outcome is not Outcome.COLLAPSES:
         return "", ""
-    ground, rock = float(spectrum.horizontal(0.0)), getattr(spectrum, "ag", None)
-    proved = ""
-    if found.solutions and found.solutions.may_be_less and found.over_fill is None:
+    demand, factor = compare_push(case, *(bound * abs(found.push) for bound in found.range))
+    if factor and found.solutions and found.solutions.may_be_less and found.over_fill is None:
         # the search may have missed a weaker solution
-        least = found.solutions.bracket[0] * abs(found.push) / ground
-        proved = f" (proved ≥ {least:.3g})" if least > 0.0 else " (no lower bound is known)"
+        _, least = compare_push(case, *[found.solutions.bracket[0] * abs(found.push)] * 2)
+        factor += f" (proved ≥ {least})" if float(least) > 0.0 else " (no lower bound is known)"
+    return demand, factor
+
+
+def compare_push(case: Case, low: float, high: float) -> tuple[str, str]:
+    """Return the site's ground acceleration, and how many times it two pushes [g] are."""
+    spectrum, ground = case.assessment.spectrum or case.target, site_acceleration(case)
+    if np.isnan(ground):
+        return "", ""
+    rock = getattr(spectrum, "ag", None)
     size = f"{ground:.3g} g" if rock is None else f"{rock:.3g} g × S {ground / rock:.3g}"
-    low, high = (f"{bound * abs(found.push) / ground:.3g}" for bound in found.range)
-    return f"the site's {size}", f"{low}{proved}" if low == high else f"{low} to {high}"
+    ends = (f"{push / ground:.3g}" for push in (low, high))
+    return f"the site's {size}", " to ".join(dict.fromkeys(ends))
 
 
 def describe_pushover(push: Pushover) -> str:

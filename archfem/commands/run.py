@@ -484,7 +484,7 @@ def print_results(case: Case, found: Iterable[Result], folder: Path) -> tuple[st
             elif isinstance(result, Pushover):
                 text = result_text.describe_pushover(result)
                 print(text)
-                write(results.pushover_files(result, text), folder)
+                write(results.pushover_files(case, result, text), folder)
             elif isinstance(result, Suite):
                 suite = result
                 print_motions(suite)

@@ -428,6 +428,9 @@ class CollapseScale:
             met = f"{met}, {'the other' if len(self.searches) == 2 else 'the last'} time step {at}"
         if self.dislocated < inf:
             met = f"dislocated from {self.dislocated:#.3g} ×, {met}"
+        if self.moves <= self.held:
+            least = min(search.runs[0].scale for search in self.searches.values())
+            met = f"a mechanism from {self.moves:#.3g} ×{' or less' * (self.moves == least)}, {met}"
         return _say_bracket("stands", self.held, self.pga, met) + self._say_tested()
 
     def _say_tested(self) -> str:
@@ -480,6 +483,12 @@ class CollapseScale:
         made = (run.scale for search in self.searches.values() for run in search.runs)
         below = [scale for scale in made if scale <= lower and scale < min(unknown, default=inf)]
         return max(below, default=0.0)
+
+    @property
+    def moves(self) -> float:
+        """Smallest scale at which failed joints let blocks move [-]; infinite for none."""
+        runs = (run for search in self.searches.values() for run in search.runs)
+        return min((run.scale for run in runs if run.mechanisms.get("verified")), default=inf)
 
     @property
     def dislocated(self) -> float:
@@ -660,7 +669,8 @@ def collapse_scale(
     def run_scaled(step: float, scale: float) -> ScaledRun:
         run = _run_as_far(model, motion.scaled(scale), start=begin, damping=damping, dt=step)
         doubts, follows = tuple(map(str, run.doubts)), run.dataset.attrs.get("admissible_step", inf)
-        return ScaledRun(scale, {}, run.ending, run.outcome, run.fall, doubts, follows)
+        met = run.mechanisms
+        return ScaledRun(scale, met, run.ending, run.outcome, run.fall, doubts, follows)
 
     limits, limit = admissible_range(between, motion), (COLLAPSE_DEFINITION,)
 

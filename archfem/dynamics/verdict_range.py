@@ -29,7 +29,8 @@ MAX_EDGES = 250  # conditions of each sense on one property
 # Displacements of equal runs of other time steps differ by chance up to here [-]
 MAX_RATIO_OF_DISPLACEMENTS = 1.5
 
-UNVARIED = "unvaried"  # name of the run as given among single changes
+# Names of single changes: the run as given, and that of other time steps
+UNVARIED, HALF_STEP = "unvaried", "half the time step"
 
 
 @validate_methods
@@ -350,7 +351,7 @@ def _name_change(name: str, value: Any) -> str:
         return f"{factors.get(name, 'motion')} {sign} {factor:.3g}"
     if name == "friction":
         return f"friction {'+' if value > 0.0 else '-'} {abs(value):.3g}"
-    labels = {"sign": f"motion {value}", "dt": f"{value} the time step"}
+    labels = {"sign": f"motion {value}", "dt": HALF_STEP}
     return labels.get(name, f"{property_text(name)} '{value}'")
 
 

@@ -35,7 +35,7 @@ from archfem.limit.linear_programme import Optimum, Programme, RigidBlocks
 from archfem.limit.mechanism_kinematics import RigidRegions
 from archfem.limit.mechanism_names import name_mechanism
 from archfem.limit.nonassociated import NonassociatedBounds, search_nonassociated
-from archfem.masonry.loads import Action, BodyForce, PointLoad, Settlement, list_loads
+from archfem.masonry.loads import Action, PointLoad, Settlement, find_push, list_loads
 from archfem.masonry.structure import (
     HasStructure,
     Structure,
@@ -131,8 +131,7 @@ class Collapse(ResultDisplay):
     @property
     def push(self) -> float:
         """Horizontal body force that alone grows, at a factor of 1 [g]; else 0."""
-        load = self.live[0] if len(self.live) == 1 else None
-        return load.horizontal if isinstance(load, BodyForce) and not load.vertical else 0.0
+        return find_push(self.live)
 
     @property
     def sentence(self) -> str:

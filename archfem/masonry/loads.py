@@ -223,3 +223,10 @@ def list_loads(given: Action | Sequence[Action]) -> list[Action]:
             "of them; a Settlement comes alone"
         )
     return list(several)
+
+
+def find_push(live: "Action | Settlement | Sequence[Action | Settlement]") -> float:
+    """Return the horizontal body force that alone grows [g]; 0 for other loads."""
+    several = live if isinstance(live, list | tuple) else [live]
+    load = several[0] if len(several) == 1 else None
+    return load.horizontal if isinstance(load, BodyForce) and not load.vertical else 0.0

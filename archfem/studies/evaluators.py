@@ -14,6 +14,7 @@ from archfem._validation import validate_arguments
 from archfem.cases.analysis_keys import rate_case
 from archfem.cases.case import Case
 from archfem.cases.provenance import hash_inputs, remove_presentation
+from archfem.cases.result_text import site_acceleration
 from archfem.cases.run import DeadLoadResult, log_prefix
 from archfem.dynamics.analysis import Analysis
 from archfem.dynamics.history import (
@@ -184,12 +185,16 @@ def scales_of(result: DeadLoadResult, motion: Motion, **options: Any) -> Finding
 def evaluate_limit(case: Case) -> Findings:
     """Return the collapse factor of a case by limit analysis, and the size of its mechanism."""
     collapse = case.limit.solve(case.structure)
-    return {
+    findings: Findings = {
         "factor": float(collapse.factor),
         "outcome": str(collapse.outcome.name).lower(),
         "hinges": len(collapse.hinges),
         "slides": len(collapse.sliding),
     }
+    if collapse.push:
+        push, site = float(collapse.factor) * abs(collapse.push), site_acceleration(case)
+        findings |= {"push": push} | ({"push_over_site": push / site} if site > 0.0 else {})
+    return findings
 
 
 def evaluate_rating(case: Case) -> Findings:
@@ -270,6 +275,7 @@ NAMED_EVALUATORS: Mapping[str, Callable[..., Findings]] = {
 
 # SI units of findings by function; findings without one are ratios, counts or words
 FINDING_UNITS: Mapping[Callable[..., Mapping[str, Any]], Mapping[str, str]] = {
+    evaluate_limit: {"push": "g"},
     evaluate_rating: {"position": "m"},
     evaluate_history: {
         "rotation": "rad",

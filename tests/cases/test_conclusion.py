@@ -8,10 +8,12 @@ import xarray as xr
 
 import archfem as af
 from archfem.cases import result_text
-from archfem.cases.report import conclusion
+from archfem.cases.report import conclusion, sections
 from archfem.cases.report.report_data import ReportData
 from archfem.dynamics import VerdictRange
 from archfem.models.model import Doubt
+
+SPECTRUM = {"spectrum": {"code": "EC8", "ag": 0.2, "ground": "A"}}
 
 
 def verdict_of(outcome="stands", displacement=0.1, doubts=(), verified=None):
@@ -101,38 +103,158 @@ def test_the_weightiest_doubts_of_a_result_are_not_folded_away(case):
 @pytest.mark.parametrize(
     ("outcomes", "verified", "moves"),
     [
-        (("stands", "dislocated"), "rocks", True),
-        (("stands", "stands"), None, False),
-        (("stands", "fallen"), "rocks", False),
+        (("stands", "dislocated"), "rocks", "in the runs it moves, and falls in none"),
+        (("stands", "stands"), None, ""),
+        (("stands", "fallen"), None, "in the runs it moves"),
     ],
 )
-def test_a_push_is_no_margin_of_what_moves_and_scales_say_where_it_is_dislocated(
-    case, outcomes, verified, moves
-):
-    data = data_of(
-        case,
-        **{f"m{k}": verdict_of(each, verified=verified) for k, each in enumerate(outcomes)},
-    )
-    scaled = "dislocated from 1.41 ×, stands again at 0.888 g (3.43 × the motion), falls at 0.9 g"
+def test_a_push_is_no_margin_of_what_moves(case, outcomes, verified, moves):
+    verdicts = (verdict_of(each, verified=verified) for each in outcomes)
+    data = data_of(case, **{f"m{k}": each for k, each in enumerate(verdicts)})
+    bounded, elastic = "1.04 (proved ≥ 0.9)", "1.02"
     rows = [
-        ("scale of the motion", "'first'", scaled, "3.43"),
-        ("scale of the motion", "'second'", "stands at 0.9 g (4.00 × the motion)", "4.00"),
-        ("limit analysis", "the site's 0.2 g", "mechanism", "1.04"),
+        ("limit analysis", "the site's 0.2 g", "mechanism", bounded),
+        ("pushover", "the site's 0.2 g", "factor 0.204", elastic),
     ]
-    pushed, rank = "the least margin is 1.04, for a push by the site's 0.2 g to begin to move it", 1
+    bodies = {f"at most {bounded}": "as rigid blocks", elastic: "with elastic joints"}
     if moves:
-        pushed, rank = (
-            "a static push of 1.04 times the site's 0.2 g begins to move it; in the runs it begins "
-            "to move, and falls in none",
-            0,
-        )
-    assert [*conclusion._describe_margin(data, rows)] == [
-        pushed,
-        f"{('the least margin', 'the next')[rank]} is 3.43 on 'first': up to there it falls in no "
-        "run, and is dislocated from 1.41 × under 'first' on; the least of 2 motions",
+        expected = [
+            f"a push of {size} times the site's 0.2 g {body} is no margin: {moves}"
+            for size, body in bodies.items()
+        ]
+    else:
+        ranks = dict(zip(bodies, ("the next is", "the least margin is"), strict=True))
+        expected = [
+            f"{ranks[size]} {size}, for a push by the site's 0.2 g to begin to move it {body}"
+            for size, body in reversed(bodies.items())
+        ]
+    assert [*conclusion._describe_margin(data, rows)] == expected
+    rows[:] = [("limit analysis", "the site's 0.2 g", "mechanism", "0.9")]
+    least = "the least margin is 0.9, for a push by the site's 0.2 g to begin to move it"
+    assert [*conclusion._describe_margin(data, rows)] == [least, *filter(None, [moves])]
+
+
+@pytest.mark.parametrize("verified", ["rocks", None])
+def test_a_check_of_what_begins_to_move_is_one_of_displacements_where_it_moves(case, verified):
+    data = data_of(case, a=verdict_of(verified=verified))
+    vars(data)["case"] = af.Case.of({**case.settings, "assessment": SPECTRUM})
+    row = ("assessment: code, right", "1 m/s²", "2 m/s², passes", "1.1 (0.842 by displacements)")
+    expected = [
+        "the least margin is 1.1 (0.842 by displacements), on the EC8 spectrum of PGA 0.2 g, by "
+        "code, right",
+        "1.1 times the spectrum begins to move it",
+        "if it moved, it could be displaced by 0.842 times the demand",
     ]
-    rows[-1] = ("limit analysis", "the site's 0.2 g", "mechanism", "0.9")
-    assert next(conclusion._describe_margin(data, rows)).startswith("the least margin is 0.9, for")
+    if verified:
+        expected = [
+            "the least margin is 0.842, on the EC8 spectrum of PGA 0.2 g, by code, right, which it "
+            "fails",
+            "it is one of displacements, for in the runs it moves, and falls in none",
+        ]
+    assert [*conclusion._describe_margin(data, [row])] == expected
+
+
+def test_the_margin_of_scales_ends_where_it_is_dislocated(case):
+    rocks = "stands at 0.3 g (1.38 × the motion), a mechanism from 0.85 × or less"
+    rows = [
+        ("scale of the motion", f"'{name}', PGA 0.2 g", outcome, factor)
+        for name, outcome, factor in (
+            ("a", f"{rocks}, dislocated from 1.41 ×, falls at 0.9 g (4.5 × the motion)", "1.38"),
+            ("b", "stands at 2.00 × the motion, falls at 0.5 g (2.10 × the motion)", "2.00"),
+            ("c", "falls at 0.2 g (1.00 × the motion); no smaller scale is known", "-"),
+        )
+    ]
+    data = data_of(case)
+    vars(data)["pairs"] = ("a", "b", "c", "d")
+    assert [*conclusion._describe_margin(data, rows)] == [
+        "the least margin is 1.38 on 'a', PGA 0.2 g, the least of 2 motions",
+        "it moves as a mechanism from 0.85 × or less on, is dislocated from 1.41 × on and falls "
+        "from 4.5 × on",
+        "it falls first under 'b', from 2.10 × on",
+        "no scale is known up to which it stands under 'c'",
+        "'d' was not scaled",
+    ]
+    small = (
+        "no mechanism at 0.1 g (0.5 × the motion), first mechanism at 0.11 g (0.55 × the motion)"
+    )
+    rows = [("scale of the motion", "'a', PGA 0.2 g", small, "0.5")]
+    assert [*conclusion._describe_margin(data, rows)][:2] == [
+        "the least margin is 0.5 on 'a', PGA 0.2 g, which it fails",
+        "it forms a mechanism from 0.55 × on",
+    ]
+    other = "stands at 0.3 g (1.5 × the motion), falls at no scale that was tried"
+    rows = [("scale of the motion", "'a', PGA 0.2 g", other, "1.5")]
+    assert [*conclusion._describe_margin(data, rows)][1] == "it falls in no run"
+
+
+def test_doubts_of_several_motions_are_one(case):
+    """With ranges of a few numbers, else in the numbers of the first; others stay as they are."""
+    doubts = [
+        ("scale", f"under '{name}': at {scale} × by 2 ms: joints let it fall")
+        for name, scale in (("a", "1.48"), ("b", "2.18"))
+    ]
+    doubts += [
+        ("scale", f"under '{name}': it falls between {low} and {low}1 ×, by 1 ms from {low}2 ×")
+        for name, low in (("a", "1.4"), ("b", "2.4"), ("c", "1.7"))
+    ]
+    doubts += [("risk", "it errs by 1.5 %"), ("risk", "it errs by 2.5 %")]
+    assert [*conclusion._merge_motions(doubts)] == [
+        ("scale", "under 'a' and 'b': at 1.48 to 2.18 × by 2 ms: joints let it fall"),
+        (
+            "scale",
+            "under 'a': it falls between 1.4 and 1.41 ×, by 1 ms from 1.42 ×; likewise under 'b' "
+            "and 'c'",
+        ),
+        *doubts[-2:],
+    ]
+
+
+def test_a_displacement_has_the_range_of_its_time_steps_and_single_changes_are_said(case):
+    """Those of one motion; equal words on several motions are one sentence."""
+    ranges = [range_of(0.02, 0.12, 0.05, motion=name) for name in "ab"]
+    for found in ranges:
+        found.dataset["sampled"][:2] = False
+        found.dataset["dt"][1] = "half"
+    data = data_of(case, ranges[0], a=verdict_of(displacement=0.1), b=verdict_of())
+    (row, *_) = (row for _, row in conclusion._capacity_rows(data))
+    assert row[2] == (
+        "stands in 2 of 2 runs; displaced by up to 100 mm (over time steps 20 mm to 120 mm under "
+        "'a'), 0 mm at the end"
+    )
+    same = "it falls with none of 1 single changes"
+    moved = "unvaried it is displaced by 20 mm, by 120 mm with half the time step"
+    assert [*conclusion._say_single_changes(ranges)] == [
+        f"under 'a' and 'b' {same}",
+        f"under 'a' and 'b' {moved}",
+    ]
+    assert [*conclusion._say_single_changes(ranges[:1])] == [same, moved]
+    assert next(conclusion._describe_ranges(ranges)) == (
+        "in variations of its properties it falls in 0 of 3 under 'a' and in 0 of 3 under 'b'"
+    )
+
+
+def test_single_changes_are_drawn_and_tabulated_the_worst_first():
+    """The bar of a fall would hide the others; where all are alike there is no picture."""
+    found = range_of(0.02, 0.12, 9.0)
+    found.dataset["sampled"][:] = False
+    found.dataset["dt"][1] = "half"
+    found.dataset["sign"] = "run", np.array(["as given", "as given", "reversed"])
+    found.dataset.attrs["properties"] = ["dt", "sign"]
+    found.dataset["outcome"] = "run", np.array(["stands", "stands", "fallen"])
+    figure, table = sections._build_single_changes(found, "a")
+    assert [row[:2] for row in table.rows] == [
+        ("motion reversed", "fallen"),
+        ("half the time step", "stands"),
+        ("unvaried", "stands"),
+    ]
+    assert table.caption == "Single changes under 'a', the worst first"
+    (axes,) = figure.figure.axes
+    assert [bar.get_width() for bar in axes.patches] == pytest.approx(
+        [20.0, np.nan, 120.0], nan_ok=True
+    )
+    found.dataset["displacement"][:] = 0.02
+    assert [each.kind for each in sections._build_single_changes(found, "")] == ["grid"]
+    assert sections._build_single_changes(range_of(0.1, 0.1, sampled=True), "") == []
 
 
 @pytest.mark.parametrize(
@@ -164,7 +286,11 @@ def test_what_was_not_varied_names_displacements(case):
         (range_, "ab", "Lengths, properties under 'b', size", " not varied."),
     ):
         data = data_of(case, found, **{name: verdict_of() for name in names})
-        lead = conclusion.build_conclusion(data).pieces[0].text
+        (lead,) = (
+            each.text
+            for each in conclusion.build_conclusion(data).pieces
+            if getattr(each, "lead", "").startswith("What would change")
+        )
         assert lead.partition("raise no doubt. ")[2].startswith(first)
         assert lead.endswith(last)
         assert (none in lead) == (found is None)

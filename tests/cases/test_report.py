@@ -178,16 +178,18 @@ def test_demand_and_capacity_stand_beside_their_doubts(kept, undrawn):
     ]
     texts = [each.text for each in sentences if each.kind == "words"]
     assert texts[0] == "Demand, as stated: 0.25 g, 475 years."
-    assert texts[1] == (
-        "The structure forms no mechanism under all 2 motions of PGA "
-        "0.05 g. The least margin is 0.5 (0.45 with one weight a body), on the spectrum of the "
-        "motion, by a code, right and left, which it fails. The runs have a vertical motion "
-        "too, of up to 0.03 g; limit analysis and kinematic assessment have none. The "
-        "doubts below, on limit analysis, kinematic assessment, may change this. Lengths, "
+    leads = ["Does it stand?", "By which margin?", "What would change the answer?"]
+    assert [each.lead for each in sentences if each.kind == "words"][1:4] == leads
+    assert texts[1:4] == [
+        "The structure forms no mechanism under all 2 motions of PGA 0.05 g.",
+        "The least margin is 0.5 (0.45 with one weight a body), on the spectrum of the motion, by "
+        "a code, right and left, which it fails. The runs have a vertical motion too, of up to "
+        "0.03 g; limit analysis and kinematic assessment have none.",
+        "The doubts below, on limit analysis, kinematic assessment, may change this. Lengths, "
         "stiffness, friction, damping, time step and fidelity "
-        "were not varied, and displacements have no range."
-    )
-    assert texts[2:] == [
+        "were not varied, and displacements have no range.",
+    ]
+    assert texts[4:] == [
         "In doubt, limit analysis: A made one.",
         "In doubt, kinematic assessment: An upper bound.",
         "Note, kinematic assessment: Faces slide flat.",
@@ -196,10 +198,11 @@ def test_demand_and_capacity_stand_beside_their_doubts(kept, undrawn):
     assert facts["in doubt"] == "limit analysis, kinematic assessment"
     assert facts["verdict"] == "no mechanism in 2 of 2 runs; fails a code, right and left"
     alone = report_data.ReportData(case, {}, found.folder)
-    question, lead = (piece.text for piece in build_conclusion(alone).pieces[:2])
-    assert question == texts[0]
-    assert lead.startswith("Limit analysis: it turns, at 4.8 times the load")
-    assert "The least margin is 0.5 (0.45 with one weight a body), on the spectrum of the" in lead
+    question, result, margin = build_conclusion(alone).pieces[:3]
+    assert question.text == texts[0]
+    assert result.lead == "Result"
+    assert result.text.startswith("Limit analysis: it turns, at 4.8 times the load")
+    assert margin.text.startswith("The least margin is 0.5 (0.45 with one weight a body), on the ")
     outcomes = "the given load: it turns, at 4.8 times the load, factor 4.8; LM1: passes without "
     outcomes += "all, factor 1.25; 2.844 m/s² of the spectrum of the motion: 8.212 m/s², passes, "
     outcomes += "factor 2.89; "
@@ -221,7 +224,7 @@ def test_a_margin_names_its_spectrum_which_may_be_another_demand(kept, undrawn, 
     demands = [row[1] for row in table.rows if row[0].startswith("assessment")]
     assert demands == [f"{own} of {spectrum}" for own in ("2.844 m/s²", "0.22 m")]
     least = "0.5 (0.45 with one weight a body)"
-    assert f"The least margin is {least}, on {spectrum}, by a code, right" in pieces[0].text
+    assert f"The least margin is {least}, on {spectrum}, by a code, right" in pieces[1].text
     (note,) = (each.text for each in pieces if getattr(each, "text", "").startswith("Note, "))
     words = f" flat. The spectrum has a PGA of {1.15 * ag:.3g} g, and the motions have 0.05"
     assert (words in note) == noted
@@ -764,12 +767,13 @@ def test_a_fill_is_stated_as_elastic_and_not_varied(kept):
     assert "pga 2.94199 m/s²" in words["motion, synthetic, before matching", "default"]
     stated = ", ".join(conclusion.list_unvaried(data))
     assert "friction, damping, stiffness and strength of the fill, " in stated
-    concluded = build_conclusion(data).pieces
-    assert " is elastic in the runs and carries tension, which soil does not. " in concluded[0].text
-    assert not any("of the template" in getattr(piece, "text", "") for piece in concluded)
+    concluded = " ".join(getattr(x, "text", "") for x in build_conclusion(data).pieces)
+    assert " is elastic in the runs and carries tension, which soil does not. " in concluded
+    assert "of the template" not in concluded
     vars(data)["fidelity"] = "rigid"
     assert "fill" not in ", ".join(conclusion.list_unvaried(data))
-    assert "carries tension" not in build_conclusion(data).pieces[0].text
+    texts = [getattr(piece, "text", "") for piece in build_conclusion(data).pieces]
+    assert "carries tension" not in " ".join(texts)
     template = (Path(af.cases.__file__).parent / "new" / "bridge.toml").read_text(encoding="utf-8")
     named = {"report": {"project": re.search(r'project = "(.+)"', template)[1]}}
     data = report_data.ReportData(af.Case.of(tables | named), data.runs)
@@ -913,9 +917,9 @@ def test_a_study_stands_in_a_report(kept, unplotted, tmp_path, capsys):
     assert af.commands.main(["report", str(kept), "--study", str(folder)]) == 0
     shown = " ".join(words_of(kept / "report.html").split("Study of many cases")[2].split())
     assert "Study: Breadths." in shown
-    assert "structure.breadth factor 0.5 0.25 1 0.5" in shown
+    assert "structure.breadth push [g] 0.5 0.25 1 0.5" in shown
     conclusion = " ".join(words_of(kept / "report.html").split())
-    assert "In the study the factor is least, 0.25, at structure.breadth = 0.5." in conclusion
+    assert "In the study the push is least, 0.25 g, at structure.breadth = 0.5." in conclusion
     assert "Lengths" not in conclusion.partition("were not varied")[0]
     assert af.commands.main(["report", str(kept), "--study", str(tmp_path)]) == 1
     assert "has no study.txt" in capsys.readouterr().err

@@ -76,6 +76,16 @@ def test_of_factors_the_least_is_the_worst():
     higher = table.isel(case=[0, 1])
     (text,) = study_findings.say_what_changes(study_findings.collect_findings("", "", higher))
     assert text == "in the study none lowers the factor of 'a', 0.6"
+    pushed = table.assign(
+        push=("case", [0.25, 0.3, 0.4, 0.2], {"units": "g"}),
+        push_over_site=("case", [1.16, 1.4, 1.9, 0.926]),
+    )
+    found = study_findings.collect_findings("", "", pushed)
+    assert [*study_findings.say_what_changes(found)] == [
+        "in the study 'd' lowers the push most, from 0.25 g to 0.2 g",
+        "1 of 4 cases begins to move below the site's acceleration: 'd', at 0.926 of it",
+    ]
+    assert study_findings.tabulate_study(found).head == ["case", "push [g]", "push over site"]
     varied = xr.Dataset(
         {"factor": (("friction", "width"), [[0.6, 0.7], [0.5, 0.4]])},
         {"friction": [0.5, 0.4], "width": [1.0, 2.0]},

@@ -228,7 +228,7 @@ def test_a_range_is_of_each_motion_of_a_suite_and_replaces_none_of_another(
         (
             "large",
             "step",
-            r"tap: stands at \S+ g \(\S+ × the motion\), dislocated from \S+ ×, falls",
+            r"tap: stands at \S+ g \(.*\), a mechanism from 0.976 ×, dislocated from \S+ ×, falls",
         ),
         ("small", "mechanism", r"tap: no mechanism at \S+ g \(.*, first mechanism at .*, by "),
     ],

@@ -279,7 +279,7 @@ def searched_by_steps(monkeypatch, windows, made, follows=inf):
         attrs = {"admissible_step": 0.6 * dt} if dt > follows else {}
         dataset = SimpleNamespace(attrs=attrs)
         return SimpleNamespace(
-            ending=run.ending, outcome="", fall=run.fall, doubts=(), dataset=dataset
+            ending=run.ending, outcome="", fall=run.fall, doubts=(), dataset=dataset, mechanisms={}
         )
 
     monkeypatch.setattr("archfem.dynamics.motion_scaling.time_history", shake)
@@ -379,6 +379,13 @@ def test_smaller_scales_at_which_it_is_dislocated_are_said():
     said = str(CollapseScale({0.005: replace(found, runs=tuple(runs))}))
     assert said.startswith("stands at 1.00 × the motion, dislocated from 1.10 ×, falls at 1.40")
     assert "; stands or is dislocated at every smaller scale that was" in said
+    for first, words in ((1, "dislocated"), (0, "a mechanism from 1.00 × or less, dislocated")):
+        moved = [replace(run, mechanisms={"verified": k >= first}) for k, run in enumerate(runs)]
+        said = str(CollapseScale({0.005: replace(found, runs=tuple(moved))}))
+        assert said.startswith(f"stands at 1.00 × the motion, {words} from 1.10 ×, falls at 1.40 ×")
+    rests = [replace(run, mechanisms={"verified": k > 1}) for k, run in enumerate(found.runs)]
+    said = str(CollapseScale({0.005: replace(found, runs=tuple(rests))}))
+    assert said.startswith("stands at 1.30 × the motion, a mechanism from 1.20 ×, falls at 1.40 ×")
     bound = CollapseScale({0.005: replace(found, runs=(*runs[:1], runs[1], found.runs[-1]))})
     assert "; stands at every smaller scale that was run" in str(bound)
 

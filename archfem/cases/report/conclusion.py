@@ -19,7 +19,12 @@ from archfem.cases.result_text import RESULTS, Row
 from archfem.dynamics.collapse_state import COLLAPSE_STATES, FALLEN_STATES, CollapseState
 from archfem.dynamics.history import History
 from archfem.dynamics.verdict import NO_RANGE
-from archfem.dynamics.verdict_range import MAX_RATIO_OF_DISPLACEMENTS, VerdictRange
+from archfem.dynamics.verdict_range import (
+    HALF_STEP,
+    MAX_RATIO_OF_DISPLACEMENTS,
+    UNVARIED,
+    VerdictRange,
+)
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import join_names, join_words
 from archfem.models.model import Doubt
@@ -55,7 +60,15 @@ MAX_DOUBTS = 3
 _WEIGHTY = ("as rigid blocks none falls", "fall", "displace")
 
 # Numbers of a doubt that differ from run to run: names of joints end in whole ones
-_NUMBER = re.compile(r"(\d+\.\d+(?:e[-+]?\d+)?|\d+(?= (?:mm|m|ms|s|g|%)\b)|\d+(?=%))")
+_NUMBER = re.compile(
+    r"(\d+\.\d+(?:e[-+]?\d+)?|\d+(?= (?:mm|m|ms|s|g|%|of)\b)|(?<= of )\d+|\d+(?=%))"
+)
+
+# Numbers of a doubt beyond which their ranges over several motions would be hard to read
+MAX_RANGES = 2
+
+# Fidelity of the variations of a verdict
+VARIED_FIDELITY = "rigid"
 
 # Results of runs: histories, and their variations
 _HISTORIES, _VARIATIONS = "time histories", "variations"
@@ -68,8 +81,8 @@ PLACEHOLDER = "Name of the project"
 
 _FACTORS = (
     "; factor: the multiple of the demand at which a check is just passed or a load makes a "
-    "mechanism, up to which a scaled motion fells nothing, or at which a fall has a probability of "
-    "one half"
+    "mechanism, up to which a scaled motion neither fells nor dislocates it, or at which a fall has "
+    "a probability of one half"
 )
 
 
@@ -158,12 +171,13 @@ def build_conclusion(data: ReportData) -> Section:
         (name, demand, outcome + " (in doubt)" * (result in doubtful), factor)
         for result, (name, demand, outcome, factor) in _capacity_rows(data)
     ]
-    lead = [*map(sentence, _build_lead(data, rows, doubtful))]
-    lead = lead if data.statements.keys() == {"rating"} else [" ".join(lead)]
     demand = data.case.report.get("demand", "")
-    question = demand and sentence(f"demand, as stated: {demand}")
-    texts = filter(None, [question, *lead, " ".join(_describe_ends(data))])
-    blocks: list[Any] = [*map(TextBlock, texts)]
+    blocks: list[Any] = [TextBlock(sentence(f"demand, as stated: {demand}"))] if demand else []
+    for lead, texts in _build_paragraphs(data, rows, doubtful).items():
+        sentences = [*map(sentence, texts)]
+        if data.statements.keys() != {"rating"}:  # of a result that stands alone each is one
+            sentences = [" ".join(sentences)] if sentences else []
+        blocks += [TextBlock(each, lead=lead * (k == 0)) for k, each in enumerate(sentences)]
     for result in filter(doubts.get, doubtful):
         ordered = sorted(doubts[result], key=_weigh)
         shown = [sentence(text) for text in ordered[:MAX_DOUBTS]]
@@ -202,106 +216,171 @@ def _list_outdated(data: ReportData) -> Iterator[str]:
         yield f"{made}: {', '.join(earlier)}."
 
 
-def _build_lead(data: ReportData, rows: Sequence[Row], doubtful: Sequence[str]) -> list[str]:
-    """Return the answer: outcomes, their range, the least margin, what may change it."""
-    lead = [f"the structure {each}" for each in _describe_outcomes(data)]
+def _build_paragraphs(
+    data: ReportData, rows: Sequence[Row], doubtful: Sequence[str]
+) -> dict[str, list[str]]:
+    """Return the sentences of the answer by their leads: outcomes, margin, what may change it."""
+    answer = [f"the structure {each}" for each in _describe_outcomes(data)]
     if not data.runs:
         # an assessment is stated by the margin; a result that stands alone states all of itself
         stated = [each.sentences for name, each in data.statements.items() if name != "assessment"]
-        lead = [*stated[0]] if len(data.statements) == 1 and stated else [x for x, *_ in stated]
-    lead += _describe_ranges(data.verdict_ranges)
+        answer = [*stated[0]] if len(data.statements) == 1 and stated else [x for x, *_ in stated]
+    answer += [*_describe_ends(data), *_describe_ranges(data.verdict_ranges)]
+    changes = [*_say_single_changes(data.verdict_ranges)]
+    if (study := read_study(data)) is not None:
+        changes += say_what_changes(study)
     if fill := list_elastic_fill(data):
         carries = "is elastic in the runs and carries tension, which soil does not"
-        lead.append(f"{join_names(fill)} {carries}")
-    lead += [*_describe_margin(data, rows), *_say_vertical(data)]
-    if (study := read_study(data)) is not None:
-        lead += say_what_changes(study)
+        changes.append(f"{join_names(fill)} {carries}")
     if data.runs and not doubtful:
-        lead.append("the checks of the numbers raise no doubt")
-    lead += [f"the doubts below, on {join_names(doubtful)}, may change this"] if doubtful else []
+        changes.append("the checks of the numbers raise no doubt")
+    if doubtful:
+        changes.append(f"the doubts below, on {join_names(doubtful)}, may change this")
     if single := list_unvaried(data):
         none = ", and displacements have no range" * (not data.verdict_ranges)
-        lead.append(f"{join_words(single)} were not varied{none}")
-    return lead
+        changes.append(f"{join_words(single)} were not varied{none}")
+    return {
+        "Does it stand?" if data.runs else "Result": answer,
+        "By which margin?": [*_describe_margin(data, rows), *_say_vertical(data)],
+        "What would change the answer?": changes,
+    }
 
 
 def _describe_ranges(ranges: Sequence[VerdictRange]) -> Iterator[str]:
-    """Yield how often the structure falls in variations, and how far it moves; of each motion."""
+    """Yield how often the structure falls in variations, and how far it moves at most."""
     if len(ranges) == 1:
-        yield f"in variations of its properties it {ranges[0].sentence}"
+        count, _, groups = ranges[0].sentence.partition("; ")
+        yield f"in variations of its properties it {count}"
+        if groups:
+            yield f"it does so in {groups}"
     elif ranges:
         counts = [
-            f"{each.count} under '{each.dataset.attrs['motion']}'{each.unanswered}"
+            f"{each.count.removeprefix('falls ')} under '{each.dataset.attrs['motion']}'"
+            f"{each.unanswered}"
             for each in ranges
         ]
-        yield f"in variations of its properties it {'; '.join(counts)}"
+        yield f"in variations of its properties it falls {join_words(counts)}"
+    moved = {
+        float(np.nanmax(each.dataset["displacement"].values[~each.falls])): each
+        for each in ranges
+        if each.displacements
+    }
+    if moved:
+        far = moved[max(moved)]
+        motion = far.dataset.attrs.get("motion")
+        under = f"it moves farthest under '{motion}': " * (len(ranges) > 1)
+        yield under + far.displacements.partition(";")[0]
+
+
+def _say_single_changes(ranges: Sequence[VerdictRange]) -> Iterator[str]:
+    """Yield what single changes of the variations do, in one sentence for equal ones."""
+    texts: dict[str, list[str]] = {}
     for each in ranges:
-        if moved := each.displacements:
-            yield f"under '{each.dataset.attrs['motion']}' {moved}" if len(ranges) > 1 else moved
+        for text in each.what_changes:
+            texts.setdefault(text, []).append(f"'{each.dataset.attrs.get('motion')}'")
+    for text, motions in texts.items():
+        yield f"under {join_words(motions)} {text}" if len(ranges) > 1 else text
 
 
 def _describe_margin(data: ReportData, rows: Sequence[Row]) -> Iterator[str]:
     """Yield the least factor on the demand of an earthquake, maybe as a range, and the others."""
-    checks, others, moves = [], [], _say_motion(data)
+    moves, apart = _say_motion(data), list[str]()
+    margins, checks = list[tuple[float, list[str]]](), list[tuple[float, list[str]]]()
     for name, demand, outcome, factor in rows:
-        if factor == "-" or name == RESULTS["scale"]:
+        check = name.partition("assessment: ")[2]
+        if factor == "-":
             continue
-        least, check = float(factor.partition(" ")[0]), name.partition("assessment: ")[2]
-        fails = ", which it fails" * (least < 1.0)
-        over = " over what is assumed of the fill" * (" to " in factor)
-        if name == RESULTS["limit"] and demand.startswith("the site"):
-            if moves and least >= 1.0:  # shaken it moves before: the push is no margin
-                yield f"a static push of {factor} times {demand}{over} begins to move it{moves}"
+        if check:
+            checks.append(_describe_check(data, (check, outcome, factor), moves))
+        elif name in (RESULTS["limit"], RESULTS["pushover"]) and demand.startswith("the site"):
+            bound = "at most " * ("(" in factor)  # the least found, without proof that none is less
+            over = " over what is assumed of the fill" * (" to " in factor)
+            least, size = float(factor.partition(" ")[0]), f"{bound}{factor}"
+            of = " with elastic joints" if name == RESULTS["pushover"] else " as rigid blocks"
+            of *= bool(bound) or name == RESULTS["pushover"]
+            if moves and least >= 1.0:  # shaken it moves before
+                apart.append(f"a push of {size} times {demand}{over}{of} is no margin: {moves}")
             else:
-                words = f"{factor}{over}, for a push by {demand} to begin to move it"
-                others.append((least, words + moves))
-        elif check:
-            _, only, assumed = outcome.partition(" only with ")
-            only = f", passed only with {assumed}" if only else fails
-            ratios, *bodies = factor.partition(" (")
-            words = f"{ratios}{over}{''.join(bodies)}, on {name_spectrum(data)}, by {check}{only}"
-            if moved := re.search(r"([\d.]+) by displacements", factor):
-                words += (
-                    f": {ratios} times the spectrum begins to move it, and if it moved, it could "
-                    f"be displaced by {moved[1]} times the demand"
-                )
-            checks.append((least, words))
-    others += _describe_scales(data, [row for row in rows if row[0] == RESULTS["scale"]])
-    for k, (_, words) in enumerate(sorted([*others, *sorted(checks)[:1]])):
-        yield f"{('the least margin is', 'the next is', 'then follows')[min(k, 2)]} {words}"
+                words = f"{size}{over}, for a push by {demand} to begin to move it{of}"
+                margins.append((least, [words, *filter(None, [moves])]))
+    margins += _describe_scales(data, [row for row in rows if row[0] == RESULTS["scale"]])
+    for k, (_, (first, *others)) in enumerate(sorted([*margins, *sorted(checks)[:1]])):
+        rank = ("the least margin is", "the next is", "then follows")[min(k, 2)]
+        yield from [f"{rank} {first}", *others]
+    yield from apart
 
 
-def _describe_scales(data: ReportData, rows: Sequence[Row]) -> Iterator[tuple[float, str]]:
-    """Yield the least scale of all motions up to which it holds, and the motions without any."""
+def _describe_check(
+    data: ReportData, row: tuple[str, str, str], moves: str
+) -> tuple[float, list[str]]:
+    """Return the ratio of a check of an assessment, and its sentences."""
+    check, outcome, factor = row
+    ratios, opened, bodies = factor.partition(" (")
+    over = " over what is assumed of the fill" * (" to " in factor)
+    least, by = float(factor.partition(" ")[0]), f"on {name_spectrum(data)}, by {check}"
+    moved, begins = re.search(r"([\d.]+) by displacements", factor), list[str]()
+    if moved and moves:  # what moves at less than the push that begins it is judged by how far
+        least, ratios, opened, bodies = float(moved[1]), moved[1], "", ""
+        begins = [f"it is one of displacements, for {moves}"]
+    elif moved:
+        begins = [
+            f"{ratios} times the spectrum begins to move it",
+            f"if it moved, it could be displaced by {moved[1]} times the demand",
+        ]
+    _, only, assumed = outcome.partition(" only with ")
+    only = f", passed only with {assumed}" if only else ", which it fails" * (least < 1.0)
+    return least, [f"{ratios}{over}{opened}{bodies}, {by}{only}", *begins]
+
+
+# States that a search of scales finds, in the words of its outcome and of the conclusion
+_SCALED = {
+    "a mechanism": "moves as a mechanism",
+    "dislocated": "is dislocated",
+    "falls": "falls",
+    "first mechanism": "forms a mechanism",
+}
+
+
+def _list_scaled(outcome: str) -> dict[str, str]:
+    """List the states that a search of scales has found, each with its least scale."""
+    states = "|".join(_SCALED)
+    pattern = rf"({states}) (?:from|at) (?:[\d.]+ g \()?([\d.]+) ×( or less)?"
+    found = re.findall(pattern, outcome.partition(", the ")[0])
+    return {state: f"{scale} ×{less}" for state, scale, less in found}
+
+
+def _describe_scales(data: ReportData, rows: Sequence[Row]) -> Iterator[tuple[float, list[str]]]:
+    """Yield the least scale up to which it stands, what comes beyond, and motions without any."""
     motions = [row[1].partition(",")[0] for row in rows]
     named = list(zip(rows, motions, strict=True))
-    made = [(float(row[3]), row, name) for row, name in named if row[3] != "-"]
+    made = sorted((float(row[3]), name, row) for row, name in named if row[3] != "-")
     if not made:
         return
-    least, (_, demand, outcome, factor), _ = min(made, key=lambda each: each[0])
-    met = "forms a mechanism" if "mechanism" in outcome else "falls"
-    fails = ", which it fails" * (least < 1.0)
-    words = f"{factor} on {demand}{fails}: up to there it {met} in no run"
-    found = [(re.search(r"dislocated.*?([\d.]+ ×)", row[2]), name) for _, row, name in made]
-    parted = [(float(at[1].split()[0]), at[1], name) for at, name in found if at]
-    if parted:
-        _, scale, name = min(parted)
-        words += f", and is dislocated from {scale}{f' under {name}' * (len(made) > 1)} on"
+    least, first, row = made[0]
+    words = f"{row[3]} on {row[1]}{', which it fails' * (least < 1.0)}"
+    words += f", the least of {len(made)} motions" * (len(made) > 1)
+    found = {name: _list_scaled(row[2]) for _, name, row in made}
+    ends = [f"{_SCALED[state]} from {scale} on" for state, scale in found[first].items()]
+    ends += [] if {"falls", "first mechanism"} & found[first].keys() else ["falls in no run"]
+    texts = [words, f"it {join_words(ends)}"]
+    falls = {name: float(x["falls"].split()[0]) for name, x in found.items() if "falls" in x}
+    if falls and (weakest := min(falls, key=lambda name: falls[name])) != first:
+        texts.append(f"it falls first under {weakest}, from {found[weakest]['falls']} on")
     # a search without a scale that holds may have the least of all
-    none = [name for row, name in named if row[3] == "-"]
-    left = [name for name in (f"'{pair}'" for pair in data.pairs) if name not in motions]
-    parts = [f"the least of {len(made)} motions"] * (len(made) > 1)
-    parts += [f"no scale is known up to which it holds under {join_words(none)}"] * bool(none)
-    parts += [f"{join_words(left)} {'were' if left[1:] else 'was'} not scaled"] * bool(left)
-    yield least, "; ".join([words, *parts])
+    if none := [name for row, name in named if row[3] == "-"]:
+        texts.append(f"no scale is known up to which it stands under {join_words(none)}")
+    if left := [name for name in (f"'{pair}'" for pair in data.pairs) if name not in motions]:
+        texts.append(f"{join_words(left)} {'were' if left[1:] else 'was'} not scaled")
+    yield least, texts
 
 
 def _say_motion(data: ReportData) -> str:
-    """Say that a structure that begins to move in a run does not fall; empty if neither is so."""
+    """Say that a structure moves in a run, maybe without a fall; empty if it moves in none."""
     verdicts = [run.verdict for run in data.runs.values()]
-    moves = any(verdict.mechanisms.get("verified") for verdict in verdicts)
+    if not any(x.mechanisms.get("verified") or x.outcome in FALLEN_STATES for x in verdicts):
+        return ""
     held = all(verdict.outcome in COLLAPSE_STATES[:2] for verdict in verdicts)
-    return "; in the runs it begins to move, and falls in none" if moves and held else ""
+    return f"in the runs it moves{', and falls in none' * held}"
 
 
 def _say_vertical(data: ReportData) -> Iterator[str]:
@@ -352,7 +431,10 @@ def _capacity_rows(data: ReportData) -> Iterator[tuple[str, Row]]:
         sizes = np.array([[each.displacement, each.residual] for each in verdicts])
         if np.isfinite(sizes).all():
             largest, residual = map(format_mm, sizes.max(axis=0))
-            outcome += f"; displaced by up to {largest}, {residual} at the end"
+            over = "time steps" if data.fidelity == VARIED_FIDELITY else "time steps and fidelity"
+            steps = ", ".join(_list_ranges_of_steps(data))
+            beside = f" (over {over} {steps})" * bool(steps)
+            outcome += f"; displaced by up to {largest}{beside}, {residual} at the end"
         yield _HISTORIES, (_HISTORIES, demand, outcome, "-")
     for computed in data.verdict_ranges:
         motion = computed.dataset.attrs.get("motion")
@@ -366,6 +448,22 @@ def _capacity_rows(data: ReportData) -> Iterator[tuple[str, Row]]:
             if data.runs and demand == "no demand given":
                 beside = f"; beside it motions of {_describe_peaks(data.runs.values())}"
             yield RESULTS[result], (name, f"{demand}{beside}", *others)
+
+
+def _list_ranges_of_steps(data: ReportData) -> Iterator[str]:
+    """Yield how far a motion displaces the structure by the steps of its run and variations."""
+    for found in data.verdict_ranges:
+        motion = found.dataset.attrs.get("motion")
+        sizes = [
+            each.displacement
+            for each in found.single_changes
+            if each.name in (UNVARIED, HALF_STEP) and each.outcome in COLLAPSE_STATES[:2]
+        ]
+        runs = [run.verdict for run in data.runs.values() if run.dataset.attrs["motion"] == motion]
+        if sizes and runs and runs[0].outcome in COLLAPSE_STATES[:2]:
+            sizes.append(runs[0].displacement)
+            ends = f"{format_mm(min(sizes))} to {format_mm(max(sizes))}"
+            yield ends + f" under '{motion}'" * (len(data.runs) > 1)
 
 
 def _describe_outcomes(data: ReportData) -> Iterator[str]:
@@ -420,30 +518,56 @@ def list_doubts(data: ReportData) -> list[tuple[str, str]]:
     verdicts = [run.verdict for run in data.runs.values()]
     doubts = [(_HISTORIES, text) for text in _merge_doubts([v.doubts for v in verdicts])]
     for found in data.verdict_ranges:
+        under = f"under '{found.dataset.attrs['motion']}': " * (len(data.verdict_ranges) > 1)
         doubts += [(_VARIATIONS, text) for text in _doubt_displacement(data, found)]
-        doubts += [(_VARIATIONS, doubt.cause) for doubt in found.doubts]
+        doubts += [(_VARIATIONS, f"{under}{doubt.cause}") for doubt in found.doubts]
     if data.verdict_ranges and (fill := list_elastic_fill(data)):
         text = f"variations take {', '.join(fill)} as rigid: as an elastic body it was not varied"
         doubts.append((_VARIATIONS, text))
     for name, stated in data.statements.items():
         doubts += [(RESULTS[name], doubt) for doubt in stated.doubts]
-    return list(dict.fromkeys(doubts))
+    return [*_merge_motions(dict.fromkeys(doubts))]
+
+
+def _merge_motions(doubts: Iterable[tuple[str, str]]) -> Iterator[tuple[str, str]]:
+    """Yield each doubt of a result once, with all motions under which it is true."""
+    found: dict[tuple[str, ...], list[tuple[str, str]]] = {}
+    for result, text in doubts:
+        named = re.search(r"under '([^']+)'", text)
+        plain = text.replace(named[0], "\0", 1) if named else text
+        kind = _NUMBER.split(plain)[::2] if named else [text]
+        found.setdefault((result, *kind), []).append((named[1] if named else "", plain))
+    for (result, *_), same in found.items():
+        motions, texts = ([*dict.fromkeys(column)] for column in zip(*same, strict=True))
+        first, *others = (f"'{motion}'" for motion in motions)
+        merged, differing = _merge_numbers(texts)
+        if differing > MAX_RANGES:
+            merged = f"{texts[0]}; likewise under {join_words(others)}".replace(
+                "\0", f"under {first}"
+            )
+        yield result, merged.replace("\0", f"under {join_words([first, *others])}")
 
 
 def _merge_doubts(runs: Sequence[Iterable[Doubt]]) -> Iterator[str]:
-    """Yield each doubt of some runs once, with how many have it, and numbers that differ as ranges.
-
-    A doubt of one run alone is as it is.
-    """
-    found: dict[tuple[str, ...], list[list[str]]] = {}
+    """Yield each doubt of some runs once, with how many have it; that of a run alone as it is."""
+    found: dict[tuple[str, ...], list[str]] = {}
     for cause in (cause for doubts in runs for cause in dict.fromkeys(x.cause for x in doubts)):
-        texts = _NUMBER.split(cause)
-        found.setdefault(tuple(texts[::2]), []).append(texts[1::2])
-    for (first, *texts), rows in found.items():
-        columns = [sorted(set(column), key=float) for column in zip(*rows, strict=True)]
-        ranges = (f"{column[0]} to {column[-1]}" if column[1:] else column[0] for column in columns)
-        merged = first + "".join(map("".join, zip(ranges, texts, strict=True)))
-        yield f"{len(rows)} of {len(runs)} runs: {merged}" if len(runs) > 1 else merged
+        found.setdefault(tuple(_NUMBER.split(cause)[::2]), []).append(cause)
+    for texts in found.values():
+        merged, _ = _merge_numbers(texts)
+        yield f"{len(texts)} of {len(runs)} runs: {merged}" if len(runs) > 1 else merged
+
+
+def _merge_numbers(texts: Sequence[str]) -> tuple[str, int]:
+    """Return texts that differ in numbers alone as one, with their ranges, and how many differ."""
+    parts = [_NUMBER.split(text) for text in texts]
+    columns = [
+        sorted(set(column), key=float) for column in zip(*(x[1::2] for x in parts), strict=True)
+    ]
+    ranges = [" to ".join(dict.fromkeys((column[0], column[-1]))) for column in columns]
+    merged = parts[0]
+    merged[1::2] = ranges
+    return "".join(merged), sum(len(column) > 1 for column in columns)
 
 
 def _weigh(doubt: str) -> int:

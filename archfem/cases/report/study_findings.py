@@ -16,8 +16,9 @@ from archfem.errors import InvalidInput
 from archfem.units import format_mm
 from archfem.view.pages.document import Grid
 
-# Findings that a report shows, those that decide first: of factors the least is the worst
-_FACTORS = ("factor", "without_pressure")
+# Findings that a report shows, those that decide first: of factors the least is the worst, and
+# those of a push are shown in g
+_FACTORS = ("push", "push_over_site", "factor", "without_pressure")
 _SIZES = ("residual_displacement", "largest_displacement")
 MAX_CASES = 24
 MAX_NAMES = 4  # of cases in a sentence
@@ -78,7 +79,8 @@ def collect_findings(title: str, text: str, table: xr.Dataset) -> StudyFindings:
     frame = table.to_dataframe().reset_index()
     differing = [str(name) for name in table.coords if frame[name].nunique() > 1]
     keys = [name for name in differing if name not in _NO_CASE] or differing
-    names = [name for name in (*_FACTORS, *_SIZES) if name in table.data_vars]
+    shown = [name for name in (*_FACTORS, *_SIZES) if name in table.data_vars]
+    names = [name for name in shown if name != "factor" or "push" not in shown]
     worst = _find_worst(frame, keys, names) if keys and names else frame.head(0)
     return StudyFindings(title, text, table, tuple(keys), tuple(names), worst)
 
@@ -147,6 +149,13 @@ def say_what_changes(found: StudyFindings) -> Iterator[str]:
         yield text + _compare_cases(found, others)
     elif falling:
         yield text.removesuffix("; of the others ")
+    # undefined without a demand
+    below = [row for row in rows if row.get("push_over_site", np.nan) < 1.0]
+    if below:
+        listed = [f"{found.label(row)}, at {row['push_over_site']:.3g} of it" for row in below]
+        count = f"{len(below)} of {len(rows)} cases begin{'s' * (len(below) == 1)} to move"
+        more = f" and {len(below) - MAX_NAMES} more" * (len(below) > MAX_NAMES)
+        yield f"{count} below the site's acceleration: {'; '.join(listed[:MAX_NAMES])}{more}"
 
 
 def _compare_cases(found: StudyFindings, rows: list[Any]) -> str:
@@ -154,7 +163,8 @@ def _compare_cases(found: StudyFindings, rows: list[Any]) -> str:
     name, first = found.decides, rows[0]
     least, words = name in _FACTORS, name.replace("_", " ")
     extreme = (min if least else max)(rows, key=lambda row: row[name])
-    show = format_mm if found.table[name].attrs.get("units") == "m" else "{:.3g}".format
+    unit = found.table[name].attrs.get("units", "")
+    show = format_mm if unit == "m" else lambda value: f"{value:.3g} {unit}".strip()
     if found.keys != ("case",):  # none of them is the given one
         end = "least" if least else "largest"
         return f"the {words} is {end}, {show(extreme[name])}, at {found.label(extreme)}"

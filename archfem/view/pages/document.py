@@ -37,6 +37,7 @@ class TextBlock:
     # preformatted text
     manner: str = "plain"
     caption: str = ""  # above preformatted text that is a table
+    lead: str = ""  # first words of a paragraph, in bold letters
 
     kind = "words"
 

@@ -51,6 +51,8 @@ def _add_text(word: Any, block: TextBlock) -> None:
     if block.caption:
         word.add_paragraph(block.caption, "Caption").paragraph_format.keep_with_next = True
     paragraph = word.add_paragraph()
+    if block.lead:
+        paragraph.add_run(f"{block.lead} ").bold = True
     parts = [block.text] if block.manner == "lines" else block.text.split("`")
     for number, part in enumerate(parts):
         run = paragraph.add_run(part)
