@@ -32,10 +32,9 @@ from archfem.statics.pushover import Pushover
 from archfem.statics.stress import strength_use_table
 from archfem.view.collapse import draw_fall
 from archfem.view.histories import draw_envelope, draw_envelopes
-from archfem.view.positions import decisive_instant
 from archfem.view.statics import draw_free_body
 from archfem.view.stress import draw_stress
-from archfem.view.structure import draw_during, draw_names
+from archfem.view.structure import draw_critical, draw_names
 from archfem.view.style import Files
 
 
@@ -238,9 +237,8 @@ def run_files(run: Run, at_rest: DeadLoadResult, text: str) -> Files:
     """Return critical instant, envelope, joints over time, fall, film and summary of a run."""
     case, history, dead = run.case, run.history, at_rest.dead
     files: Files = {} if case.suite is None else {"motion.png": run.motion.plot()}
-    critical = history.joints.sel(time=decisive_instant(history), method="nearest")
     files |= {
-        "critical_instant.png": draw_during(dead.model, history, critical),
+        "critical_instant.png": draw_critical(case.structure, history, dead.model),
         "envelope.png": draw_envelope({case.title: history}, dead=dead.joints),
         # The joints of the case, or else those of the largest |e| and of the longest sliding.
         "joints.png": history.plot(joints=case.joints or None),

@@ -77,13 +77,19 @@ def run(options: argparse.Namespace) -> int:
     failure = None
     # All else is printed after the verdict, which is known last.
     with _print_at_end(folder, "run", case.title) as verdict, replace_run(case, folder) as draft:
+        computed = carry_out(case, draft)
         if options.workers > 1 and case.suite is not None:
             from archfem.studies.study import compute_pairs
 
-            # Workers save the histories, which are reused below.
+            # Workers save the histories, which are read below.
+            before = {path.parent.name for path in draft.glob("*/history.nc")}
             compute_pairs(case, draft, workers=options.workers)
+            computed = (
+                replace(x, reused=x.motion.name in before) if isinstance(x, Run) and x.reused else x
+                for x in computed
+            )
         try:
-            headline, doubtful = print_results(case, carry_out(case, draft), draft)
+            headline, doubtful = print_results(case, computed, draft)
             verdict.append(headline)
         except FailedPairs as error:
             failure = error
@@ -548,9 +554,10 @@ def _print_run(run: Run, at_rest: DeadLoadResult) -> None:
         # The other pairs of a suite are run nevertheless.
         print(f"archfem: {motion.name}: {run.error}", file=sys.stderr)
     else:
+        took = f" in {run.seconds:.1f} s" if run.seconds else ""  # not known of workers
         print(
             f"time history: {motion.name}, PGA {motion.pga:.2f} m/s², "
-            f"{float(history.time[-1]):.2f} s in {run.seconds:.1f} s; {history.outcome}"
+            f"{float(history.time[-1]):.2f} s{took}; {history.outcome}"
         )
         print(f"wrote {run.path}")
     defaults = describe_defaults(run.case)

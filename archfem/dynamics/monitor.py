@@ -93,12 +93,18 @@ class CornerDisplacements:
         self.time = np.full(len(self.blocks), start.time)  # of the largest displacement [s]
         # displacement of the farthest corner of each block, of all steps and of the last (b,) [m]
         self.largest, self.residual = np.zeros((2, len(self.blocks)))
+        # time of the largest displacement of all [s], and displacements of corners then (c, 2) [m]
+        self.peak = start.time, observer.corners(observer.read(start.q))
 
     def add(self, times: Array, readings: Array) -> None:
         """Add the times of the next steps, and the readings of the observer at these (steps, r)."""
         moved = np.linalg.norm(self._observer.corners(readings) - self._start, axis=2)
         farthest = np.maximum.reduceat(moved, self._first, axis=1)
         largest, self.residual = farthest.max(axis=0), farthest[-1]
+        if largest.max() > self.largest.max():
+            step = int(farthest.max(axis=1).argmax())
+            # a copy, for the readings are a part of the memory of all steps
+            self.peak = float(times[step]), self._observer.corners(readings[step]).copy()
         self.time = np.where(largest > self.largest, times[farthest.argmax(axis=0)], self.time)
         self.largest = np.maximum(self.largest, largest)
 

@@ -236,7 +236,8 @@ def mechanism_scales(  # noqa: PLR0913  (arguments of `time_history`, and of the
         return ScaledRun(scale, first_mechanisms(run), run.ending, run.outcome, doubts=doubts)
 
     definitions = (*applicable_definitions(start.model.structure, criteria), "verified")
-    found = search_scales(run_scaled, definitions, precision, admissible_range(between, motion))
+    within = admissible_range(between, motion)
+    found = search_scales(run_scaled, definitions, precision, within, name=motion.name)
     return replace(found, pga=motion.pga)
 
 
@@ -324,6 +325,7 @@ def search_scales(
     between: tuple[float, float],
     begin: Sequence[float] = (1.0,),
     found: MechanismScales | None = None,
+    name: str = "",
 ) -> MechanismScales:
     """Make runs until all brackets are within the precision, and below a fall no gap is wide.
 
@@ -331,7 +333,7 @@ def search_scales(
     """
     scales = found or MechanismScales(definitions)
     try:
-        with ProgressReport("scale", None) as progress:
+        with ProgressReport(f"scale of {name or 'the motion'}", None) as progress:
             while (scale := _next_scale(scales, precision, between, begin)) is not None:
                 began = perf_counter()
                 run = run_scaled(scale)
@@ -675,7 +677,8 @@ def collapse_scale(
     limits, limit = admissible_range(between, motion), (COLLAPSE_DEFINITION,)
 
     def search(step: float, at: Sequence[float], made: MechanismScales | None) -> MechanismScales:
-        return search_scales(partial(run_scaled, step), limit, precision, limits, at, made)
+        run = partial(run_scaled, step)
+        return search_scales(run, limit, precision, limits, at, made, motion.name)
 
     searches = _search_steps(search, steps)
     while shortens and (shorter := _admissible_step(searches)) < steps[0]:

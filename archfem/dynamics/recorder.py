@@ -157,10 +157,10 @@ class Recorder:
         history = History(dataset, structure)
         return history.with_doubts((*self.monitor.doubts, *self._doubt_mass_damping(dataset)))
 
-    def _block_displacements(self) -> dict[str, tuple[str, Array, dict[str, str]]]:
+    def _block_displacements(self) -> dict[str, Any]:
         """Return displacements of all blocks as variables of a dataset; zero for fixed blocks."""
         moved, subject = self.monitor.displacements, "displacement of its farthest corner"
-        variables = {}
+        variables = dict[str, Any]()
         for name, values, units, text in (
             ("largest_displacement", moved.largest, "m", f"largest {subject}"),
             ("largest_displacement_time", moved.time, "s", f"time of the largest {subject}"),
@@ -169,7 +169,10 @@ class Recorder:
             of_all = np.zeros(len(self.model.structure.blocks))
             of_all[moved.blocks] = values
             variables[name] = "block", of_all, {"units": units, "long_name": text}
-        return variables
+        time, corners = moved.peak
+        subject = "largest displacement of all: that of the corners of free blocks then, by block"
+        attributes = {"units": "m", "long_name": subject, "time": time}
+        return variables | {"peak_displacement": (("corner", "axis"), corners, attributes)}
 
     def _doubt_mass_damping(self, dataset: xr.Dataset) -> list[Doubt]:
         """Return a doubt where joints opened and damping drags loose blocks."""

@@ -202,9 +202,9 @@ class Status:
         words += [f"{self.runs} runs kept"] if self.runs else []
         if self.done < self.total:
             rate = f"{self.run_rate:.3g} runs" if self.run_rate else f"{self.rate:.3g}"
-            words.append(f"{rate} a second")
-            known = self.remaining < inf
-            words.append(f"{self.remaining:.0f} s remaining" if known else "time unknown")
+            words += [f"{rate} a second"] if self.run_rate or self.rate else []
+            known, first = self.remaining < inf, "time known when the first has ended"
+            words.append(f"{self.remaining:.0f} s remaining" if known else first)
         words.append("running" if self.running else "not running")
         return ", ".join(words)
 

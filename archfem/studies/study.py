@@ -234,7 +234,7 @@ class Study:
         missing = sorted(number for digest, number in numbers.items() if digest not in rows)
         points = group_by_model([(number, self.points[number]) for number in missing])
         failed = sum(bool(row["error"]) for row in rows.values())
-        progress = Progress(len(numbers), len(rows), failed, store, shared)
+        progress = Progress(len(numbers), len(rows), failed, store, shared, self.title)
         log = None if store is None else store.log
         evaluation = self._evaluate(points, shared, client, workers=workers, log=log)
         # closed on Ctrl-C too, which ends the workers
@@ -518,7 +518,7 @@ def compute_pairs(case: Case, draft: Path, **options: Any) -> list[str]:
         )
     pairs = list(case.suite["pairs"])
     find = {"name": save_pair, "folder": str(draft.resolve())}
-    table = Study(case, {PAIR_KEY: pairs}, find).run(**options)
+    table = Study(case, {PAIR_KEY: pairs}, find, title="pairs of the suite").run(**options)
     endings = table["ended"].values if "ended" in table else [""] * len(pairs)
     return [a or b for a, b in zip(table["error"].values.tolist(), endings, strict=True)]
 

@@ -149,7 +149,8 @@ def verdict_range(  # noqa: PLR0913  (one call, one argument for each thing that
     changes = [*_single_changes(ranges, neutral), *sample_changes(ranges, samples, seed)]
     variations = [Variation(analysis, motion, _resolve_labels(ranges, each)) for each in changes]
     points = list(enumerate(variations))
-    rows = dict(evaluate_with_progress(points, evaluate_variation, workers, "range", folder))
+    name = f"range of {motion.name or 'the motion'}"
+    rows = dict(evaluate_with_progress(points, evaluate_variation, workers, name, folder))
     dataset = _build_dataset(ranges, changes, [rows[k] for k in range(len(points))], neutral)
     dataset["sampled"] = "run", np.arange(len(points)) >= len(points) - samples
     named = [each for row in ranges.values() if isinstance(row, dict) for each in row.values()]

@@ -66,6 +66,36 @@ def recorded_fields(run: History) -> tuple[Array, Array]:
     return times, fields
 
 
+def peak_instant(run: History) -> float | None:
+    """Return the time of the largest displacement [s]; None if it is unknown, or blocks fall."""
+    if "peak_displacement" not in run.dataset or "fall_pose" in run.dataset:
+        return None
+    return float(run.dataset["peak_displacement"].attrs["time"])
+
+
+def peak_displacements(structure: Structure, run: History, points: Array, block: Numbers) -> Array:
+    """Return displacements of points of blocks at the largest one, linear along edges (p, 2)."""
+    corners, moved = run.dataset["peak_displacement"].values, np.zeros(points.shape)
+    first = 0
+    for number in structure.free:
+        start = np.asarray(structure.blocks[number].points)
+        along, own = np.roll(start, -1, axis=0) - start, np.flatnonzero(block == number)
+        arms = points[own, None] - start
+        share = np.clip((arms * along).sum(axis=2) / (along**2).sum(axis=1), 0.0, 1.0)
+        edge = np.linalg.norm(arms - share[..., None] * along, axis=2).argmin(axis=1)
+        ends = corners[first : first + len(start)], share[np.arange(len(own)), edge, None]
+        moved[own] = (1.0 - ends[1]) * ends[0][edge] + ends[1] * np.roll(ends[0], -1, axis=0)[edge]
+        first += len(start)
+    return moved
+
+
+def peak_joint_ends(structure: Structure, run: History) -> Array:
+    """Return displacements of the ends of joints at the largest one, midway of faces (j, 2, 2)."""
+    points = np.tile(structure.ends.reshape(-1, 2), (2, 1))
+    blocks = np.repeat(structure.pairs.T, 2, axis=1).ravel()
+    return peak_displacements(structure, run, points, blocks).reshape(2, -1, 2, 2).mean(axis=0)
+
+
 def ground_acceleration(run: History) -> tuple[Array, Array]:
     """Return times and ground acceleration (n, 2) [m/s²], including the fall."""
     data = run.dataset

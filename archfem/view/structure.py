@@ -32,7 +32,14 @@ from archfem.view.joint_marks import (
     round_magnification,
     support_outlines,
 )
-from archfem.view.positions import block_kinds, fields_at
+from archfem.view.positions import (
+    block_kinds,
+    decisive_instant,
+    fields_at,
+    peak_displacements,
+    peak_instant,
+    peak_joint_ends,
+)
 from archfem.view.style import (
     Colour,
     Size,
@@ -43,6 +50,7 @@ from archfem.view.style import (
     annotate,
     drawing_scale,
     harpoons,
+    limit_width,
     new_figure,
     outline_bounds,
     set_title,
@@ -476,14 +484,59 @@ def draw_displaced(
     return cast(Figure, axes.figure)
 
 
-def draw_during(model: Model, run: History, joints: xr.Dataset) -> Figure:
+def draw_critical(structure: Structure, run: History, model: Model | None = None) -> Figure:
+    """Draw the decisive instant of a run and, where nothing falls, that of largest displacement."""
+    joints = run.joints.sel(time=decisive_instant(run), method="nearest")
+    if (time := peak_instant(run)) is None:
+        return draw_during(structure, run, joints, model)
+    low, high = outline_bounds(structure)
+    # side by side, unless they would be less than half as high as wide
+    rows, columns = (1, 2) if 2.0 * (high - low)[1] > (high - low)[0] else (2, 1)
+    with limit_width(25.4 * Size.PAGE / columns):
+        size = structure_figure(structure).get_size_inches()
+        figure = new_figure(*size)
+        figure.set_size_inches(size * [columns, rows])
+        first, last = figure.subplots(rows, columns)
+        for axes in (first, last):
+            structure_axes(structure, axes)
+    draw_during(structure, run, joints, model, first)
+    _draw_peak(last, structure, run, run.joints.sel(time=time, method="nearest"))
+    handles = {x.get_label(): x for a in (first, last) for x in a.get_legend_handles_labels()[0]}
+    first.get_legend().remove()
+    add_legend_below(figure, handles=list(handles.values()))
+    return figure
+
+
+def _draw_peak(axes: Axes, structure: Structure, run: History, joints: xr.Dataset) -> None:
+    """Draw the displaced blocks and the marks at the largest displacement of a run."""
+    outlines = [block.drawn() for block in structure.blocks]
+    block = np.repeat(np.arange(len(outlines)), [len(outline) for outline in outlines])
+    places = np.concatenate(outlines)
+    moved = peak_displacements(structure, run, places, block)
+    by = round_magnification(float(np.abs(moved).max()) / structure.size)
+    displaced = np.split(places + by * moved, np.flatnonzero(np.diff(block)) + 1)
+    add_polygons(axes, outlines, "none", edge=Colour.UNDEFORMED, width=0.6, zorder=0)
+    add_polygons(axes, displaced, block_colours(structure), gid="blocks")
+    draw_marks(axes, joint_marks(structure, joints, shift=by * peak_joint_ends(structure, run)))
+    scale = "" if by == 1.0 else f", displacements × {by:g}"
+    set_title(axes, title_at_instant("largest displacement", joints) + scale)
+    axes.autoscale_view()
+
+
+def draw_during(
+    structure: Structure,
+    run: History,
+    joints: xr.Dataset,
+    model: Model | None = None,
+    axes: Axes | None = None,
+) -> Figure:
     """Draw an instant of a run, with displaced blocks if the run contains displacements."""
-    if "q" in run.dataset:
+    if model is not None and "q" in run.dataset:
         q = fields_at(run, joints["time"].values[None])[0]
         largest = float(np.abs(model.cells.displacement(q)).max()) / model.structure.size
         magnification = 1.0 if model.large_displacements else round_magnification(largest)
-        return draw_displaced(model, q, joints=joints, magnification=magnification)
-    return draw_structure(model.structure, joints)
+        return draw_displaced(model, q, joints=joints, magnification=magnification, axes=axes)
+    return draw_structure(structure, joints, axes=axes)
 
 
 def draw_loads(

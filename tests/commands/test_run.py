@@ -18,7 +18,7 @@ import archfem as af
 from archfem.cases.run import carry_out
 from archfem.commands import margin
 from archfem.commands.run import print_results
-from archfem.studies import variations
+from archfem.studies import study, variations
 
 RING = Path(__file__).parents[2] / "meshes" / "ring_paper.toml"
 
@@ -157,6 +157,29 @@ def test_one_command_runs_all_and_again_keeps_finished_runs(small, undrawn, requ
     assert "finished before" not in capsys.readouterr().out
     table = (out / "suite.txt").read_text()
     assert re.search(r"^first .* 1\.00 m/s² +0\.67 m/s² ", table, re.MULTILINE)
+
+
+def test_pairs_that_workers_have_run_were_not_finished_before(
+    small, undrawn, unplotted, undoubted, monkeypatch, capsys
+):
+    def compute(case, draft, workers):
+        """Run the pairs that are missing, as workers do."""
+        for pair in case.suite["pairs"]:
+            if not (draft / pair / "history.nc").exists():
+                study.save_pair(case.alone(pair), str(draft))
+
+    monkeypatch.setattr(study, "compute_pairs", compute)
+    out = str(small.parent / "out")
+    command = ["run", str(small), "--out", out, "--workers", "2"]
+    assert af.commands.main(command) == 0
+    said = capsys.readouterr().out
+    assert "time history: first, " in said
+    assert "finished before" not in said
+    (small.parent / "out" / "first" / "history.nc").unlink()
+    assert af.commands.main(command) == 0
+    said = capsys.readouterr().out
+    assert "second: finished before" in said
+    assert "first: finished before" not in said
 
 
 def run_with(small, shake):

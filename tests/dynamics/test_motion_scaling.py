@@ -85,6 +85,15 @@ def pretended(fails, ended=lambda scale: Ending.FINISHED):
     return shaken
 
 
+def test_lines_of_a_search_name_its_motion(monkeypatch, capsys):
+    monkeypatch.setattr("archfem._display.PROGRESS_INTERVAL", 0.0)
+    fails = dict.fromkeys(DEFINITIONS, beyond(2.0))
+    search_scales(pretended(fails), DEFINITIONS, 0.05, (0.05, 5.0), name="first")
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) > 3
+    assert all(line.startswith("scale of first: ") for line in lines)
+
+
 def searched(fails, *, ended=lambda scale: Ending.FINISHED, precision=0.05, between=(0.05, 5.0)):
     """Brackets of such runs."""
     return search_scales(pretended(fails, ended), DEFINITIONS, precision, between)
@@ -502,7 +511,9 @@ def test_collapse_is_not_sought_beyond_five_g(between, limits, monkeypatch):
     ranges = []
     monkeypatch.setattr(
         "archfem.dynamics.motion_scaling.search_scales",
-        lambda _, what, precision, found, *begin: ranges.append(found) or MechanismScales(what),
+        lambda _, what, precision, found, *begin, **_name: (
+            ranges.append(found) or MechanismScales(what)
+        ),
     )
     block = af.column(breadth=1.0, heights=[1.0])
     model = af.build(block, fidelity="rigid", displacements="large")

@@ -28,7 +28,7 @@ def test_the_remaining_time_follows_the_rate_of_points_or_of_runs(given, remaini
     ("given", "words"),
     [
         ({"rate": 2.0}, "4 of 10 points done, 1 failed, 2 a second, 3 s remaining, not running"),
-        ({}, "4 of 10 points done, 1 failed, 0 a second, time unknown, not running"),
+        ({}, "4 of 10 points done, 1 failed, time known when the first has ended, not running"),
         (
             {"runs": 7, "run_rate": 0.5, "runs_left": 40.0, "running": True},
             "4 of 10 points done, 1 failed, 7 runs kept, 0.5 runs a second, 80 s remaining, "

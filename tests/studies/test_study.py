@@ -299,10 +299,11 @@ def test_progress_is_reported_where_the_output_is_a_file(
 ):
     monkeypatch.setattr(result_store, "PROGRESS_INTERVAL", 0.02)
     find = {"name": "finders_of_tests:slowly", "seconds": 0.08}
-    af.Study(small_ring, {"structure.thickness": [0.5, 0.6, 0.7]}, find).run(workers=workers)
+    over = {"structure.thickness": [0.5, 0.6, 0.7]}
+    af.Study(small_ring, over, find, title="thickness").run(workers=workers)
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) > 2
-    assert all(line.startswith("study: ") and "of 3 points done" in line for line in lines)
+    assert all(line.startswith("thickness: ") and "of 3 points done" in line for line in lines)
     assert any("0 failed" in line and "s remaining" in line for line in lines)
 
 
@@ -315,7 +316,9 @@ def test_progress_of_a_range_is_reported_where_the_output_is_a_file(monkeypatch,
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) > 2
     total = found.dataset.sizes["run"]
-    assert all(re.match(rf"range: \d+ of {total} points done, 0 failed", line) for line in lines)
+    assert all(
+        re.match(rf"range of .+: \d+ of {total} points done, 0 failed", line) for line in lines
+    )
 
 
 @pytest.mark.parametrize("workers", [1, 2])
@@ -467,7 +470,7 @@ def test_a_search_counts_its_runs(tmp_path):
     assert "24 runs kept, 0.6 runs a second, 27 s remaining" in str(searched)
     begun = replace(searched, done=0, rate=0.0, runs_left=0.0)
     assert begun.remaining == inf
-    assert "0.6 runs a second, time unknown" in str(begun)
+    assert "0.6 runs a second, time known when the first has ended" in str(begun)
     progress = result_store.Progress(4, 0, 0, None, tmp_path)
     (tmp_path / "runs").mkdir()
     for number in range(24):

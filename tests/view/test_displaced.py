@@ -3,7 +3,9 @@
 import numpy as np
 
 import archfem as af
-from archfem.view.structure import draw_during
+from archfem.view.pages.player_data import Scene
+from archfem.view.positions import peak_displacements, peak_instant, peak_joint_ends
+from archfem.view.structure import draw_critical, draw_during
 
 
 def labelled(figure, gid):
@@ -32,9 +34,9 @@ def test_the_thrust_line_ends_where_faces_touch(column, toppled):
 
 def test_an_instant_of_a_run_is_drawn_as_it_is_known(column, toppled):
     joints = toppled.joints.isel(time=-1)
-    moved = draw_during(column, toppled, joints)
+    moved = draw_during(column.structure, toppled, joints, column)
     bare = af.History(toppled.dataset.drop_vars("q"), toppled.structure)
-    built = draw_during(column, bare, joints)
+    built = draw_during(column.structure, bare, joints, column)
     wide = [np.ptp(figure.axes[0].dataLim.get_points()[:, 0]) for figure in (moved, built)]
     assert wide[0] > 1.1 * wide[1]
 
@@ -45,9 +47,51 @@ def test_small_displacements_of_a_run_are_magnified():
     model = af.build(stones, fidelity="rigid")
     motion = af.Motion(np.full(21, 0.5), 0.005)
     run = af.time_history(model, motion, dt=0.005, record=af.Record(fields_every=5))
-    figure = draw_during(model, run, run.joints.isel(time=-1))
+    figure = draw_during(stones, run, run.joints.isel(time=-1), model)
     by = float(" ".join(figure.axes[0].get_title().split()).partition("displacements × ")[2])
     drawn = np.concatenate([path.vertices for path in labelled(figure, "blocks").get_paths()])
     places = model.cells.places + by * model.cells.displacement(run.dataset["q"].values[-1])
     assert by >= 10.0
     np.testing.assert_allclose(drawn.min(axis=0), places.min(axis=0))
+
+
+def shake(stones, motion, **settings):
+    model = af.build(stones, fidelity="rigid", displacements="large")
+    return model, af.time_history(model, motion, dt=0.005, **settings)
+
+
+def test_the_largest_displacement_is_kept_without_fields():
+    """Blocks and joints are where the fields of each step show them at that instant."""
+    stones = af.column(breadth=0.4, heights=[0.8, 0.8])
+    motion = af.Motion.synthetic(seed=3, duration=2.0, pga=2.5)
+    model, run = shake(stones, motion, record=af.Record(fields_every=1))
+    time, moved = peak_instant(run), run.displacement
+    k = int(np.argmin(np.abs(moved["time"].values - time)))
+    start = moved.values[0]
+    assert k == np.linalg.norm(moved.values - start, axis=2).max(axis=1).argmax() > 0
+    corners = np.column_stack([moved["x"], moved["y"]])
+    owners = [block.name for block in stones.blocks]
+    block = np.array([owners.index(name) for name in moved["block"].values])
+    found = peak_displacements(stones, run, corners, block)
+    np.testing.assert_allclose(found, moved.values[k], atol=1e-9)
+    # of the overlap of both faces, which have slid a little
+    ends = model.observer().joint_ends(run.dataset["q"].values[k])
+    np.testing.assert_allclose(peak_joint_ends(stones, run), ends, atol=5e-4)
+
+
+def test_a_run_without_fields_is_drawn_at_its_largest_displacement():
+    stones = af.column(breadth=0.4, heights=[0.8, 0.8])
+    _, run = shake(stones, af.Motion.synthetic(seed=3, duration=2.0, pga=2.5))
+    figure = draw_critical(stones, run)
+    assert len(figure.axes) == 2
+    title = " ".join(figure.axes[1].get_title().split())
+    assert title.startswith(f"largest displacement, t = {peak_instant(run):.3f} s")
+    scene = Scene(stones, run)
+    assert scene.initial_time == peak_instant(run) == scene.data["peak"]
+    assert [len(part) for part in scene.moved] == [1, 1, 1]
+    assert "the largest displacement alone" in scene.note
+
+
+def test_a_run_that_ends_in_a_fall_is_drawn_at_its_collapse(column, toppled):
+    assert peak_instant(toppled) is None
+    assert len(draw_critical(column.structure, toppled, column).axes) == 1

@@ -61,7 +61,7 @@ _THRUST = "Thrust line under dead load, drawn where the resultant of each joint 
 MAX_SLENDERNESS = 2.6  # length over height of a structure that is legible at half the width
 MAX_WIDTH = 170.0  # of a figure of many panels [mm]
 
-_PLAYER_CAPTION = "The structure at an instant, the ground acceleration, and one joint."
+_PLAYER_CAPTION = "The structure at the instant above it, the ground acceleration, and one joint."
 
 # References of the methods, with the file of the result that was made by each
 _METHODS = (

@@ -8,17 +8,17 @@ from archfem.errors import InvalidInput
 from archfem.models.model import Model
 from archfem.view.pages.document import FigureBlock, StandalonePage, render
 from archfem.view.pages.player_data import Scene
-from archfem.view.positions import decisive_instant
-from archfem.view.structure import draw_structure
+from archfem.view.structure import draw_critical
 
 
 @dataclass(frozen=True, eq=False)
 class Player(StandalonePage):
     """Interactive page of a run, shown in a notebook or written by `save`.
 
-    It shows the structure with its thrust line, hinges, sliding and open joints; sliders for the
-    time and for the magnification of displacements; the ground acceleration with a cursor; and e
-    and V / N over time of the joint that is clicked on.
+    It shows the structure with its thrust line, hinges, sliding and open joints, at first at the
+    largest displacement unless blocks fall; sliders for the time and for the magnification of
+    displacements; the ground acceleration with a cursor; and e and V / N over time of the joint
+    that is clicked on.
 
     Attributes:
         scene: the data shown.
@@ -38,10 +38,10 @@ class Player(StandalonePage):
 
     @property
     def still(self) -> FigureBlock:
-        """Picture of the decisive instant, for documents in which nothing plays."""
-        run = self.scene.run
-        joints = run.joints.sel(time=decisive_instant(run), method="nearest")
-        return FigureBlock.of(draw_structure(self.scene.structure, joints), self.caption)
+        """Picture of critical instants, for documents in which nothing plays."""
+        scene = self.scene
+        drawn = draw_critical(scene.structure, scene.run, scene.model)
+        return FigureBlock.of(drawn, self.caption)
 
     @property
     def frame_height(self) -> float:

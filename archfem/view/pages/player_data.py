@@ -29,6 +29,9 @@ from archfem.view.positions import (
     block_kinds,
     first_motion_instant,
     ground_acceleration,
+    peak_displacements,
+    peak_instant,
+    peak_joint_ends,
     recorded_fields,
 )
 
@@ -172,7 +175,7 @@ class Scene:
     def moved(self) -> tuple[Array, Array, Array] | None:
         """Times (f,) and displacements of outlines (f, p, 2) and joint ends (f, n_joints, 2, 2)."""
         if self.model is None or "q" not in self.run.dataset:
-            return None
+            return self.peak
         times, fields = recorded_fields(self.run)
         between = (times[-1] - times[0]) / max(len(times) - 1, 1)
         # more than 40 frames per second cannot be distinguished
@@ -182,6 +185,17 @@ class Scene:
         moved = self.outlines.displacements(self.model, fields[chosen])
         more = len(self.points) - moved.shape[1]  # of grains, which are a point before the fall
         return times[chosen], np.pad(moved, ((0, 0), (0, more), (0, 0))), ends
+
+    @cached_property
+    def peak(self) -> tuple[Array, Array, Array] | None:
+        """Time and displacements as of frames, of the largest displacement alone."""
+        if (time := peak_instant(self.run)) is None:
+            return None
+        points = peak_displacements(
+            self.structure, self.run, self.outlines.points, self.outlines.block
+        )
+        ends = peak_joint_ends(self.structure, self.run)
+        return np.array([time]), points[None], ends[None]
 
     @cached_property
     def fallen(self) -> tuple[Array, Array] | None:
@@ -211,7 +225,7 @@ class Scene:
     @cached_property
     def magnification(self) -> float:
         """Default magnification: a round number that makes displacements visible [-]."""
-        if self.model is not None and self.model.large_displacements:
+        if self.falls is not None:
             return 1.0
         if self.moved is not None:
             return round_magnification(float(np.abs(self.moved[1]).max()) / self.structure.size)
@@ -223,8 +237,9 @@ class Scene:
 
     @cached_property
     def initial_time(self) -> float:
-        """Time shown at first, and in print [s]: of the first mechanism, or the largest |e|."""
-        return first_motion_instant(self.run)
+        """Time shown at first, and in print [s]: of the largest displacement, if it is known."""
+        time = peak_instant(self.run)
+        return first_motion_instant(self.run) if time is None else time
 
     @cached_property
     def marks(self) -> set[str]:
@@ -328,6 +343,7 @@ class Scene:
             "loose": None if falls is None else float(falls.times[0]),
             "level": None if falls is None else falls.level,
             "mechanism": None if mechanism is None else mechanism.time,
+            "peak": peak_instant(self.run),
             "note": self.note,
             "pack": pack.head,
             "bytes": pack.text,
@@ -336,7 +352,8 @@ class Scene:
     @property
     def note(self) -> str:
         """Sentences on joints that are not assessed, and on missing displacements."""
-        note = "" if self.moved is not None else self.missing_reason or _default_note(self.run)
+        moves = self.moved is not None and len(self.moved[0]) > 1
+        note = "" if moves else self.missing_reason or _default_note(self.run)
         assessed = describe_assessed_joints(self.run.joints)
         return f"{assessed[:1].upper()}{assessed[1:]}. {note}" if assessed else note
 
@@ -354,8 +371,11 @@ def _thin_out(count: int, every: int) -> NDArray[np.intp]:
 def _default_note(run: History) -> str:
     """Return the note in a page without displacements."""
     opening = ", with the openings of the joints between them" if "opening" in run.joints else ""
-    remedy = "fields_every = 8 in [record] of its case records them"
-    return f"The run contains no displacements: blocks are drawn undeformed{opening}; {remedy}."
+    only, apart, them = "no displacements", "", "them"
+    if peak_instant(run) is not None:
+        only, apart, them = "the largest displacement alone", " at all other instants", "others"
+    remedy = f"fields_every = 8 in [record] of its case records {them}"
+    return f"The run contains {only}: blocks are drawn undeformed{apart}{opening}; {remedy}."
 
 
 def _bounds(points: Array, margin: float) -> tuple[Array, Array]:

@@ -86,7 +86,7 @@ def test_the_view_has_room_for_displacements_that_are_magnified_somewhat_more(ro
     assert scene.magnification > 1.0
     low, high = seen(points, points + 1.2 * scene.magnification * moved)
     assert scene.box == (pytest.approx(low - margin), pytest.approx(high + margin))
-    still = Scene(model.structure, af.History(run.dataset.drop_vars("q")))
+    still = Scene(model.structure, af.History(run.dataset.drop_vars(["q", "peak_displacement"])))
     low, high = seen(points, points)
     assert still.box == (pytest.approx(low - margin), pytest.approx(high + margin))
 
@@ -115,7 +115,7 @@ def test_the_view_follows_loose_blocks_as_far_as_half_a_structure(column, topple
 def test_openings_without_displacements_are_seen_as_a_third_of_the_depth(rocked, opening, by):
     """As nearly as a round number makes them: joints are 1 m deep."""
     model, run = rocked
-    dataset = run.dataset.drop_vars("q")
+    dataset = run.dataset.drop_vars(["q", "peak_displacement"])
     dataset["opening"] = dataset["opening"] * opening / float(dataset["opening"].max())
     assert (dataset["depth"] == 1.0).all()
     assert Scene(model.structure, af.History(dataset)).magnification == by
@@ -123,7 +123,9 @@ def test_openings_without_displacements_are_seen_as_a_third_of_the_depth(rocked,
 
 def test_without_displacements_blocks_stand_still(rocked):
     model, run = rocked
-    data, found = arrays(Scene(model.structure, af.History(run.dataset.drop_vars("q"))))
+    data, found = arrays(
+        Scene(model.structure, af.History(run.dataset.drop_vars(["q", "peak_displacement"])))
+    )
     assert "contains no displacements" in data["note"]
     assert "fields_every = 8 in [record] of its case records them." in data["note"]
     assert "frame_points" not in found

@@ -91,7 +91,8 @@
       this.range = range;
       this.top = instants.some(([, name]) => name) ? 40 : 22; // names of instants stand below the title
       this.svg.replaceChildren();
-      element("text", { x: this.left, y: 13 }, this.svg).textContent = title;
+      // paper has larger type: names grow upwards from the axes
+      element("text", { x: this.left, y: this.top - 8, dy: this.top > 22 ? "-1em" : 0 }, this.svg).textContent = title;
       for (const tick of ticks) {
         element("path", { class: "zero", d: `M${this.left} ${this.y(tick)}H${this.right}` }, this.svg);
         element("text", { x: this.left - 6, y: this.y(tick), "text-anchor": "end", "dominant-baseline": "central" }, this.svg).textContent = words(tick);
@@ -229,6 +230,7 @@
       for (let k = -Math.floor(top / apart); k * apart <= top; k++) ticks.push(k * apart);
       const instants = [];
       if (scene.mechanism !== null) instants.push([scene.mechanism, "mechanism"]);
+      if (scene.peak !== null) instants.push([scene.peak, ""]);
       if (scene.loose !== null) instants.push([scene.loose, "blocks loose"]);
       this.instants = instants.map(([time]) => [time, ""]);
       // on a phone a wide chart would have tiny words
@@ -264,8 +266,10 @@
     /** Displacements at a time: of outlines, and of both ends of each joint. */
     moved(time) {
       const { scene, arrays } = this, falling = scene.loose !== null && time >= scene.loose, name = falling ? "fall" : "frame";
-      if (!arrays[`${name}_time`]) return { falling, by: 0, points: () => 0, ends: () => 0 };
-      const [first, last, share] = between(arrays[`${name}_time`].row(0), time);
+      const times = arrays[`${name}_time`] ? arrays[`${name}_time`].row(0) : [];
+      this.moves = times.length > 1 || Math.abs(times[0] - time) < 2e-3; // the largest displacement may be the only one
+      if (!this.moves) return { falling, by: 0, points: () => 0, ends: () => 0 };
+      const [first, last, share] = between(times, time);
       const reader = (packed) => (k) => {
         const at = k * packed.samples;
         return (1 - share) * packed.values[at + first] + share * packed.values[at + last];
@@ -312,7 +316,7 @@
       thrust.forEach((point) => { if (point) element("circle", { class: "thrust", cx: point[0].toFixed(2), cy: point[1].toFixed(2), r: 2.3 }, layers.thrusts); });
       scene.joints.forEach((joint, j) => {
         const flags = arrays.flags.row(j)[record], side = (flags & 3) - 1, ends = this.ends[j];
-        if (arrays.opening && !arrays.frame_time) this.wedge(joint, ends, arrays.opening.row(j)[record], flags & 32);
+        if (arrays.opening && !this.moves) this.wedge(joint, ends, arrays.opening.row(j)[record], flags & 32);
         if (!joint.judged) return;
         if (flags & 8) {
           found.open += 1;
@@ -355,8 +359,9 @@
     tell(falling, record, by, counts) {
       const { scene, arrays } = this, joint = scene.joints[this.chosen], times = (value) => `× ${words(value)}`;
       const failing = Object.entries(counts).filter(([, count]) => count).map(([name, count]) => `${count} ${name}`);
-      const scale = arrays.frame_time || falling ? (by === 1 ? "true to scale" : `displacements ${times(by)}`) : arrays.opening ? `openings ${times(this.by)}` : "blocks where they stand";
-      this.find("state").textContent = [`t = ${this.time.toFixed(3)} s`, ...(falling ? ["blocks are loose"] : failing), scale].join(" · ");
+      const scale = this.moves ? (by === 1 ? "true to scale" : `displacements ${times(by)}`) : arrays.opening ? `openings ${times(this.by)}` : "blocks where they stand";
+      const peak = scene.peak !== null && Math.abs(scene.peak - this.time) < 2e-3 ? ["largest displacement"] : [];
+      this.find("state").textContent = [`t = ${this.time.toFixed(3)} s`, ...peak, ...(falling ? ["blocks are loose"] : failing), scale].join(" · ");
       this.find("time").value = this.time;
       this.find("times").textContent = times(this.by);
       const number = (name, digits, factor = 1) => {
