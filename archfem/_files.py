@@ -27,7 +27,7 @@ from time import sleep
 from typing import IO, Any, NamedTuple
 
 from archfem._validation import short_repr
-from archfem.errors import DiskFull, InvalidInput
+from archfem.errors import DiskFull, InvalidInput, logger
 
 # Errors of the operating system for a full disk, an exceeded quota, a file too large
 DISK_FULL_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
@@ -537,6 +537,11 @@ def _move_finished(finished: Path, folder: Path) -> None:
     moves.sort(key=lambda move: move[1] == folder / LIST_FILE)  # last: it says that all are there
     for path, target in moves:
         target.parent.mkdir(parents=True, exist_ok=True)
+        name = target.relative_to(folder).as_posix()
+        if name not in earlier and name != LIST_FILE and target.is_file():
+            kept = target.with_name(f"{target.name}.kept")  # of the user, or of a lost list
+            logger.warning("%s is in no list of results: it is kept as %s", target, kept.name)
+            os.replace(target, kept)
         os.replace(path, target)
 
 

@@ -246,6 +246,17 @@ def test_a_changed_file_is_refused_and_another_is_not(tmp_path):
             _files.check_listed(tmp_path / name, b"2")
 
 
+def test_a_file_that_no_command_has_written_is_kept_beside_the_result(tmp_path, caplog):
+    (tmp_path / "a.txt").write_text("mine")
+    write(tmp_path, "run", "one", a_txt="1", b_txt="1")
+    assert "a.txt is in no list of results: it is kept as a.txt.kept" in caplog.text
+    caplog.clear()
+    write(tmp_path, "run", "two", a_txt="2", b_txt="2")
+    found = contents(tmp_path)
+    assert (found["a.txt"], found["b.txt"], found["a.txt.kept"]) == (b"2", b"2", b"mine")
+    assert caplog.text == ""
+
+
 def test_a_list_names_no_files_outside_its_folder(tmp_path):
     out = tmp_path / "out"
     write(out, "run", "one", a_txt="1")

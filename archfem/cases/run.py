@@ -8,7 +8,7 @@ import logging
 import os
 import shutil
 from collections.abc import Callable, Collection, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from importlib.util import find_spec
@@ -25,6 +25,7 @@ from archfem._netcdf import read_dataset
 from archfem._validation import validate_arguments
 from archfem.cases.case import Case
 from archfem.cases.structure_keys import read_survey
+from archfem.cases.toml_file import read_tables
 from archfem.dynamics.analysis import Analysis
 from archfem.dynamics.damping import resolve_effective_damping
 from archfem.dynamics.history import Ending, History, partial_history
@@ -514,6 +515,7 @@ def _start_draft(case: Case, folder: Path, inputs: str) -> Path:
     """Return a draft with the case, and of a suite the histories that earlier calls computed."""
     _files.complete_publication(folder)
     _files.refuse_unlisted(folder, (CASE_FILE, HISTORY_FILE))
+    _warn_of_another_case(case, folder)
     draft, listed = _files.start_draft(folder, "run"), _files.intact_file_list(folder).get("run")
     pairs = {f"{name}/{HISTORY_FILE}": name for name in (case.suite or {}).get("pairs", ())}
     for path in _files.list_files(draft):
@@ -531,6 +533,16 @@ def _start_draft(case: Case, folder: Path, inputs: str) -> Path:
         with _files.atomic_write(draft / name) as part:
             part.write_text(f"{text}\n", encoding="utf-8")
     return draft
+
+
+def _warn_of_another_case(case: Case, folder: Path) -> None:
+    """Say that a folder has results of a case with another title, which a run replaces."""
+    path = _files.path_inside(folder, CASE_FILE)
+    with suppress(InvalidInput):  # damaged
+        title = read_tables(path, "case file").get("title", case.title) if path.is_file() else ""
+        if title not in ("", case.title):
+            text = "%s has results of another case, '%s': those of the same names are replaced"
+            logger.warning(text, folder, title)
 
 
 def case_files(case: Case) -> dict[str, str]:

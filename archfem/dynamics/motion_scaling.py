@@ -7,7 +7,7 @@ where one falls, the search continues below it.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import pairwise
 from math import inf, sqrt
@@ -410,11 +410,13 @@ class CollapseScale:
         searches: runs made, by time step [s].
         pga: peak of the motion [m/s²].
         of_model: doubts that concern every run, whatever its scale.
+        longer: runs made before, with steps too long for sliding; no bound rests on them.
     """
 
     searches: dict[float, MechanismScales]
     pga: float | None = None
     of_model: tuple[Doubt, ...] = ()
+    longer: dict[float, MechanismScales] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         """Return scales around the fall, and from which it is dislocated, which is no fall."""
@@ -433,7 +435,9 @@ class CollapseScale:
         if self.moves <= self.held:
             least = min(search.runs[0].scale for search in self.searches.values())
             met = f"a mechanism from {self.moves:#.3g} ×{' or less' * (self.moves == least)}, {met}"
-        return _say_bracket("stands", self.held, self.pga, met) + self._say_tested()
+        steps = join_names([f"{1e3 * dt:g}" for dt in self._every])
+        varied = f"; varied were the scale and the time step ({steps} ms), and no property"
+        return _say_bracket("stands", self.held, self.pga, met) + self._say_tested() + varied
 
     def _say_tested(self) -> str:
         """Return in words how closely scales were run up to `lower`; "" where none stands."""
@@ -457,15 +461,22 @@ class CollapseScale:
     def doubts(self) -> tuple[str, ...]:
         """Reasons why the scales may be wrong."""
         doubts = [str(doubt) for doubt in self.of_model]
-        brackets = {dt: self.bracket(dt) for dt in self.searches}
-        if _disagreeing(self.searches):
+        brackets = {dt: each[COLLAPSE_DEFINITION] for dt, each in self._every.items()}
+        if _disagreeing(self._every):
             found = (
                 f"between {b.lower:#.3g} and {b.upper:#.3g} × by {1e3 * dt:g} ms"
                 for dt, b in brackets.items()
             )
-            doubts.append(f"its time steps disagree: it first falls {', '.join(found)}")
+            low, *_, high = sorted(bracket.upper for bracket in brackets.values())
+            ends = f"{low:#.3g} to {high:#.3g} ×" if high < inf else f"{low:#.3g} × on, or nowhere"
+            doubts.append(f"its time steps find the first fall from {ends}: {', '.join(found)}")
         searches = {f" by {1e3 * dt:g} ms": search for dt, search in self.searches.items()}
         return (*doubts, *_doubts_of_searches(searches, COLLAPSE_DEFINITION))
+
+    @property
+    def _every(self) -> dict[float, MechanismScales]:
+        """All runs made, those with longer steps first."""
+        return {**self.longer, **self.searches}
 
     def bracket(self, dt: float) -> Bracket:
         """Return the bracket of collapse that was found with one time step.
@@ -552,19 +563,21 @@ class CollapseScale:
         return call_late_bound("CollapseScale.verdict_range", self, structure, motion, **options)
 
     def rows(self) -> tuple[list[str], list[list[str]]]:
-        """Return titles and cells of a row per run: step, scale, state, time, residual."""
+        """Return titles and cells of a row per run: what was varied and not, state, residual."""
         rows = [
             [
                 f"{1e3 * dt:g} ms",
-                f"{scale:.3g}",
+                f"{run.scale:.3g}",
+                "as given",
                 fall.kind if fall else "no answer",
                 f"{fall.time:.2f} s" if fall and fall.time is not None else "-",
                 f"{fall.residual:.3g} m" if fall else "-",
             ]
-            for dt in self.searches
-            for scale, fall in self.falls(dt)
+            for dt, search in self._every.items()
+            for run in search.runs
+            for fall in [run.fall]
         ]
-        return ["step", "scale", "the structure", "at", "residual"], rows
+        return ["step", "scale", "properties", "the structure", "at", "residual"], rows
 
     def table(self) -> str:
         """Return a line per run: step, scale, state of collapse, time and residual displacement."""
@@ -680,8 +693,9 @@ def collapse_scale(
         run = partial(run_scaled, step)
         return search_scales(run, limit, precision, limits, at, made, motion.name)
 
-    searches = _search_steps(search, steps)
+    searches, longer = _search_steps(search, steps), dict[float, MechanismScales]()
     while shortens and (shorter := _admissible_step(searches)) < steps[0]:
+        longer |= searches
         steps = [shorter, 0.5 * shorter]
         searches = _search_steps(search, steps)
-    return CollapseScale(searches, motion.pga, doubt_soft_blocks(begin.model.structure))
+    return CollapseScale(searches, motion.pga, doubt_soft_blocks(begin.model.structure), longer)

@@ -65,6 +65,7 @@ from archfem.studies.variations import (
     Variation,
     as_falling,
     check_ranges,
+    doubt_steps_of_sliding,
     draw_samples,
     prepare_runs,
 )
@@ -78,7 +79,7 @@ VARIED = ("k_n", "k_s", "friction", "damping_ratio")
 FIRST_ROUND = 8
 
 # Variables of the table that are results
-RESULTS = ("lower", "upper", "runs", "error")
+RESULTS = ("lower", "upper", "runs", "admissible_step", "error")
 
 # Peak acceleration at which those begin [m/s²]
 FIRST_PEAK = 2.0
@@ -118,16 +119,21 @@ class RiskSample(Variation):
 
 
 def bracket_capacity(sample: RiskSample) -> dict[str, Any]:
-    """Return the largest scale that stands below the smallest that falls, that one, and runs."""
+    """Return the largest scale that stands below the smallest that falls, that one, and runs.
+
+    The admissible step is that which follows sliding in both; infinite if those of the runs do.
+    """
     run = prepare_runs(sample.analysis, dict(sample.changes))
     smallest, largest = admissible_range(sample.between, sample.motion)
-    stands, falls, runs = 0.0, inf, 0
+    stands, falls, runs, steps = 0.0, inf, 0, {inf: inf}
     scale = min(max(sample.begin, smallest), largest)
     wide = 1.0 + sample.precision
     factor = _search_factor(wide)
     while runs < MOST_RUNS:
         runs += 1
-        if run(sample.motion.scaled(scale)).kind in FALLEN_STATES:
+        state = run(sample.motion.scaled(scale))
+        steps[scale] = state.admissible_step
+        if state.kind in FALLEN_STATES:
             falls = scale
         else:
             stands = scale
@@ -139,7 +145,8 @@ def bracket_capacity(sample: RiskSample) -> dict[str, Any]:
             scale = max(falls / factor, smallest)
         else:
             scale = sqrt(stands * falls)
-    return {"lower": stands, "upper": falls, "runs": runs}
+    step = min(steps.get(stands, inf), steps[falls])
+    return {"lower": stands, "upper": falls, "runs": runs, "admissible_step": step}
 
 
 def _search_factor(wide: float) -> float:
@@ -217,6 +224,7 @@ def collapse_risk(  # noqa: PLR0913  (one call, one argument for each thing that
     table = _describe_samples(ranges, draws, labels, order)
     table = table.assign(_measure_records(next(iter(tree.values()))[2], records, hazard))
     table.attrs |= _describe_inputs(tree, hazard, target, [width, list(between), seed])
+    table.attrs["dt"] = next(iter(tree.values()))[1].dt
     table.attrs["blocks"] = json.dumps([size for _, size in blocks])
     _continue_file(out, table)
     for begin, end in ((0, FIRST_ROUND), (FIRST_ROUND, samples)):
@@ -348,6 +356,7 @@ def _describe_samples(
     columns: dict[str, Any] = {name: ("sample", [row[name] for row in draws]) for name in ranges}
     columns |= {"alternative": ("sample", labels), "record_number": ("sample", order)}
     columns |= {"lower": ("sample", np.zeros(count)), "upper": ("sample", np.full(count, inf))}
+    columns["admissible_step"] = ("sample", np.full(count, inf))
     columns |= {
         "runs": ("sample", np.zeros(count, int)),
         "error": ("sample", np.array([""] * count, dtype=object)),
@@ -362,10 +371,10 @@ def _continue_file(out: str | Path | None, table: xr.Dataset) -> None:
     kept = read_dataset(out, "file of a risk")
     count = kept.sizes.get("sample", 0)
     first = table.isel(sample=slice(count))
+    varies = (*RESULTS, "unscaled_sa")  # which is at the period of the hazard
     same = all(
-        key in kept and np.array_equal(kept[key].values, first[key].values)
+        key in kept and (key in varies or np.array_equal(kept[key].values, first[key].values))
         for key in first
-        if key not in (*RESULTS, "unscaled_sa")  # which is at the period of the hazard
     )
     keys = ("properties", "inputs")
     if not same or any(kept.attrs.get(key) != table.attrs[key] for key in keys):
@@ -392,7 +401,7 @@ def _first_scales(table: xr.Dataset, measure: str, begin: int) -> Array:
 
 def _store_row(table: xr.Dataset, number: int, row: Mapping[str, Any]) -> None:
     """Store the bracket of a sample, or the text of its error."""
-    for name in ("lower", "upper", "runs"):
+    for name in RESULTS[:-1]:
         if name in row["found"]:
             table[name].values[number] = row["found"][name]
     table["error"].values[number] = str(row["error"])
@@ -636,6 +645,9 @@ class CollapseRisk(ResultDisplay):
             )
             doubts.append(Doubt(cause, "give its points at longer return periods"))
         doubts += self._doubt_records()
+        if "dt" in self.dataset.attrs:  # files of earlier versions do not have it
+            steps = self._of_answered("admissible_step")
+            doubts += doubt_steps_of_sliding(steps, self.dataset.attrs["dt"], "samples", "")
         count = len(self.dataset["sample"])
         # a twentieth of all is what the 90 % interval leaves out at each of its ends
         if count - len(self.answered) > 0.05 * count:

@@ -161,7 +161,8 @@ def verdict_range(  # noqa: PLR0913  (one call, one argument for each thing that
     if isinstance(structure, Analysis) and analysis.fidelity != structure.fidelity:
         doubts = [_blame_variations(each, analysis.fidelity) for each in doubts]
     doubts += doubt_soft_blocks(*structures)
-    doubts += _doubt_steps_of_sliding([row["found"] for row in rows.values()], analysis.dt)
+    steps = [row["found"].get("admissible_step", inf) for row in rows.values()]
+    doubts += doubt_steps_of_sliding(steps, analysis.dt)
     dataset.attrs["doubts"] = write_doubts(doubts)
     contacts = [joint.contact for joint in analysis.structure.joints]
     dataset.attrs["k_n"] = float(np.mean([contact.normal_stiffness for contact in contacts]))
@@ -180,14 +181,19 @@ def _blame_variations(doubt: Doubt, fidelity: object) -> Doubt:
     return replace(doubt, remedy=remedy)
 
 
-def _doubt_steps_of_sliding(found: Sequence[Mapping[str, Any]], dt: float | None) -> list[Doubt]:
-    """Return a doubt where time steps are too long for the sliding of some runs."""
-    steps = [step for row in found if (step := row.get("admissible_step", inf)) < inf]
+def doubt_steps_of_sliding(
+    admissible: Sequence[float], dt: float | None, runs: str = "runs", half: str = " or half of it"
+) -> list[Doubt]:
+    """Return a doubt where time steps are too long for the sliding of some runs, or samples.
+
+    Admissible steps are infinite where those of the run follow.
+    """
+    steps = [step for step in admissible if step < inf]
     if not steps or dt is None:
         return []
     return [
         Doubt(
-            f"in {len(steps)} of {len(found)} runs the steps, {1e3 * dt:g} ms or half of it, are "
+            f"in {len(steps)} of {len(admissible)} {runs} the steps, {1e3 * dt:g} ms{half}, are "
             "long for sliding",
             f"take {1e3 * min(steps):g} ms or less, `--set analysis.dt={min(steps):g}`",
         )

@@ -221,6 +221,15 @@ def break_off(case, motion, *given):
     raise af.DidNotConverge("no equilibrium", history=history)
 
 
+def test_results_of_a_case_with_another_title_are_replaced_with_a_warning(tmp_path, caplog):
+    for title, scale in (("Bell tower", 1.0), ("Bell tower", 0.5), ("Gate", 1.0)):
+        assert caplog.text == ""
+        motion = {**COLUMN["motion"], "scale": scale}
+        case = af.Case.of({**COLUMN, "title": title, "motion": motion})
+        [*af.cases.run_case(case, tmp_path)]
+    assert "has results of another case, 'Bell tower'" in caplog.text
+
+
 @pytest.mark.parametrize("name", ["history.nc", "case.toml"])
 def test_a_run_replaces_no_file_that_archfem_did_not_write(name, small, tmp_path, capsys):
     (tmp_path / "out").mkdir()

@@ -275,7 +275,7 @@ def test_gaps_below_the_largest_scale_are_filled_where_nothing_falls_there():
     assert len(found.runs) == 4
 
 
-def searched_by_steps(monkeypatch, windows, made, follows=inf):
+def searched_by_steps(monkeypatch, windows, made, follows=inf, *, is_given=True):
     """Search the fall of a block that falls within given windows of scales by each time step.
 
     Longer steps than a given one do not follow sliding.
@@ -294,7 +294,7 @@ def searched_by_steps(monkeypatch, windows, made, follows=inf):
     monkeypatch.setattr("archfem.dynamics.motion_scaling.time_history", shake)
     block = af.column(breadth=1.0, heights=[1.0])
     model = af.build(block, fidelity="rigid", displacements="large")
-    given = (*windows,) if isinstance(windows, dict) else None
+    given = (*windows,) if isinstance(windows, dict) and is_given else None
     return af.collapse_scale(model, af.Motion(np.array([0.0, 1.0, 0.0]), dt=0.01), dt=given)
 
 
@@ -308,7 +308,7 @@ def test_steps_disagree_at_equal_scales_only(monkeypatch, window, finds, agree):
     bracket = found.bracket(finds)
     assert window[0] < bracket.upper < window[1]
     assert all({bracket.lower, bracket.upper} <= set(scales) for scales in made.values())
-    assert any("time steps disagree" in doubt for doubt in found.doubts) != agree
+    assert any("its time steps find" in doubt for doubt in found.doubts) != agree
     assert all(len(set(scales)) == len(scales) for scales in made.values())
 
 
@@ -327,6 +327,22 @@ def test_a_search_without_a_step_shortens_its_own_until_sliding_follows(
     assert [*kept.searches] == [0.005]
 
 
+def test_the_fall_of_steps_too_long_for_sliding_is_stated_and_bounds_nothing(monkeypatch):
+    """5 ms fall from 3.5 on, the others from 2.9 on: the range is of all."""
+    windows = {0.005: ((3.5, inf),), **dict.fromkeys((0.0025, 0.003, 0.0015), ((2.9, inf),))}
+    given = searched_by_steps(monkeypatch, windows, {}, 0.004, is_given=False)
+    assert [1e3 * dt for dt in (*given.longer, *given.searches)] == pytest.approx([5, 2.5, 3, 1.5])
+    assert given.lower < 2.9 < given.upper < 3.5
+    (doubt,) = given.doubts
+    low, high = min(given.bracket(dt).upper for dt in given.searches), given.longer[0.005]
+    high = high["collapse"].upper
+    assert f"the first fall from {low:#.3g} to {high:#.3g} ×: between" in doubt
+    assert "time step (5, 2.5, 3, 1.5 ms), and no property" in str(given)
+    steps = [row[0] for row in given.rows()[1]]
+    assert {*steps} == {"5 ms", "2.5 ms", "3 ms", "1.5 ms"}
+    assert all(row[2] == "as given" for row in given.rows()[1])
+
+
 def test_the_second_step_begins_near_the_fall_of_the_first(monkeypatch):
     """Its scales lie between those of the first."""
     made = {}
@@ -338,7 +354,7 @@ def test_the_second_step_begins_near_the_fall_of_the_first(monkeypatch):
     away = [min(abs(one / other - 1.0) for other in made[0.01]) for one in made[0.005]]
     assert min(away) > 0.015
     assert "; stands at every smaller scale that was run: from " in str(found)
-    assert str(found).endswith(" apart, and none between was run")
+    assert " apart, and none between was run; varied were the scale and the " in str(found)
 
 
 def fallen(*scales):
@@ -359,7 +375,8 @@ def test_collapse_is_between_a_stable_and_a_falling_run_at_every_step():
     assert str(found) == (
         "stands at 1.00 × the motion, falls at 2.00 × the motion, the other time step first falls "
         "at 2.50 ×; stands at every smaller scale that was run: from 0.500 × on they are up to a "
-        "factor of 2.00 apart, and none between was run"
+        "factor of 2.00 apart, and none between was run; varied were the scale and the time step "
+        "(10, 5 ms), and no property"
     )
     assert found.doubts == (
         "it is not monotonic: it survives also at 3.00 × the motion by 10 ms",
@@ -369,11 +386,11 @@ def test_collapse_is_between_a_stable_and_a_falling_run_at_every_step():
     assert (never.lower, never.upper, never.above) == (1.0, inf, ())
     assert str(never) == (
         "stands at 1.00 × the motion, falls at 2.00 × the motion, the other time step falls at no "
-        "scale"
+        "scale; varied were the scale and the time step (10, 5 ms), and no property"
     )
     assert never.doubts == (
-        "its time steps disagree: it first falls between 1.00 and 2.00 × by 10 ms, between 2.00 "
-        "and inf × by 5 ms",
+        "its time steps find the first fall from 2.00 × on, or nowhere: between 1.00 and 2.00 × "
+        "by 10 ms, between 2.00 and inf × by 5 ms",
     )
     three = CollapseScale({dt: fallen(1.0, -upper) for dt, upper in enumerate((2.0, 2.2, 2.1))})
     assert "2.00 × the motion, the last time step first falls at 2.20 ×" in str(three)

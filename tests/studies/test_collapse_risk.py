@@ -316,6 +316,36 @@ def test_no_bracket_is_narrower_than_its_precision(quick_runs, precision, begin)
     assert found["upper"] / found["lower"] == pytest.approx(1.0 + precision, rel=1e-12)
 
 
+def test_steps_too_long_for_sliding_at_a_bound_are_in_doubt(tmp_path, monkeypatch):
+    """Those of runs far from the bracket do not count; a file without them has no such doubt."""
+
+    def slides(_, changes):
+        def run(motion):
+            over = motion.pga / (2.0 + changes["friction"])
+            falls, far = over > 1.0, not 0.5 < over < 2.0
+            step = 1e-4 if far else 2e-3 if falls and changes["friction"] < 0.0 else np.inf
+            kind = "fallen" if falls else "stands"
+            return af.dynamics.CollapseState(kind, None, (), 0.0, 0.0, True, step)
+
+        return run
+
+    monkeypatch.setattr(af.studies.collapse_risk, "prepare_runs", slides)
+    given = *tilted_block(), SITE
+    found = af.collapse_risk(*given, samples=8, precision=0.5, vary={"friction": (-0.1, 0.1)})
+    (doubt,) = (str(each) for each in found.doubts if "sliding" in str(each))
+    assert doubt == (
+        "in 4 of 8 samples the steps, 5 ms, are long for sliding; take 2 ms or less, "
+        "`--set analysis.dt=0.002`"
+    )
+    found.dataset["admissible_step"].values[:] = np.inf
+    assert "sliding" not in str(found.doubts)
+    path = tmp_path / "risk.nc"
+    earlier = found.dataset.drop_vars("admissible_step")
+    del earlier.attrs["dt"]
+    CollapseRisk(earlier).save(path)
+    assert "sliding" not in str(CollapseRisk.read(path).doubts)
+
+
 def test_samples_are_kept_and_continued(tmp_path, monkeypatch, quick_runs):
     analysis, motions = tilted_block()
     options = {"samples": 10, "out": tmp_path / "risk.nc", "precision": 0.02}

@@ -10,6 +10,7 @@ import numpy as np
 from archfem._typing import Array
 from archfem.cases.report.report_data import ReportData
 from archfem.errors import InvalidInput
+from archfem.motion.design_spectra import DesignSpectrum
 from archfem.motion.motion import Motion
 from archfem.motion.record_selection import SELECTION_RULES, SelectionRule
 from archfem.motion.response_spectra import response_spectrum
@@ -19,6 +20,9 @@ from archfem.view.pages.document import Grid
 
 # Norms by their words in [report], with the name of their rule
 _NORMS = {r"EN ?1998|EC ?8|Eurocode 8": "EC8", r"NTC": "NTC-2018"}
+
+# Longest period up to which motions are compared beyond the rule, where blocks rock [s]
+LONGEST_PERIOD = 4.0
 
 # Shortest stationary part of artificial motions, in both norms: from memory [s]
 MIN_PLATEAU = 10.0
@@ -77,12 +81,34 @@ def _check_spectra(data: ReportData, rule: SelectionRule) -> Iterator[Check]:
             met = bool(rule.lower <= design.min() and design.max() <= rule.upper)
             within = f"from {band[0]:.3g} to {band[1]:.3g} s"
             yield Check(name, required, f"{design.min():.3g} to {design.max():.3g} {within}", met)
+        yield from _compare_beyond(motions, target, reduction, band[1])
     if rule.zero_period:
         mean = np.mean([motion.pga for motion in motions]) / STANDARD_GRAVITY
         ratio = float(reduction * mean / target.horizontal(0.0))
         met = ratio >= rule.zero_period
         name = "mean PGA over the target at period zero"
         yield Check(name, f"≥ {rule.zero_period:g}", f"{ratio:.3g}", met)
+
+
+def _compare_beyond(
+    motions: list[Motion], target: DesignSpectrum, reduction: float, shortest: float
+) -> Iterator[Check]:
+    """Yield the motions over the target at the periods of rocking, for which there is no rule."""
+    periods = np.geomspace(shortest, LONGEST_PERIOD, 60)
+    try:
+        design = reduction / target.horizontal(periods)
+    except InvalidInput:  # a spectrum that ends before
+        return
+    ratios = {motion.name: design * _mean_spectrum([motion], periods) for motion in motions}
+    mean = np.mean([*ratios.values()], axis=0)
+    name, worst = max(ratios.items(), key=lambda each: float(np.abs(np.log(each[1])).max()))
+    at = int(np.abs(np.log(worst)).argmax())
+    yield Check(
+        f"the same from there to {LONGEST_PERIOD:g} s",
+        "no rule: T₁ is that of closed joints, and what rocks has longer periods",
+        f"{mean.min():.3g} to {mean.max():.3g}; '{name}' {worst[at]:.3g} at {periods[at]:.3g} s",
+        None,
+    )
 
 
 def _mean_spectrum(motions: list[Motion], periods: Array) -> Array:
