@@ -475,7 +475,7 @@ def format_ratio(value: float) -> str:
     """Format e or V / N, which is undefined at open joints and unbounded near opening."""
     if np.isnan(value):
         return "open"
-    return f"{value:.3f}" if value < 100.0 else "> 100"
+    return f"{value:z.3f}" if value < 100.0 else "> 100"
 
 
 def _mechanism_cell(mechanisms: Mapping[str, Mechanism | None], definition: str) -> str:

@@ -216,7 +216,6 @@ def draw_worst_places(ratings: Sequence[Rating]) -> Figure:
     drawn = ratings[: len(Colour.LINES)]
     structure, count = drawn[0].structure, (len(drawn) + 1) // 2
     low, high = outline_bounds(structure)
-    # a page prints figures as high as 94 mm in full width
     tall = (0.5 * Size.PAGE - 0.2) * (high[1] - low[1]) / (high[0] - low[0]) + 0.3
     figure = new_figure(Size.PAGE, 0.4 + min(count * tall, 3.25))
     rows = [figure.add_subplot(count, 2, 1 + k) for k in range(len(drawn))]
@@ -279,9 +278,9 @@ def _draw_factors(
     ends = np.array([*seen, low[0], high[0]])
     wide, tall = structure_figure(structure).get_size_inches()
     # height to spare, so that the bridge fills its part of the width, and room for the legend
-    tall = max(1.5 * tall * (high[0] - low[0]) / np.ptp(ends), 2.5)
-    figure = new_figure(wide, tall + 3.0)
-    upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=[3.0, tall])
+    tall = min(max(1.5 * tall * (high[0] - low[0]) / np.ptp(ends), 2.5), 3.9)
+    figure = new_figure(wide, tall + 2.0)
+    upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=[2.0, tall])
     ways = zip(("right", "left"), ("-", "--"), (Colour.THRUST, Colour.LOAD), strict=True)
     for way, line, colour in ways:
         drawn = over.sel(direction=way)
@@ -512,7 +511,7 @@ def draw_fall(run: History) -> Figure:
     drawn = np.concatenate([*built, *(each for time in instants for each in falls.outlines(time))])
     size, margin = np.ptp(drawn, axis=0), 0.4  # [m], [inch]
     # panels have the shape of what is drawn: else they would leave much of the page white
-    scale = ((np.array([Size.PAGE, 6.8]) / 2.0 - margin) / size).min()
+    scale = ((np.array([Size.PAGE, 5.6]) / 2.0 - margin) / size).min()
     figure = new_figure(*np.maximum(2.0 * (scale * size + margin), 0.5 * Size.COLUMN))
     panels = figure.subplots(2, 2, sharex=True, sharey=True).ravel()
     for axes, time in zip(panels, instants, strict=True):

@@ -285,7 +285,7 @@ def _label_places(panel: PartPanel, names: Sequence[str], joints: xr.Dataset) ->
 def _label_joints(axes: Axes, names: Sequence[str]) -> None:
     """Write the names of joints at 0, 1, …, as far as there is room, or 0, 1, … for long ones."""
     if max(map(len, names), default=0) > MAX_NAME_LETTERS:
-        axes.set_xlabel("joint, counted among those assessed [-]")
+        axes.set_xlabel("joint number [-]")
         names = [str(k) for k in range(len(names))]
     labels = {float(k): name for k, name in enumerate(names)}
     axes.xaxis.set_major_locator(MaxNLocator(max(2, min(6, len(names) // 3)), integer=True))
@@ -309,7 +309,7 @@ def _lay_out_panels(
         if rows[-1] and sum(rows[-1].values()) + width > joints_per_inch * Size.PAGE:
             rows.append({})
         rows[-1][part] = width
-    inches = (Size.COLUMN, 3.4) if len(sizes) == 1 else (Size.PAGE, 0.6 + 2.8 * len(rows))
+    inches = (Size.COLUMN, 3.4) if len(sizes) == 1 else (Size.PAGE, 0.6 + 2.5 * len(rows))
     figure, panels = new_figure(*inches), dict[str, Axes]()
     longest = max(sum(row.values()) for row in rows)
     first: Axes | None = None

@@ -437,7 +437,7 @@ def _name_part(axes: Axes, joints: Sequence[Joint], inch: float, top: float) -> 
     above = is_ring and corners[:, 1].max() > top - 1e-6  # a deck would strike the name through
     place = corners[:, 0].mean(), corners[:, 1].max() if above else corners[:, 1].min()
     style |= {"rotation": 0.0, "ha": "center", "va": "bottom" if above else "top"}
-    annotate(axes, joints[0].part, place, (0.0, 2.0 if above else -Size.LABEL), **style)
+    annotate(axes, joints[0].part, place, (0.0, 2.0 if above else -1.5 * Size.LABEL), **style)
 
 
 @validate_arguments

@@ -59,6 +59,8 @@ class Size:
     NOTE, LABEL, TITLE = 7.0, 8.0, 9.5  # LABEL also of ticks and legends; none is smaller than NOTE
     # a page of A4 prints 170 mm: no figure is wider, so that its type is printed as it is
     COLUMN, PAGE = 6.4, 170.0 / 25.4
+    # of a structure: a report leaves no more of a page empty where a figure moves to the next
+    HEIGHT = 107.0 / 25.4
 
 
 # Percentage of stresses beyond the end of a colour scale: peaks at the corners about which blocks
@@ -307,8 +309,8 @@ def drawing_scale(structure: Structure) -> float:
     """Return the approximate scale at which a structure is drawn on its own figure [inch / m]."""
     low, high = outline_bounds(structure)
     width, height = high - low
-    # margins: 0.8 inch beside the drawing, 1.2 above and below; a figure is at most 6.8 high
-    return float(min((Size.PAGE - 0.8) / width, (6.8 - 1.2) / height))
+    # margins: 0.8 inch beside the drawing, 1.2 above and below
+    return float(min((Size.PAGE - 0.8) / width, (Size.HEIGHT - 1.2) / height))
 
 
 def structure_figure(structure: Structure) -> Figure:

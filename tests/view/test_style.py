@@ -1,8 +1,11 @@
 """Pictures are saved whole."""
 
+import re
+import struct
 from dataclasses import replace
 from html import escape
 from itertools import combinations
+from pathlib import Path
 
 import matplotlib
 import numpy as np
@@ -116,6 +119,24 @@ def test_figures_fit_a_column_and_a_page_with_type_of_seven_points(bridge, run, 
                     assert page.x0 - 1 <= box.x0 <= box.x1 <= page.x1 + 1, text
                     assert page.y0 - 1 <= box.y0 <= box.y1 <= page.y1 + 1, text
     assert new_figure(20.0, 3.0).get_figwidth() == 170.0 / 25.4
+
+
+def test_pictures_of_the_gallery_are_as_small_as_paper_prints_them():
+    """At 150 dots per inch: type of seven points and more would shrink with a larger picture."""
+    folder = Path(__file__).parents[2]
+    style = (folder / "archfem/view/pages/templates/page.css").read_text(encoding="utf-8")
+    (high,) = re.findall(r"\.plate img \{ max-height: (\d+)mm", style)
+    pictures = [*(folder / "docs" / "gallery").glob("*.png")]
+    assert len(pictures) > 10
+    for picture in pictures:
+        width, height = struct.unpack(">II", picture.read_bytes()[16:24])
+        assert width / 150.0 * 25.4 <= 170.0, picture.name
+        assert height / 150.0 * 25.4 <= float(high), picture.name
+
+
+def test_tall_structures_are_drawn_as_high_as_paper_prints_them():
+    tower = af.column(breadth=1.0, heights=[2.0] * 10)
+    assert af.view.draw_structure(tower).get_figheight() == pytest.approx(107.0 / 25.4)
 
 
 @pytest.mark.parametrize("millimetres", [10.0, 500.0])

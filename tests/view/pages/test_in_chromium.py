@@ -161,12 +161,12 @@ return [sizes, widths];
 
 
 def test_type_on_paper_has_seven_points_at_least(small, tmp_path):
-    """Figures are printed at the size for which they were drawn, the widest also."""
+    """Figures are printed at the size for which they were drawn, the widest and highest also."""
     case, folder = af.Case.read(small).alone("first"), tmp_path / "out"
     with replace_run(case, folder) as draft:
         list(carry_out(case, draft))
         (draft / "limit.txt").write_text("limit analysis")
-        af.view.save(new_figure(9.0, 4.0), draft / "collapse.png")
+        af.view.save(new_figure(9.0, 5.9), draft / "collapse.png")
     report = af.cases.open_results(folder).report()
     with browser(wide=665) as driver:  # the width of the text on A4
         driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print"})
