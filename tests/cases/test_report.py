@@ -320,7 +320,7 @@ def test_a_run_in_memory_has_a_report_and_a_player(small, unplotted, undoubted, 
     words = " ".join(read_page(run.report(tmp_path / "run.html").read_text()).words)
     assert "damping 5 % of critical given damping, joints closed default" in " ".join(words.split())
     assert "5 Hz, proportional to stiffness" in words
-    assert "contains no displacements" in run.player().scene.data["note"]
+    assert "contains the largest displacement alone" in run.player().scene.data["note"]
     assert "Ground motions" not in words
     assert "The run is not complete" not in words
     data = report_data.ReportData(case, {"first": run.history})

@@ -14,6 +14,7 @@ from archfem.cases.result_text import (
     describe_run,
     describe_run_quality,
     describe_verdicts,
+    format_ratio,
     tabulate_joints,
     tabulate_runs,
 )
@@ -170,3 +171,17 @@ def test_verdicts_of_several_runs_are_counted(run):
     assert describe_verdicts([run]) == run.verdict.headline
     outcome, doubtful = run.verdict.outcome, "2" if run.verdict.doubts else "none"
     assert describe_verdicts([run, run]) == f"{outcome} in 2 of 2 runs; doubts in {doubtful}"
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (-1e-5, "0.000"),
+        (-0.0006, "-0.001"),
+        (0.4996, "0.500"),
+        (float("nan"), "open"),
+        (1e3, "> 100"),
+    ],
+)
+def test_a_ratio_of_nothing_has_no_sign(value, text):
+    assert format_ratio(value) == text

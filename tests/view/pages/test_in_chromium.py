@@ -62,6 +62,27 @@ def test_the_player_draws_the_states_of_the_history(rocked, tmp_path):
         assert complaints(driver) == []
 
 
+def test_a_player_without_fields_opens_at_the_largest_displacement(rocked, tmp_path):
+    """Elsewhere blocks stand where they were built, with openings between them."""
+    model, run = rocked
+    run = af.History(run.dataset.drop_vars("q"), model.structure)
+    path = af.view.player(run).save(tmp_path / "player.html")
+    outlines, number = Outlines(model.structure), model.structure.free[-1]
+    own = outlines.points[outlines.block == number]
+    with browser() as driver:
+        opened(driver, path)
+        said = driver.find_element("css selector", ".player-state")
+        assert "largest displacement" in said.text
+        assert "displacements ×" in said.text
+        found, by, *_ = corners(driver, number)
+        farthest = np.linalg.norm(found - own, axis=1).max() / by
+        assert farthest == pytest.approx(run.verdict.displacement, rel=0.1)
+        driver.execute_script(SET, "time", 0.0)
+        assert "openings ×" in said.text
+        assert np.abs(corners(driver, number)[0] - own).max() < 1e-3
+        assert complaints(driver) == []
+
+
 def test_a_click_on_a_joint_shows_it_and_play_moves_on(rocked, tmp_path):
     model, run = rocked
     path = af.view.player(run, model).save(tmp_path / "player.html")
@@ -276,4 +297,4 @@ def test_a_report_is_printed_as_pdf(small, tmp_path):
     # how to record what moves is not on paper
     assert "fields_every = 8" in page.read_text(encoding="utf-8")
     assert "fields_every = 8" not in text
-    assert "The run contains no displacements" in text
+    assert "largest displacement" in text
