@@ -61,14 +61,16 @@ def _draw_as_read(options: argparse.Namespace) -> Path | None:
 
 
 def _check_case(options: argparse.Namespace) -> int:
-    """Read a case and its motions, and compute limit analysis and dead load."""
+    """Read a case and its motions, and compute dead load, and limit analysis unless it searches."""
     case = Case.read(options.case, options.changes)
     print(case.title)
     if (survey := read_survey(case.settings, case.folder)) is not None:
         print(survey)
     print(result_text.describe_supports(case.structure))
     print(result_text.describe_depths(case.structure))
-    if case.limit.live:
+    if case.limit.live and case.limit.friction == "nonassociated":
+        print("limit analysis: `archfem limit` searches sliding without dilatancy, in both senses")
+    elif case.limit.live:
         show_both_senses(case, case.limit.solve(case.structure), lambda _, text: print(text))
     # Unreadable records are errors before the dead load is computed.
     case.check_ground()

@@ -144,8 +144,13 @@ def _collapse_kind(structure: Structure, lost: list[int], residual: float) -> st
     return "partly fallen" if parts - {blocks[number].part for number in lost} else "fallen"
 
 
-def doubt_collapse(structure: Structure, fall: CollapseState) -> Iterator[Doubt]:
-    """Yield doubts of a structure that has not fallen but was near another kind of collapse."""
+def doubt_collapse(
+    structure: Structure, fall: CollapseState, held: bool = False
+) -> Iterator[Doubt]:
+    """Yield doubts of a structure that has not fallen but was near another kind of collapse.
+
+    It may be held by the ground, which accelerates to the end.
+    """
     if fall.kind in FALLEN_STATES:
         return
     depth = shallowest_part(structure)[0]
@@ -170,7 +175,10 @@ def doubt_collapse(structure: Structure, fall: CollapseState) -> Iterator[Doubt]
         yield Doubt(
             f"blocks still move at the end: they may come back from {format_mm(fall.residual)}, or "
             "go farther",
-            "let the ground rest at the end, `--set motion.rest=10`, or suite.pairs.NAME.rest=10",
+            "hold the push longer, until it falls or rests"
+            if held
+            else "let the ground rest at the end, `--set motion.rest=10`, or "
+            "suite.pairs.NAME.rest=10",
         )
 
 

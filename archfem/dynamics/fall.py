@@ -117,7 +117,10 @@ def follow_fall(
         resting = is_resting(model, state, shaken=ending is not Ending.FINISHED)
         resting = resting or swings_little(history)
         fall = replace(classify_collapse(structure, [frame], origin), resting=resting)
-    doubts += doubt_collapse(structure, fall)
+    # throughout the last fifth; records change their sign there
+    size = np.abs(motion.horizontal)
+    held = bool(size[-len(size) // 5 :].min() > 0.5 * size.max())
+    doubts += doubt_collapse(structure, fall, held)
     if fall.kind in FALLEN_STATES and whole:
         doubts += _doubt_joints(structure, motion, start.time)
     return with_fall(history, fall).with_doubts((*history.doubts, *doubts))

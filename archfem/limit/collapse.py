@@ -468,8 +468,8 @@ def _solve_collapse(
         return replace(result, solutions=solutions)
     result = _read_result(stones, programme, bounded, scale * optimum.value, optimum, support)
     result = replace(result, solutions=solutions)
-    if solutions is not None and solutions.jumps:
-        warn_jump(solutions)
+    if solutions is not None:
+        warn_lost_solution(solutions)
     if not isinstance(live, Settlement):
         failing = {*result.sliding, *(joint for joint, _ in result.hinges)}
         if friction is not None and not structure.tension.any():  # bonds that hold stay closed
@@ -699,14 +699,23 @@ def warn_idle_joints(result: Collapse) -> None:
         )
 
 
-def warn_jump(solutions: NonassociatedBounds) -> None:
-    """Warn of a factor that rises suddenly with friction, as where the weakest is not found."""
-    share, factor = solutions.path[-1]
-    logger.warning(
-        "a weaker solution without dilatancy is likely: the least found is %.4g, but %.4g with "
-        "%.3g times the friction, from which the factor should rise little",
-        *(solutions.between[0], factor, share),
-    )
+def warn_lost_solution(solutions: NonassociatedBounds) -> None:
+    """Warn where the weakest was found by chance, or the factor rises suddenly with friction."""
+    least, tried = solutions.between[0], solutions.starts[0]
+    if solutions.may_be_less and solutions.agreeing < 2:
+        found = "only one" if solutions.agreeing else "none"
+        logger.warning(
+            "a weaker solution without dilatancy may exist: %s of %d starting states led to the "
+            "least found, %.4g; hold a motion a tenth below",
+            *(found, tried, least),
+        )
+    if solutions.jumps:
+        share, factor = solutions.path[-1]
+        logger.warning(
+            "a weaker solution without dilatancy is likely: the least found is %.4g, but %.4g with "
+            "%.3g times the friction, from which the factor should rise little",
+            *(least, factor, share),
+        )
 
 
 def warn_bonds(structure: Structure, result: Collapse) -> None:

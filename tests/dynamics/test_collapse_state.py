@@ -138,7 +138,9 @@ def test_a_kind_of_collapse_near_another_is_doubted(kind, displacement, residual
 def test_a_dislocation_of_blocks_that_still_move_is_doubted(kind, resting, doubted):
     column = af.column(breadth=0.1, heights=[0.3])
     state = collapse_state.CollapseState(kind, None, (), 0.03, 0.02, resting)
-    doubts = list(collapse_state.doubt_collapse(column, state))
-    assert [doubt.cause for doubt in doubts] == doubted * [
-        "blocks still move at the end: they may come back from 20 mm, or go farther"
-    ]
+    for held, remedy in ((False, "motion.rest=10"), (True, "hold the push longer")):
+        doubts = list(collapse_state.doubt_collapse(column, state, held))
+        assert [doubt.cause for doubt in doubts] == doubted * [
+            "blocks still move at the end: they may come back from 20 mm, or go farther"
+        ]
+        assert all(remedy in doubt.remedy for doubt in doubts)

@@ -12,6 +12,7 @@ from scipy.optimize import Bounds, LinearConstraint, milp
 import archfem as af
 from archfem.limit import Outcome, linear_programme, nonassociated
 from archfem.limit.backfill import self_weight_programme
+from archfem.limit.collapse import warn_lost_solution
 from archfem.limit.linear_programme import RigidBlocks
 from archfem.limit.nonassociated import descend, find_solution, starting_forces
 
@@ -294,25 +295,62 @@ def test_a_factor_jumps_where_it_rises_far_faster_than_before():
     assert not jumps(0.5, 0.5, np.nan)
 
 
-def test_a_wall_is_searched_from_more_states_where_the_first_lead_nowhere(monkeypatch):
-    structure = af.circular_arch(
-        radius=3.0, thickness=0.6, embrace=120.0, voussoirs=7, contact=rough(0.5)
+DOOR = [1.0, 0.5, -1.5, 0.5, 1.0]
+DOOR_CUT = [0.5, 1.0, -1.5, 1.0, 0.5]
+DOOR_WALL = [*[DOOR, DOOR_CUT] * 3, [0.5, 0.5, 2.5, 0.5, 0.5], [0.75, 1.0, 1.0, 1.0, 0.75]]
+"""Bond of a symmetric wall with a door and a lintel."""
+
+
+def test_a_symmetric_wall_is_as_strong_to_both_sides():
+    """The other sense is the mirror image: forces of mirrored joints are the same."""
+    structure = wall(DOOR_WALL, 0.7)
+    push = {sense: af.BodyForce(float(sense)) for sense in (1, -1)}
+    found = {
+        sense: af.collapse_factor(structure, live=live, friction="nonassociated")
+        for sense, live in push.items()
+    }
+    assert found[-1].factor == found[1].factor
+    pressed = [np.sort(each.joints["N"].values) for each in found.values()]
+    assert pressed[0] == pytest.approx(pressed[1], abs=1e-9 * pressed[0].max())
+    assert found[-1].motion[:, 0].sum() == pytest.approx(-found[1].motion[:, 0].sum())
+    for sense, each in found.items():
+        check(structure, push[sense], each)
+
+
+@pytest.mark.usefixtures("few_starts")
+def test_from_the_weakest_of_the_starts_the_search_goes_down(caplog):
+    """A wedge of this wall that does not slide is found from no start with much friction."""
+    least = af.collapse_factor(wall(DOOR_WALL, 0.6), live=SIDEWAYS, friction="nonassociated")
+    structure = wall(DOOR_WALL, 0.8)
+    found = af.collapse_factor(structure, live=SIDEWAYS, friction="nonassociated")
+    check(structure, SIDEWAYS, found)
+    assert least.solutions.agreeing > 0
+    assert found.solutions.agreeing == 0
+    assert found.factor == pytest.approx(least.factor, rel=EXACT)
+    assert (
+        f"none of {found.solutions.starts[0]} starting states led to the least found" in caplog.text
     )
-    push = af.PointLoad(0.0, (-1e3, 0.0))
-    usual = af.collapse_factor(structure, live=push, friction="nonassociated")
-    find, calls = nonassociated.find_solution, []
 
-    def fail_first(programme, forces):
-        calls.append(forces)
-        return find(programme, forces) if len(calls) > 3 else None
 
-    # as in a wall of many joints: the associated state and two others
-    monkeypatch.setattr(nonassociated, "MAX_FULL_SEARCH_JOINTS", 0)
-    monkeypatch.setattr(nonassociated, "find_solution", fail_first)
-    found = af.collapse_factor(structure, live=push, friction="nonassociated")
-    assert found.solutions.starts[0] > 3
-    check(structure, push, found)
-    assert found.factor == pytest.approx(usual.factor, rel=EXACT)
+def test_only_a_symmetric_structure_has_a_mirror_image():
+    def pushed(structure, horizontal=-1.0, vertical=0.0):
+        stones, dead = self_weight_programme(structure, "nonassociated", None, None)
+        load = stones.load([af.BodyForce(horizontal, vertical)])
+        return nonassociated._find_mirror(dead.with_load_factor(load))
+
+    symmetric = wall(DOOR_WALL)
+    assert pushed(symmetric) is not None
+    assert pushed(symmetric, 1.0) is None  # that is the sense in which it is searched
+    assert pushed(symmetric, vertical=-0.1) is None
+    assert pushed(ring(voussoirs=8)) is not None
+    assert pushed(wall([FOUR, [0.75, 1.0, 1.0, 1.25]])) is None
+    one, *others = symmetric.joints
+    for changes in ({"friction": 0.5}, {"cohesion": 1e3}):
+        joint = replace(one, contact=replace(one.contact, **changes))
+        assert pushed(replace(symmetric, joints=(joint, *others))) is None
+    heavy = replace(af.STONE, unit_weight=30e3)
+    blocks = [*symmetric.blocks[:-1], replace(symmetric.blocks[-1], material=heavy)]
+    assert pushed(replace(symmetric, blocks=tuple(blocks))) is None
 
 
 HALVES = [[0.5, 0.5], [1.0]]
@@ -467,6 +505,19 @@ def test_the_text_has_names_and_the_range_of_solutions():
     )
 
 
+@pytest.mark.parametrize(
+    ("agreeing", "lower", "words"),
+    [(0, 0.0, "none of 21"), (1, 0.0, "only one of 21"), (2, 0.0, ""), (1, 0.5, "")],
+)
+def test_a_least_factor_found_by_chance_is_doubted(caplog, agreeing, lower, words):
+    """Unless a bound proves it, as where both bounds are the factor."""
+    bounds = nonassociated.NonassociatedBounds((lower, 0.6), (0.5, 0.6), (21, 9), agreeing=agreeing)
+    warn_lost_solution(bounds)
+    assert bool(caplog.records) is bool(words)
+    assert words in caplog.text
+    assert f"(by 9 of 21 starting states, the least by {agreeing})" in str(bounds)
+
+
 def test_where_dilatancy_locks_a_strut_the_factor_is_the_proven_bound():
     """Its own load presses three stones between walls; nothing is known of the largest factor."""
     dry = af.Contact(1e9, 3e8, 0.6)
@@ -540,18 +591,19 @@ def test_shear_is_held_by_cohesion_and_friction_unless_it_never_slides():
 
 
 def test_bounds_are_those_of_the_weakest_and_the_strongest_solution(monkeypatch):
-    """The search finds three solutions, beside the associated factor."""
+    """The search finds four solutions, two of them a hair apart, beside the associated factor."""
     programme, optimum = programmed(ring(voussoirs=5))
     found = [
         nonassociated.AlternatingIterate(replace(optimum, value=value), 0.0, True)
-        for value in (-0.4, -0.3, -0.5)
+        for value in (-0.4, -0.3, -0.5, -0.3001)
     ]
     monkeypatch.setattr(nonassociated, "_find_solutions", lambda *given: list(found))
     monkeypatch.setattr(nonassociated, "descend", lambda *given, **options: iter([]))
     state, bounds = nonassociated.search_nonassociated(programme, optimum, -1.0)
     assert state.value == -0.3
     assert bounds.between == (0.3, 0.5)
-    assert bounds.starts == (44, 3)  # three from less friction, the associated one and 40
+    assert bounds.starts == (45, 4)  # three from less friction, and fourteen chains of three
+    assert bounds.agreeing == 2
     assert bounds.bracket[1] == pytest.approx(optimum.unknowns[0])
 
 
