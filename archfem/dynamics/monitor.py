@@ -263,7 +263,8 @@ class RunMonitor:
                 "tension",
                 f"elastic fill bears {tension / kPa:.3g} kPa of tension, at t = {time:.4g} s: soil "
                 f"has next to none, {SOIL_TENSION / kPa:.2g} kPa with a cohesion of 5 kPa",
-                'compare with fill in pieces (law = "jointed" in [structure.fill] of a case)',
+                'compare with fill in pieces (law = "jointed", friction_angle, cohesion and '
+                "piece_size in [structure.fill] of a case)",
             )
 
     def _check_small_displacements(self, time: float, small_rotation: float = 0.01) -> None:
