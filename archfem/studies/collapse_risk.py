@@ -127,8 +127,7 @@ def bracket_capacity(sample: RiskSample) -> dict[str, Any]:
     smallest, largest = admissible_range(sample.between, sample.motion)
     stands, falls, runs, states = 0.0, inf, 0, dict[float, CollapseState]()
     scale = min(max(sample.begin, smallest), largest)
-    wide = 1.0 + sample.precision
-    factor = _search_factor(wide)
+    factor = _search_factor(wide := 1.0 + sample.precision)
     while runs < MOST_RUNS:
         runs += 1
         states[scale] = run(sample.motion.scaled(scale))
