@@ -43,6 +43,7 @@ from archfem.limit.mechanism_kinematics import (
 from archfem.masonry.joint_closing import describe_closing
 from archfem.masonry.structure import Structure, join_names
 from archfem.models.model import Doubt, Model
+from archfem.units import kPa
 
 SIGN_CONVENTION = (
     "N > 0 compression; eccentricity and M > 0 toward the extrados; V > 0 where the joint's "
@@ -89,6 +90,7 @@ def _read_number(value: Any) -> float:
 ATTRIBUTE_KINDS: dict[str, Callable[[Any], Any]] = {
     **dict.fromkeys(("pga", "energy_drift", "displacement", "residual"), _read_number),
     **dict.fromkeys(("last_time", "predicted_error", "admissible_step"), _read_number),
+    **dict.fromkeys(("fill_tension", "fill_tension_time"), _read_number),
     **dict.fromkeys(("fall_time", "fall_residual", "fall_resting"), _read_number),
     **dict.fromkeys(("criteria_hinge", "criteria_duration", "criteria_friction"), _read_number),
     **dict.fromkeys(("halved_steps", "steps", "criteria_failures"), index),
@@ -289,6 +291,11 @@ class History(ResultDisplay):
         if self.structure is not None and self.fall is not None and self.fall.time is None:
             remarks.append(describe_dislocation(self.structure))
         remarks += extremes_remark(self.dataset)
+        if (tension := attrs.get("fill_tension")) is not None:
+            when = f"at {attrs['fill_tension_time']:.3f} s"
+            remarks.append(
+                f"largest tension in elastic fill {tension / kPa:.3g} kPa, {when}: soil has none"
+            )
         remarks += brief_mechanism_remarks(joints, self.structure, mechanisms)
         if mechanisms["any joints at once"] is not None:
             remarks.append(total_duration_remark(joints))

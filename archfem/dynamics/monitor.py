@@ -16,6 +16,7 @@ step of a batch.
 """
 
 from dataclasses import dataclass, replace
+from math import cos, radians, sin
 
 import numpy as np
 from scipy import sparse
@@ -26,6 +27,12 @@ from archfem.dynamics.separation import MeetingMonitor
 from archfem.dynamics.state import Batch, State
 from archfem.errors import DidNotConverge, logger
 from archfem.models.model import Doubt, Model, Observer
+from archfem.statics.stress import observe_fill_tension
+from archfem.units import kPa
+
+# Largest tension that cohesive loose soil bears, 30° and 5 kPa as in `fill_doubts`: where Mohr's
+# circle touches the limit, 2 c cos φ / (1 + sin φ) [Pa]
+SOIL_TENSION = 2.0 * 5e3 * cos(radians(30.0)) / (1.0 + sin(radians(30.0)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,6 +136,8 @@ class RunMonitor:
         self._pairs_facets = not self._small and bool(model.face_mismatch(start.state(0).q)[1])
         self._meeting = MeetingMonitor(model, start.state(0))
         self._met: tuple[float, str] | None = None  # first time [s], and which stones
+        self._observe_tension = observe_fill_tension(model)
+        self.fill_tension = (0.0, 0.0)  # largest tension in elastic fill [Pa], and its time [s]
         self._mismatch = (0.0, "")  # slip over facet length, and the joint
         self._depth = float(model.structure.depths.min())
         self._last, self._before = start.state(0), start.state(0)
@@ -189,9 +198,17 @@ class RunMonitor:
             for k in range(first, len(batch.times), facet_check_interval):
                 slip = self.model.face_mismatch(batch.state(k).q)
                 self._mismatch = max(self._mismatch, slip)
+        self._add_tension(batch)
         self._steps += len(batch.times)
         self._before, self._last = self._last, batch.state(len(batch.times) - 1)
         return drift
+
+    def _add_tension(self, batch: Batch, interval: int = 2) -> None:
+        """Add the tension of fill at some of the next steps."""
+        if self._observe_tension is not None:
+            for k in range(-self._steps % interval, len(batch.times), interval):
+                found = self._observe_tension(batch.state(k).q), float(batch.times[k])
+                self.fill_tension = max(self.fill_tension, found)
 
     def check_run(self) -> None:
         """Raise an error if the steps added are wrong, and warn if they are doubtful."""
@@ -220,6 +237,7 @@ class RunMonitor:
             )
         self._check_facets(time)
         self._check_energy()
+        self._check_tension()
         if self._small:
             self._check_small_displacements(time)
 
@@ -235,6 +253,18 @@ class RunMonitor:
                 f"energy drifts: by t = {self._worst_time:.4g} s {abs(self.worst_drift):.0%} of "
                 f"the largest exchanged {change}",
                 "compare with the scheme Conserving, with a smaller dt, or with more damping",
+            )
+
+    def _check_tension(self) -> None:
+        """Warn of fill that holds itself, and the stones, by tension."""
+        tension, time = self.fill_tension
+        if tension > SOIL_TENSION:
+            self._add_doubt(
+                "tension",
+                f"elastic fill bears {tension / kPa:.3g} kPa of tension, at t = {time:.4g} s: soil "
+                f"has next to none, {SOIL_TENSION / kPa:.2g} kPa with a cohesion of 5 kPa",
+                'compare with fill in pieces (law = "jointed", friction_angle, cohesion and '
+                "piece_size in [structure.fill] of a case)",
             )
 
     def _check_small_displacements(self, time: float, small_rotation: float = 0.01) -> None:

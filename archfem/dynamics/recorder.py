@@ -214,6 +214,8 @@ class Recorder:
             "signs": SIGN_CONVENTION,
             "versions": library_versions(),
         }
+        if monitor.fill_tension[0] > 0.0:
+            attributes["fill_tension"], attributes["fill_tension_time"] = monitor.fill_tension
         if self.model.prediction:
             attributes["predicted_error"] = self.model.prediction.error
         return attributes

@@ -23,6 +23,7 @@ from archfem.errors import InvalidInput, logger
 from archfem.joints.resultants import check_instant, joint_dataset
 from archfem.limit.backfill import (
     BlocksWithFill,
+    check_options,
     is_balanced,
     refuse_bonds,
     self_weight_programme,
@@ -36,6 +37,7 @@ from archfem.limit.mechanism_kinematics import RigidRegions
 from archfem.limit.mechanism_names import name_mechanism
 from archfem.limit.nonassociated import NonassociatedBounds, search_nonassociated
 from archfem.masonry.loads import Action, PointLoad, Settlement, find_push, list_loads
+from archfem.masonry.materials import STONE
 from archfem.masonry.structure import (
     HasStructure,
     Structure,
@@ -83,6 +85,7 @@ class Collapse(ResultDisplay):
         upper: what no state of equilibrium exceeds: the factor itself, with a `PlasticFill` the
             bound from above. `factor` is the bound from below then, and `lower` another name of it.
         over_fill: factors over all assumptions on a `Fill` that is pushed sideways; else None.
+        strength: compressive strength at which joints crush [Pa]; infinite where they do not.
         live: the growing actions, or the settlement.
         dead: the actions beside self-weight that do not grow.
         structure: the analysed structure; None where the result was built by hand.
@@ -99,6 +102,7 @@ class Collapse(ResultDisplay):
     fill_motion: xr.Dataset | None = None
     upper: float = np.nan
     over_fill: FillRange | None = None
+    strength: float = np.inf
     live: tuple[Action | Settlement, ...] = ()
     dead: tuple[Action, ...] = ()
     structure: Structure | None = None
@@ -215,7 +219,10 @@ class Collapse(ResultDisplay):
         text = f"{self._headline}: factor {self.factor:.4g}{bound}; hinges: {hinges}; "
         solutions = "" if self.solutions is None else f"; {self.solutions}"
         over = f"; {self.describe_range()}" if self.over_fill else ""
-        return f"{text}sliding: {sliding}{solutions}{over}"
+        crushing = ""
+        if self.structure is not None:
+            crushing = f"; {describe_crushing(self.strength, self.structure)}"
+        return f"{text}sliding: {sliding}{solutions}{over}{crushing}"
 
 
 def collapse_factor(
@@ -351,7 +358,8 @@ def _solve_loads(
         warn_idle_joints(result)
     warn_bonds(structure, result)
     actions = (loads,) if isinstance(loads, Settlement) else tuple(loads)
-    return replace(result, live=actions, dead=stays, structure=structure)
+    crushes = check_options(structure, friction, strength)
+    return replace(result, strength=crushes, live=actions, dead=stays, structure=structure)
 
 
 def stands(
@@ -619,10 +627,11 @@ def _read_joints(
 
 def describe_crushing(strength: float | None, structure: Structure) -> str:
     """Describe at which strength joints crush, if at all: that of the stones, or one for them."""
-    if strength is None or np.isinf(strength):
-        return "joints do not crush: no strength of the stones counts"
     blocks = {structure.blocks[k] for k in np.unique(structure.pairs[structure.judged]).tolist()}
     own = sorted({block.material.strength or np.inf for block in blocks})
+    if strength is None or np.isinf(strength):
+        preset = " (56 MPa of the preset is not given)" * (STONE.strength in own)
+        return f"joints do not crush: no strength of the stones counts{preset}"
     of_stones = "the strength of the stones"
     if not np.isclose(strength, own).any():
         listed = " and ".join(f"{x / MPa:.3g} MPa" for x in own if x < np.inf) or "not known"

@@ -13,6 +13,8 @@ time histories stress is elastic, without the blocks' viscous part. Resultants, 
 stress from them, include that of the joints where damping is "closed".
 """
 
+from collections.abc import Callable
+
 import numpy as np
 import xarray as xr
 from scipy import sparse
@@ -21,6 +23,7 @@ from archfem._files import align_columns
 from archfem._typing import Array
 from archfem._validation import validate_arguments
 from archfem.errors import InvalidInput
+from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import Structure
 from archfem.models.model import Cells, Model
 from archfem.units import MPa
@@ -324,6 +327,21 @@ def _peak_stresses(model: Model, fields: Array) -> Array:
         np.maximum.at(tension, owner, largest)
     peaks[:, :, rigid] = np.nan
     return peaks
+
+
+def observe_fill_tension(model: Model) -> Callable[[Array], float] | None:
+    """Return a function from coordinates to the largest tension in fill in one piece [Pa].
+
+    None where there is no such fill, or where it is rigid or cut into pieces.
+    """
+    cells, blocks = model.cells, model.structure.blocks
+    fill = [number for number in find_yielding_blocks(model.structure) if not blocks[number].grain]
+    own = [cells.polygons[k] for k in np.flatnonzero(np.isin(cells.owner, fill))]
+    if cells.stress is None or not own:
+        return None
+    rows = 3 * np.unique(np.concatenate(own))[:, None] + np.arange(3)
+    operator = corner_stress_operator(cells)[rows.ravel()]
+    return lambda q: float(principal_values(*(operator @ q).reshape(-1, 3).T)[0].max())
 
 
 def _label_use(structure: Structure, peaks: Array) -> xr.Dataset:

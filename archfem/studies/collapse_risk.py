@@ -38,7 +38,7 @@ from archfem._validation import (
     validate_methods,
 )
 from archfem.dynamics.analysis import Analysis
-from archfem.dynamics.collapse_state import FALLEN_STATES, doubt_soft_blocks
+from archfem.dynamics.collapse_state import FALLEN_STATES, CollapseState, doubt_soft_blocks
 from archfem.dynamics.motion_scaling import admissible_range, check_search
 from archfem.dynamics.recorder import Record
 from archfem.errors import DidNotConverge, InvalidInput
@@ -125,15 +125,13 @@ def bracket_capacity(sample: RiskSample) -> dict[str, Any]:
     """
     run = prepare_runs(sample.analysis, dict(sample.changes))
     smallest, largest = admissible_range(sample.between, sample.motion)
-    stands, falls, runs, steps = 0.0, inf, 0, {inf: inf}
+    stands, falls, runs, states = 0.0, inf, 0, dict[float, CollapseState]()
     scale = min(max(sample.begin, smallest), largest)
-    wide = 1.0 + sample.precision
-    factor = _search_factor(wide)
+    factor = _search_factor(wide := 1.0 + sample.precision)
     while runs < MOST_RUNS:
         runs += 1
-        state = run(sample.motion.scaled(scale))
-        steps[scale] = state.admissible_step
-        if state.kind in FALLEN_STATES:
+        states[scale] = run(sample.motion.scaled(scale))
+        if states[scale].kind in FALLEN_STATES:
             falls = scale
         else:
             stands = scale
@@ -145,8 +143,8 @@ def bracket_capacity(sample: RiskSample) -> dict[str, Any]:
             scale = max(falls / factor, smallest)
         else:
             scale = sqrt(stands * falls)
-    step = min(steps.get(stands, inf), steps[falls])
-    return {"lower": stands, "upper": falls, "runs": runs, "admissible_step": step}
+    bounds = [states[at].admissible_step for at in (stands, falls) if at in states]
+    return {"lower": stands, "upper": falls, "runs": runs, "admissible_step": min(bounds)}
 
 
 def _search_factor(wide: float) -> float:
@@ -645,9 +643,9 @@ class CollapseRisk(ResultDisplay):
             )
             doubts.append(Doubt(cause, "give its points at longer return periods"))
         doubts += self._doubt_records()
-        if "dt" in self.dataset.attrs:  # files of earlier versions do not have it
-            steps = self._of_answered("admissible_step")
-            doubts += doubt_steps_of_sliding(steps, self.dataset.attrs["dt"], "samples", "")
+        steps = self.dataset.get("admissible_step", self.dataset["upper"])  # of earlier versions
+        dt = self.dataset.attrs.get("dt")
+        doubts += doubt_steps_of_sliding(steps.values.tolist(), dt, "samples", "")
         count = len(self.dataset["sample"])
         # a twentieth of all is what the 90 % interval leaves out at each of its ends
         if count - len(self.answered) > 0.05 * count:

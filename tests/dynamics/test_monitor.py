@@ -200,6 +200,35 @@ def test_facets_that_slid_past_each_other_are_doubted(stack, monkeypatch, slip, 
         looked(model).check_run()
 
 
+@pytest.mark.parametrize(("tension", "doubted"), [(5.7e3, False), (5.9e3, True)])
+def test_tension_that_soil_does_not_bear_is_doubted(stack, monkeypatch, tension, doubted):
+    """Mohr's circle of uniaxial tension σ touches the limit of 30° and 5 kPa at 5 kPa · 2 / √3."""
+    monkeypatch.setattr(
+        "archfem.dynamics.monitor.observe_fill_tension", lambda model: lambda q: tension
+    )
+    guard = looked(af.build(stack, fidelity="rigid", displacements="large"))
+    guard.check_run()
+    assert guard.fill_tension[0] == tension
+    assert any("kPa of tension" in doubt.cause for doubt in guard.doubts) is doubted
+
+
+def test_a_run_states_the_largest_tension_of_its_fill():
+    """That of the recorded fields, at every second step."""
+    arch = af.shapes.Arch(span=5.0, rise=1.2, thickness=0.4, voussoirs=9)
+    bridge = af.bridge(arches=[arch], backfill=af.shapes.Backfill(cover=0.3), width=3.0)
+    model = af.build(bridge, fidelity={"backfill": "full", "rest": "rigid"}, cells=(2, 2))
+    record = af.dynamics.Record(fields_every=2)
+    run = af.time_history(model, MOTION.cut(0.0, 0.5), dt=0.005, damping="effective", record=record)
+    use = af.statics.strength_use_over(model, run.dataset)
+    fill = use.isel(block=use["part"].values == "backfill")
+    tension, time = (float(fill[name].item()) for name in ("tension", "tension_time"))
+    assert 0.0 < tension == pytest.approx(run.dataset.attrs["fill_tension"], rel=1e-9)
+    words = (
+        f"largest tension in elastic fill {tension / 1e3:.3g} kPa, at {time:.3f} s: soil has none"
+    )
+    assert words in run.verdict.remarks
+
+
 def test_every_step_of_a_batch_counts_for_displacements(stack, monkeypatch):
     """Facets, if any are paired, are checked at every 32nd step alone: the first, and the 33rd."""
     model = af.build(stack, fidelity="rigid", displacements="large")

@@ -22,6 +22,7 @@ from archfem.statics import (
 from archfem.statics.stress import (
     _fit_planes,
     corner_stress_operator,
+    observe_fill_tension,
     strength_use_text,
     utilisation_text,
 )
@@ -247,6 +248,23 @@ def test_tension_and_compression_are_reported_by_part(stack):
     assert [cell.strip() for cell in line if cell.strip()] == [
         "column", "2.800 MPa", "block 1", "5.00%", "0.014 MPa", "block 1",
     ]  # fmt: skip
+
+
+def test_the_tension_of_a_fill_is_that_of_its_corners():
+    """As by `strength_use` of that block; None where it is rigid."""
+    arch = af.shapes.Arch(span=5.0, rise=1.2, thickness=0.4, voussoirs=9)
+    bridge = af.bridge(arches=[arch], backfill=af.shapes.Backfill(cover=0.3), width=3.0)
+    model = af.build(bridge, fidelity={"backfill": "full", "rest": "rigid"}, cells=(2, 2))
+    observe = observe_fill_tension(model)
+    q = np.zeros(model.size)
+    assert observe is not None
+    assert observe(q) == 0.0
+    rest = af.dead_load(model)
+    use = strength_use(rest.model, rest.q)
+    (fill,) = np.flatnonzero(use["part"].values == "backfill")
+    assert observe(rest.q) == pytest.approx(float(use["tension"][fill]), rel=1e-9)
+    assert observe(2.0 * rest.q) == pytest.approx(2.0 * observe(rest.q), rel=1e-9)
+    assert observe_fill_tension(af.build(bridge, fidelity="rigid")) is None
 
 
 def test_rigid_stones_beside_a_meshed_fill_have_no_stress():
