@@ -16,7 +16,6 @@ velocity then errs by up to ½ Δt c N₀ |ΔV/N| until it turns or rests again,
 import numpy as np
 
 from archfem._typing import Array
-from archfem.dynamics.solvers.step_scans import add_drifts, scan_shears
 from archfem.dynamics.state import Batch
 from archfem.masonry.structure import Structure
 from archfem.motion.motion import Motion
@@ -49,8 +48,8 @@ class SlipError:
         least = least_compression(first.resultants[0, judged, 0])[slides[judged]]
         # cohesion of bonds is lost as they break
         cohesion = np.where(structure.tension > 0.0, 0.0, structure.cohesion)
-        of_joints = structure.friction[self.joints], cohesion[self.joints], least
-        self._law, self._gravity = (self.joints, *of_joints), structure.gravity
+        self._law = structure.friction[self.joints], cohesion[self.joints], least
+        self._gravity = structure.gravity
         # relative acceleration of the two blocks by a shear as large as N at rest (j,) [m/s²]
         masses = np.full(len(structure.blocks), np.inf)
         for number in structure.free:
@@ -76,12 +75,15 @@ class SlipError:
         lengths[0] -= self._end
         lengths[1:] -= batch.times[:-1]
         middles = np.append(self._middles, batch.times - 0.5 * lengths)
-        rows, count = np.empty((len(middles), 2, len(self.joints))), len(lengths)
-        rows[: len(self._rows)] = self._rows
-        variation, margins = np.empty((2, count, len(self.joints)))
-        nearest, squares = np.empty(count), np.square(lengths)[:, None]
-        scans = variation, margins, nearest
-        scan_shears(batch.resultants, self._law, lengths, middles, rows, scans)
+        rows, count = np.concatenate([self._rows, self._scale_shears(batch)]), len(lengths)
+        squares = np.square(lengths)[:, None]
+        variation = squares * np.abs(second_derivatives(middles, rows[:, 0])[-count:]) / 6.0
+        # the least margin of a step and the two before
+        margins = rows[:, 1].copy()
+        for before in (1, 2):
+            margins[before:] = np.minimum(margins[before:], rows[:-before, 1])
+        margins = np.maximum(margins[-count:], 0.0)
+        nearest = margins.min(axis=1, initial=np.inf)
         # elsewhere the ground cannot vary as much within a step as V lacks to its limit
         near = nearest < self._largest_slope * lengths
         for jump in self._jumps:
@@ -100,11 +102,33 @@ class SlipError:
         count = len(batch.times)
         end = len(rows) - len(lengths) + count
         self.total = self.total + errors[:count].sum(axis=0)
-        # V/N within a thousandth of its limit counts as sliding
-        sums = self.total, self._drift
-        add_drifts(rows[:end], lengths[:count], self._acceleration, 1e-3, sums)
+        self._add_drifts(rows[:end], lengths[:count])
         self._middles, self._rows = middles[max(end - 2, 0) : end], rows[max(end - 2, 0) : end]
         self._end = float(batch.times[-1])
+
+    def _scale_shears(self, batch: Batch) -> Array:
+        """Return V/N of the joints, and what it lacks to its limit (steps, 2, j)."""
+        friction, cohesion, least = self._law
+        normal, shear = (batch.resultants[:, self.joints, k] for k in range(2))
+        pressed, limit = np.maximum(normal, least), friction * np.maximum(normal, 0.0) + cohesion
+        return np.stack([shear / pressed, (limit - np.abs(shear)) / pressed], axis=1)
+
+    def _add_drifts(self, rows: Array, lengths: Array) -> None:
+        """Add the errors of the slip by those of the velocity, and update these.
+
+        A turn sets the latter: of the last one it leaves (a - μ g)/(a + μ g). A rest removes it.
+        """
+        # V/N within a thousandth of its limit counts as sliding
+        ratio, slides = rows[:, 0], rows[:, 1] < 1e-3
+        turns = slides[2:] & slides[:-2] & (ratio[2:] * ratio[:-2] < 0.0)
+        rests, lengths = ~(slides[2:] | slides[1:-1]), lengths[len(lengths) - len(turns) :, None]
+        turned = self._acceleration * np.abs(ratio[2:] - ratio[:-2]) / np.sqrt(12.0) * lengths
+        # each error lasts until the next one
+        drifts = np.concatenate([self._drift[None], np.where(turns, turned, 0.0)])
+        begins = np.pad(turns | rests, ((1, 0), (0, 0))) * np.arange(len(drifts))[:, None]
+        drifts = np.take_along_axis(drifts, np.maximum.accumulate(begins), axis=0)
+        self.total = self.total + (lengths * drifts[1:]).sum(axis=0)
+        self._drift = drifts[-1]
 
     def _vary_ground(self, ends: Array, lengths: Array) -> Array:
         """Return by how much the ground's acceleration leaves its mean in steps (k, 1) [g]."""

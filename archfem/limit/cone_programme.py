@@ -41,11 +41,12 @@ class Rows:
         self.put(number, columns.ravel(), np.broadcast_to(values, columns.shape).ravel())
         self.right.append(np.broadcast_to(np.asarray(right, dtype=float), len(columns)))
 
-    def matrix(self, size: int) -> sparse.csr_matrix:
-        """Return the matrix of the rows."""
+    def matrix(self, size: int, count: int = 0) -> sparse.csr_matrix:
+        """Return the matrix of the rows, and of empty ones up to a count."""
         entries = np.concatenate(self.value or [np.empty(0)])
         places = [np.concatenate(each or [np.empty(0, int)]) for each in (self.row, self.column)]
-        return sparse.csr_matrix((entries, tuple(places)), shape=(self.count, size))
+        shape = max(self.count, count), size
+        return sparse.csr_matrix((entries, tuple(places)), shape=shape)
 
     @property
     def bounds(self) -> Array:

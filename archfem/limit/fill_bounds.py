@@ -306,17 +306,10 @@ class FilledBlocks:
     def _solve(self, equations: Rows, limits: Rows, stones: Rows, first: int) -> Bound:
         """Add balance and limits of the stones, and solve the programme."""
         blocks, count = self.blocks, len(self.friction)
-        factor = first + 3 * count
+        factor, weight = first + 3 * count, self.dead
         size = factor + 1
-        weight = self.dead
-        entries = [
-            np.concatenate(each or [np.empty(0, int)]) for each in (stones.row, stones.column)
-        ]
-        pushes = sparse.csr_matrix(
-            (np.concatenate(stones.value or [np.empty(0)]), tuple(entries)), (len(weight), size)
-        )
         parts = sparse.csr_matrix((len(weight), first)), blocks.balance, -self.live[:, None]
-        balance = sparse.hstack(parts, format="csr") - pushes
+        balance = sparse.hstack(parts, format="csr") - stones.matrix(size, len(weight))
         self._limit_joints(limits, first)
         matrices = [equations.matrix(size), balance, limits.matrix(size)]
         rights = [equations.bounds, weight, limits.bounds]

@@ -19,7 +19,6 @@ and SNES takes the steps at which they fail.
     active_compliance  its compliance and workspace
     supernodal_lu      sparse factors in dense panels
     sparse_products    products of sparse matrices
-    step_scans         compiled scans of the steps of a batch
 
 Symbols, which all of them share:
 

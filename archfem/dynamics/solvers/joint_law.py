@@ -21,13 +21,10 @@ from archfem._numba import inlined_kernel, kernel
 from archfem._typing import Array
 from archfem.dynamics.solvers.newmark import StepNumbers
 from archfem.joints.contact_law import ContactLaw
-from archfem.joints.large.closing_law import facet_step_excess
-from archfem.joints.large.lanes import WIDTH, load, store
 from archfem.joints.large.point_law import (
-    add_point_excess,
     instant_release,
+    joint_means,
     limit_rate,
-    linear_means,
     releases,
     shear_limit,
     shear_means,
@@ -178,9 +175,6 @@ class JointLaw(NamedTuple):
     point_states: Any  # records `POINT_STATE_RECORD` (p,)
     segments: Any  # records `SEGMENT_RECORD` (s,)
     segment_states: Any  # records `SEGMENT_STATE_RECORD` (s,)
-    # k_n, 1/δ_m, closings of both ends before and after, and excess with rates, of eight facets
-    excess: Array  # (11, 8)
-    pressed: Any  # first point and segment of these facets (8, 2)
     groups: Any  # of slip rows, begin of their points in `members` and of their pairs (2, g + 1)
     members: Any  # points sorted by their slip rows (p,)
     slips: Array  # released force of each slip row [N], and its derivative there [N/m] (g, 2)
@@ -219,8 +213,6 @@ def joint_law(
         np.zeros(count, POINT_STATE_RECORD),
         segments,
         np.zeros(len(segments), SEGMENT_STATE_RECORD),
-        np.ones((11, WIDTH)),
-        np.zeros((WIDTH, 2), np.int64),
         np.stack([first, pair]),
         members,
         np.zeros((len(gaps.sizes), 2)),
@@ -318,7 +310,7 @@ def evaluate_openings(law, gap, segments):  # type: ignore
         before, after = (near - moved[0], far - moved[1]), (near + moved[0], far + moved[1])
         stiffens = points[segment.begin].closing_rate > 0.0
         state.near = state.far = state.first = state.mixed = state.last = 0.0
-        if max(before + after) <= 0.0 and (facets or not stiffens):
+        if max(before + after) <= 0.0 and not stiffens:
             # forces are linear over the whole path
             for k in range(segment.begin, segment.end):
                 point, point_state = points[k], law.point_states[k]
@@ -330,9 +322,7 @@ def evaluate_openings(law, gap, segments):  # type: ignore
             # means over the path at a spring, or exactly over a facet
             a, b = points[first].share, points[first + step - 1].share
             ends = gaps_between(before, after, a, b)
-            means = linear_means(points[first], ends, rates[0], rates[1], facets)
-            if stiffens and not facets:
-                means = add_point_excess(points[first], ends, rates, means)
+            means = joint_means(points[first], ends, rates[0], rates[1], facets)
             for end in range(step):
                 # forces of the points go to the ends of the segment by linear interpolation
                 point, point_state = points[first + end], law.point_states[first + end]
@@ -343,66 +333,6 @@ def evaluate_openings(law, gap, segments):  # type: ignore
                 state.first += (1.0 - share) * point_state.near
                 state.mixed += (1.0 - share) * point_state.far
                 state.last += share * point_state.far
-    if facets:
-        _add_excess(law, gap, segments)
-
-
-@kernel
-def _add_excess(law, gap, segments):  # type: ignore
-    """Add what facets press beyond the linear law, eight of them at a time."""
-    points, rows, pressed, count = law.points, law.excess, law.pressed, 0
-    gain, start = law.gain, law.start if law.gain > 0.0 else gap
-    for number in segments:
-        segment = law.segments[number]
-        # the excess has no lag: from the gaps at the start to those at the end
-        before = start[segment.near], start[segment.far]
-        moved = gain * (gap[segment.near] - before[0]), gain * (gap[segment.far] - before[1])
-        after = before[0] + moved[0], before[1] + moved[1]
-        if points[segment.begin].closing_rate == 0.0 or min(before + after) > 0.0:
-            continue
-        for first in range(segment.begin, segment.end, 2):
-            ends = gaps_between(before, after, points[first].share, points[first + 1].share)
-            rows[0, count] = points[first].normal_stiffness
-            rows[1, count] = points[first].closing_rate
-            for k in range(4):
-                rows[2 + k, count] = -ends[k]
-            pressed[count, 0], pressed[count, 1] = first, number
-            count += 1
-            if count == WIDTH:
-                _press_facets(law, count)
-                count = 0
-    rows[2:6, count:] = -1.0  # open, as there is no facet
-    if count > 0:
-        _press_facets(law, count)
-
-
-@kernel
-def _press_facets(law, count):  # type: ignore
-    """Add the excess of eight facets or less to the states of their points and segments."""
-    rows, rate = law.excess, (0.0, law.gain) if law.gain > 0.0 else (1.0, 1.0)
-    ends = load(rows, 2, 0), load(rows, 3, 0), load(rows, 4, 0), load(rows, 5, 0)
-    means, rates = facet_step_excess(load(rows, 0, 0), load(rows, 1, 0), ends, rate[0], rate[1])
-    store(rows, 6, 0, means[0])
-    store(rows, 7, 0, means[1])
-    for k in range(3):
-        store(rows, 8 + k, 0, rates[k])
-    for k in range(count):
-        first, state = law.pressed[k, 0], law.segment_states[law.pressed[k, 1]]
-        a, b = law.points[first].share, law.points[first + 1].share
-        for end in range(2):
-            point, point_state = law.points[first + end], law.point_states[first + end]
-            force, share = point.area * rows[6 + end, k], point.share
-            # chain rule, as for what opens
-            one, other = point.area * rows[8 + end, k], point.area * rows[9 + end, k]
-            near, far = one * (1.0 - a) + other * (1.0 - b), one * a + other * b
-            point_state.normal -= force
-            point_state.near -= near
-            point_state.far -= far
-            state.near += (1.0 - share) * force
-            state.far += share * force
-            state.first -= (1.0 - share) * near
-            state.mixed -= (1.0 - share) * far
-            state.last -= share * far
 
 
 @inlined_kernel

@@ -18,7 +18,7 @@ from scipy import sparse
 from scipy.linalg import solve_triangular
 from scipy.sparse.linalg import splu
 
-from archfem._numba import entry, kernel, summing_kernel, view_kernel
+from archfem._numba import entry, kernel, summing_kernel
 from archfem._typing import Array
 
 Indices = NDArray[np.int64]
@@ -274,23 +274,11 @@ def eliminate(panels):  # type: ignore
 
 @summing_kernel
 def _eliminate_rows(top, smallest):  # type: ignore
-    """Eliminate in each row of a group the columns before its own, four rows at a time."""
+    """Eliminate in each row of a group the columns before its own."""
     width, size = top.shape
     for i in range(width):
-        own, k = top[i], 0
-        while k + 4 <= i:
-            # multipliers of four rows, each after the elimination by those before
-            p, q, r, s = top[k], top[k + 1], top[k + 2], top[k + 3]
-            a = own[k] * p[k]
-            b = (own[k + 1] - a * p[k + 1]) * q[k + 1]
-            c = (own[k + 2] - a * p[k + 2] - b * q[k + 2]) * r[k + 2]
-            d = (own[k + 3] - a * p[k + 3] - b * q[k + 3] - c * r[k + 3]) * s[k + 3]
-            own[k], own[k + 1], own[k + 2], own[k + 3] = a, b, c, d
-            k += 4
-            rest, p, q, r, s = own[k:], p[k:], q[k:], r[k:], s[k:]
-            for j in range(len(rest)):
-                rest[j] -= a * p[j] + b * q[j] + c * r[j] + d * s[j]
-        for last in range(k, i):
+        own = top[i]
+        for last in range(i):
             row = top[last]
             own[last] = factor = own[last] * row[last]
             for j in range(last + 1, size):
@@ -310,15 +298,9 @@ def _eliminate_columns(top, left):  # type: ignore
     """Eliminate in the rows below a group, stored by columns, the columns of the group."""
     width, count = left.shape
     for m in range(width):
-        # columns before this one, four at a time, then the rest, then its pivot
-        own, k = left[m], 0
-        while k + 4 <= m:
-            a, b, c, d = top[k, m], top[k + 1, m], top[k + 2, m], top[k + 3, m]
-            p, q, r, s = left[k], left[k + 1], left[k + 2], left[k + 3]
-            for i in range(count):
-                own[i] -= a * p[i] + b * q[i] + c * r[i] + d * s[i]
-            k += 4
-        for last in range(k, m):
+        # columns before this one, then its pivot
+        own = left[m]
+        for last in range(m):
             factor, other = top[last, m], left[last]
             for i in range(count):
                 own[i] -= factor * other[i]
@@ -350,18 +332,6 @@ def _multiply_blocks(top, left, products):  # type: ignore
             for j in range(count):
                 one[j] += a * row[j]
                 two[j] += e * row[j]
-
-
-@view_kernel
-def _four_columns(panel, column, height):  # type: ignore
-    """Return four consecutive columns of a panel, the first of them `column`."""
-    start = column * height
-    return (
-        panel[start : start + height],
-        panel[start + height : start + 2 * height],
-        panel[start + 2 * height : start + 3 * height],
-        panel[start + 3 * height : start + 4 * height],
-    )
 
 
 @summing_kernel
@@ -417,16 +387,10 @@ def solve_forward(factor, vector):  # type: ignore
             continue
         rows = factor.rows[factor.below[group] : factor.below[group + 1]]
         panel, size = factor.panels[factor.places[group] :], width + len(rows)
-        # columns of the panel, four at a time: each entry of the sum is loaded once for all
         total = factor.image[:size]
         for i in range(size):
             total[i] = 0.0
-        for k in range(0, width - width % 4, 4):
-            p, q, r, s = _four_columns(panel, k, size)
-            a, b, c, d = own[k], own[k + 1], own[k + 2], own[k + 3]
-            for i in range(size):
-                total[i] += a * p[i] + b * q[i] + c * r[i] + d * s[i]
-        for k in range(width - width % 4, width):
+        for k in range(width):
             column, value = panel[k * size :], own[k]
             for i in range(size):
                 total[i] += value * column[i]
@@ -451,16 +415,7 @@ def solve_backward(factor, vector, marked):  # type: ignore
             known[i] = own[i]
         for i in range(len(rows)):
             known[width + i] = -vector[rows[i]]
-        for k in range(0, width - width % 4, 4):
-            p, q, r, s = _four_columns(panel, k, size)
-            a, b, c, d = 0.0, 0.0, 0.0, 0.0
-            for i in range(size):
-                a += p[i] * known[i]
-                b += q[i] * known[i]
-                c += r[i] * known[i]
-                d += s[i] * known[i]
-            own[k], own[k + 1], own[k + 2], own[k + 3] = a, b, c, d
-        for k in range(width - width % 4, width):
+        for k in range(width):
             column, value = panel[k * size :], 0.0
             for i in range(size):
                 value += column[i] * known[i]

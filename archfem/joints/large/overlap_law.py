@@ -34,9 +34,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from archfem._numba import inlined_kernel, kernel
+from archfem._numba import inlined_kernel
 from archfem._typing import Array
-from archfem.joints.large.closing_law import facet_step_excess
+from archfem.joints.large.lanes import any_lane, greatest, select
 from archfem.joints.large.point_law import (
     closed_means,
     damping_tractions,
@@ -45,6 +45,7 @@ from archfem.joints.large.point_law import (
     mean_tractions,
     point_energy,
     shear_means,
+    sign,
 )
 
 # Slip, relative to the depth of the joint, below which |s| in the overlap is rounded [-]
@@ -71,23 +72,29 @@ class FaceLaw(NamedTuple):
 
 
 @inlined_kernel
-def rounded_size(depth, slip):  # type: ignore
-    """Return R(s), the size of a slip, and its derivative."""
-    # Rounded where it is below 1e-5 of the depth. The force that pushes a face off an edge would
-    # jump where the slip changes its sign, and Newton's method would alternate there.
-    size, bend = abs(slip), ROUNDED_SLIP * depth
-    if size < bend:
-        return 0.5 * slip * slip / bend, slip / bend
-    return size - 0.5 * bend, np.sign(slip)
+def _rounded_size(bend, slip):  # type: ignore
+    """Return R(s), the size of a slip, and its derivative; rounded below a slip `bend`."""
+    # The force that pushes a face off an edge would jump where the slip changes its sign, and
+    # Newton's method would alternate there.
+    size, share = abs(slip), slip / bend
+    is_small = size < bend
+    return (
+        select(is_small, 0.5 * slip * share, size - 0.5 * bend),
+        select(is_small, share, sign(slip)),
+    )
 
 
 @inlined_kernel
-def _lost_end(depth, slip, end_slip):  # type: ignore
-    """Return by how much an end of the overlap has moved inward, and its derivative by s."""
-    size, rate = rounded_size(depth, slip - end_slip)
-    if end_slip != 0.0:
-        size -= rounded_size(depth, end_slip)[0]
-    return 0.5 * size, 0.5 * rate
+def overlap_between(depth, ends, sizes, slip):  # type: ignore
+    """Return `overlap` from the slips s^+ and s^- at which faces end together, and R of them."""
+    bend = ROUNDED_SLIP * depth
+    right, right_rate = _rounded_size(bend, slip - ends[0])
+    left, left_rate = _rounded_size(bend, slip - ends[1])
+    right, left = right - sizes[0], left - sizes[1]
+    rest = depth - 0.5 * (right + left)
+    is_left = rest > 0.0
+    length = select(is_left, rest, 0.0), select(is_left, -0.5 * (right_rate + left_rate), 0.0)
+    return length, (0.25 * (right - left), 0.25 * (right_rate - left_rate))
 
 
 @inlined_kernel
@@ -96,12 +103,10 @@ def overlap(law, segment, slip):  # type: ignore
     depth = law.depth[segment]
     if law.paired[segment]:
         return (depth, 0.0), (0.0, 0.0)
-    right, right_rate = _lost_end(depth, slip, law.end_slip[segment, 0])
-    left, left_rate = _lost_end(depth, slip, law.end_slip[segment, 1])
-    middle = 0.5 * (right - left), 0.5 * (right_rate - left_rate)
-    if right + left >= depth:
-        return (0.0, 0.0), middle
-    return (depth - (right + left), -(right_rate + left_rate)), middle
+    ends = law.end_slip[segment, 0], law.end_slip[segment, 1]
+    bend = ROUNDED_SLIP * depth
+    sizes = _rounded_size(bend, ends[0])[0], _rounded_size(bend, ends[1])[0]
+    return overlap_between(depth, ends, sizes, slip)
 
 
 @inlined_kernel
@@ -122,36 +127,36 @@ def closing_energy(law, segment, length, opening, turn):  # type: ignore
 
 
 @inlined_kernel
-def _size_slope(depth, before, after):  # type: ignore
+def _size_slope(bend, before, after):  # type: ignore
     """Return ΔR/Δs over a step, and its derivative by the slip at the end."""
-    moved, bend = after - before, ROUNDED_SLIP * depth
-    if max(abs(before), abs(after)) < bend:
-        return 0.5 * (before + after) / bend, 0.5 / bend
-    (first, r0), (last, r1) = rounded_size(depth, before), rounded_size(depth, after)
-    # beyond, on one side of zero slip, or without slip, it is the derivative
-    if r0 == r1 or abs(moved) <= 1e-12 * (abs(before) + abs(after)):
-        return r1, 0.0
+    (first, r0), (last, r1) = _rounded_size(bend, before), _rounded_size(bend, after)
+    moved, is_small = after - before, greatest(abs(before), abs(after)) < bend
     slope = (last - first) / moved
-    return slope, (r1 - slope) / moved
+    # beyond, on one side of zero slip, or without slip, it is the derivative
+    is_rate = (r0 == r1) | (abs(moved) <= 1e-12 * (abs(before) + abs(after)))
+    bends = select(is_rate, 0.0, (r1 - slope) / moved)
+    slope = select(is_rate, r1, slope)
+    return (
+        select(is_small, 0.5 * (before + after) / bend, slope),
+        select(is_small, 0.5 / bend, bends),
+    )
 
 
 @inlined_kernel
-def _overlap_slopes(law, segment, slips, lengths):  # type: ignore
+def overlap_slopes(depth, ends, slips, lengths):  # type: ignore
     """Return Δℓ/Δs and Δc/Δs over a step, each with its derivative by the slip at the end."""
-    depth, (before, after), ((l0, _), (l1, shrinks)) = law.depth[segment], slips, lengths
-    end = law.end_slip[segment, 0]
-    right, right_bend = _size_slope(depth, before - end, after - end)
-    end = law.end_slip[segment, 1]
-    left, left_bend = _size_slope(depth, before - end, after - end)
-    middle = 0.25 * (right - left), 0.25 * (right_bend - left_bend)
-    if l0 > 0.0 and l1 > 0.0:
-        return (-0.5 * (right + left), -0.5 * (right_bend + left_bend)), middle
-    # the faces part, or meet
-    moved = after - before
-    if abs(moved) <= 1e-12 * (abs(before) + abs(after)):
-        return (shrinks, 0.0), middle
-    slope = (l1 - l0) / moved
-    return (slope, (shrinks - slope) / moved), middle
+    bend, (before, after), (l0, (l1, shrinks)) = ROUNDED_SLIP * depth, slips, lengths
+    right, right_bend = _size_slope(bend, before - ends[0], after - ends[0])
+    left, left_bend = _size_slope(bend, before - ends[1], after - ends[1])
+    slope, bends = -0.5 * (right + left), -0.5 * (right_bend + left_bend)
+    parts = (l0 <= 0.0) | (l1 <= 0.0)
+    if any_lane(parts):  # the faces part, or meet
+        moved = after - before
+        is_still = abs(moved) <= 1e-12 * (abs(before) + abs(after))
+        whole = (l1 - l0) / moved
+        slope = select(parts, select(is_still, shrinks, whole), slope)
+        bends = select(parts, select(is_still, 0.0, (shrinks - whole) / moved), bends)
+    return (slope, bends), (0.25 * (right - left), 0.25 * (right_bend - left_bend))
 
 
 @inlined_kernel
@@ -172,6 +177,53 @@ def friction_limits(law, point, segment, pressed, lagged, lag):  # type: ignore
 
 
 @inlined_kernel
+def add_pressure(sums, share, places, pressed):  # type: ignore
+    """Return sums with those of a facet: f, x f, and derivatives by the gap times 1, x and x²."""
+    (x, y), ((n0, n1), (k00, k01, k11)) = places, pressed
+    near, far = k00 + k01, k01 + k11
+    return (
+        sums[0] + share * (n0 + n1),
+        sums[1] + share * (x * n0 + y * n1),
+        sums[2] + share * (near + far),
+        sums[3] + share * (x * near + y * far),
+        sums[4] + share * (x * x * k00 + 2.0 * x * y * k01 + y * y * k11),
+    )
+
+
+@inlined_kernel
+def press_overlap(sums, lengths):  # type: ignore
+    """Return F_g and F'_σ, their derivatives by g', s and σ at the end, and those of Σ x_i t̄_i.
+
+    Lengths of the overlap are the mean one, half its rate by s, that rate times σ, and the last.
+    """
+    (total, moment, gap, place, square), (mean, half, tilts, last) = sums, lengths
+    leans = place, -tilts * square, -last * square
+    opens = mean * gap, half * total - mean * tilts * place, -mean * last * place
+    turns = (
+        -mean * mean * leans[0],
+        -mean * (mean * leans[1] + 2.0 * half * moment),
+        -mean * mean * leans[2],
+    )
+    return (mean * total, -mean * mean * moment), (opens, turns), leans
+
+
+@inlined_kernel
+def edge_force(energies, slopes, lengths, turns, moments):  # type: ignore
+    """Return w Δℓ/Δs (Φ̄ - ℓ̄ σ̄ Σ x_i t̄_i), and its derivatives by opening, slip and rotation.
+
+    Energies are w Φ at start and end, and the derivatives of the latter by gap and tilt.
+    """
+    (before, after, whole, tilted), (slope, bends) = energies, slopes
+    (mean, half, _, last), (t0, t1), (moment, leans) = lengths, turns, moments
+    turn = 0.5 * (t0 + t1)
+    push = 0.5 * (before + after) - mean * turn * moment
+    by_slip = -half * (t1 * tilted + turn * moment) - mean * turn * leans[1]
+    by_turn = -0.5 * (last * tilted + mean * moment) - mean * turn * leans[2]
+    by_opening = 0.5 * whole - mean * turn * leans[0]
+    return slope * push, (slope * by_opening, slope * by_slip + bends * push, slope * by_turn)
+
+
+@inlined_kernel
 def segment_forces(law, segment, ends, lag, memory):  # type: ignore
     """Return forces of a segment over a step, their derivatives, shear, moment, loss, corrections.
 
@@ -185,25 +237,16 @@ def segment_forces(law, segment, ends, lag, memory):  # type: ignore
     (l0, _), (l1, shrinks), is_off_middle = first, last, c0 != 0.0 or c1 != 0.0 or moves != 0.0
     g0, g1 = g0 - c0 * t0, g1 - c1 * t1
     ends = (g0, s0, t0), (g1, s1, t1), longer
-    mean, half, tilts = 0.5 * (l0 + l1), 0.5 * shrinks, shrinks * t1
+    lengths = 0.5 * (l0 + l1), 0.5 * shrinks, shrinks * t1, l1
     bounds = g0, g1, l0 * t0, l1 * t1
-    sums, rubs, is_stuck = _sum_stuck(law, segment, (bounds, ends), mean, lag, memory)
-    if not is_stuck:
-        sums, rubs = _sum_points(law, segment, (bounds, ends), (mean, half, tilts, l1), lag, memory)
-    total, moment, gap, place, square = sums
-    # derivatives of the moment sum, of F_g and of F_σ, by the measures at the end
-    leans = place, -tilts * square, -l1 * square
-    scale = law.width * mean
-    opens = scale * gap, law.width * (half * total - mean * tilts * place), -scale * l1 * place
-    turns = (
-        -scale * mean * leans[0],
-        -scale * (mean * leans[1] + 2.0 * half * moment),
-        -scale * mean * leans[2],
-    )
+    sums, rubs = _sum_points(law, segment, (bounds, ends), lengths, lag, memory)
+    (pressed, about), (opens, turns), leans = press_overlap(sums, lengths)
     # F_s: edge force and shear
-    push, slides, slope = _edge_force(law, segment, ends, (first, last), (moment, leans))
-    about = -scale * mean * moment
-    force = scale * total, push + rubs[0], about, rubs[1]
+    push, slides, slope = 0.0, (0.0, 0.0, 0.0), (0.0, 0.0)
+    if not law.paired[segment]:
+        (slopes, slope), energies = _edge_energies(law, segment, ends, (first, last))
+        push, slides = edge_force(energies, slopes, lengths, (t0, t1), (sums[1], leans))
+    force = pressed, push + rubs[0], about, rubs[1]
     slides = slides[0] + rubs[3], slides[1] + rubs[4], slides[2] + rubs[5]
     rates = opens, slides, turns, (rubs[6], rubs[7], rubs[8])
     if is_off_middle:
@@ -263,25 +306,14 @@ def _by_gap(row, middle, moved):  # type: ignore
 
 
 @inlined_kernel
-def _edge_force(law, segment, ends, lengths, moments):  # type: ignore
-    """Return the force along the joint due to the shrinking overlap, its derivatives, and Δc/Δs."""
-    if law.paired[segment]:
-        return 0.0, (0.0, 0.0, 0.0), (0.0, 0.0)
-    ((g0, s0, t0), (g1, s1, t1), _), (first, last) = ends, lengths
-    (l0, _), (l1, shrinks), (moment, leans) = first, last, moments
-    # w Δℓ/Δs (Φ̄ - ℓ̄ σ̄ Σ x_i t̄_i)
-    mean, turn = 0.5 * (l0 + l1), 0.5 * (t0 + t1)
-    before = closing_energy(law, segment, l0, g0, t0)[0]
-    after, whole, tilted = closing_energy(law, segment, l1, g1, t1)
-    (slope, bends), middle = _overlap_slopes(law, segment, (s0, s1), lengths)
-    push, width = 0.5 * (before + after) - mean * turn * moment, law.width
-    # derivatives by opening, slip and rotation at the end
-    by_opening = 0.5 * whole - mean * turn * leans[0]
-    by_slip = -0.5 * shrinks * (t1 * tilted + turn * moment) - mean * turn * leans[1]
-    by_turn = -0.5 * (l1 * tilted + mean * moment) - mean * turn * leans[2]
-    by_slip = width * (slope * by_slip + bends * push)
-    rates = width * slope * by_opening, by_slip, width * slope * by_turn
-    return width * slope * push, rates, middle
+def _edge_energies(law, segment, ends, lengths):  # type: ignore
+    """Return `overlap_slopes`, and the energies of `edge_force`, of a segment over a step."""
+    ((g0, s0, t0), (g1, s1, t1), _), (first, last), width = ends, lengths, law.width
+    end_slips = law.end_slip[segment, 0], law.end_slip[segment, 1]
+    slopes = overlap_slopes(law.depth[segment], end_slips, (s0, s1), (first[0], last))
+    before = closing_energy(law, segment, first[0], g0, t0)[0]
+    after, whole, tilted = closing_energy(law, segment, last[0], g1, t1)
+    return slopes, (width * before, width * after, width * whole, width * tilted)
 
 
 @inlined_kernel
@@ -289,24 +321,16 @@ def _sum_points(law, segment, ends, overlap, lag, memory):  # type: ignore
     """Return sums over the points of a segment: of normal forces and rates, and of shear."""
     (g0, g1, r0, r1), measures = ends
     contact = law.contacts[segment]
-    total = moment = by_gap = by_place = by_square = lost = 0.0
-    rubs = 13 * (0.0,)
+    sums, rubs, lost = 5 * (0.0,), 13 * (0.0,), 0.0
     stride = 2 if law.facets else 1
     for point in range(law.first_point[segment], law.first_point[segment + 1], stride):
         # gaps at both ends of the facet at start (a, c) and end (b, d), shifted by the lag
         x0, x1 = law.place[point], law.place[point + stride - 1]
         a, c, b, d = g0 - x0 * r0, g0 - x1 * r0, g1 - x0 * r1, g1 - x1 * r1
-        p, q, share = lag * (b - a), lag * (d - c), law.depth_share[point]
+        p, q, share = lag * (b - a), lag * (d - c), law.width * law.depth_share[point]
         lagged = a + p, c + q, b + p, d + q
         pressed = mean_tractions(contact, lagged, lag, law.facets)
-        (n0, n1), (k00, k01, k11) = pressed
-        # sums of f, x f, and of their derivatives by the gap: 1, x, x²
-        near, far = k00 + k01, k01 + k11
-        total += share * (n0 + n1)
-        moment += share * (x0 * n0 + x1 * n1)
-        by_gap += share * (near + far)
-        by_place += share * (x0 * near + x1 * far)
-        by_square += share * (x0 * x0 * k00 + 2.0 * x0 * x1 * k01 + x1 * x1 * k11)
+        sums = add_pressure(sums, share, (x0, x1), pressed)
         # shear of the point, or of both ends of the facet
         (near, far), (k00, k01, k11) = friction_limits(law, point, segment, pressed, lagged, lag)
         is_free = near == 0.0 and far == 0.0 and contact.resistance == 0.0
@@ -320,74 +344,7 @@ def _sum_points(law, segment, ends, overlap, lag, memory):  # type: ignore
             limits = contact.resistance, held, overlap
             rubs = _add_point_shear(law, point + end, (measures, lag), limits, memory, rubs)
     rubs = rubs[:2] + (rubs[2] + lost,) + rubs[3:]  # noqa: RUF005 (numba has no other)
-    return (total, moment, by_gap, by_place, by_square), rubs
-
-
-@inlined_kernel
-def _sum_stuck(law, segment, ends, overlap, lag, memory):  # type: ignore
-    """Return `_sum_points` of facets that stay closed and stick, and whether all of them do.
-
-    The facets cover the overlap: sums of their integrals are those over all of it.
-    """
-    ((g0, g1, r0, r1), ((_, s0, _), (_, s1, _), (e0, e1))), contact = ends, law.contacts[segment]
-    sums, rubs = 5 * (0.0,), 13 * (0.0,)
-    # gaps without and with the lag of damping, at the end that is more open
-    more, tilt = lag * (g1 - g0), lag * (r1 - r0)
-    widest = max(g0 + 0.5 * abs(r0), g1 + 0.5 * abs(r1))
-    lagged = max(g0 + more + 0.5 * abs(r0 + tilt), g1 + more + 0.5 * abs(r1 + tilt))
-    if not law.facets or max(widest, lagged) > 0.0:
-        return sums, rubs, False
-    gap, turn, stiff = 0.5 * (g0 + g1) + more, 0.5 * (r0 + r1) + tilt, contact.normal_stiffness
-    whole, excess = (0.5 + lag) * stiff, (0.0, 0.0)
-    pressed = stiff * gap, -stiff * turn / 12.0, whole, 0.0, whole / 12.0
-    shear = stretched = lost = along = first_moment = second_moment = 0.0
-    begin, end = law.first_point[segment], law.first_point[segment + 1]
-    for point in range(begin, end):
-        # Coulomb's limit from the normal force of this end of a facet
-        is_first = (point - begin) % 2 == 0
-        place, other = law.place[point], law.place[point + 1 if is_first else point - 1]
-        normal = stiff / 6.0 * (3.0 * gap - (2.0 * place + other) * turn)
-        if contact.closing_rate > 0.0:
-            if is_first:
-                pressed, excess = _add_facet_excess(law, point, contact, (g0, g1, r0, r1), pressed)
-            normal -= excess[0] if is_first else excess[1]
-        share, spring = overlap * law.width * law.depth_share[point], law.shear_spring[point]
-        limit = contact.resistance + share * limit_rate(contact, normal, 0.5)
-        first = spring * (s0 + place * e0 - memory[0][point])
-        change = spring * (s1 - s0 + place * (e1 - e0))
-        mean = first + (0.5 + lag) * change
-        if not max(abs(first), abs(first + change), abs(mean)) <= limit:
-            return sums, rubs, False
-        rate = (0.5 + lag) * spring
-        shear += mean
-        stretched += place * mean
-        lost += lag * change * change / spring
-        along += rate
-        first_moment += place * rate
-        second_moment += place * place * rate
-    for point in range(begin, end):
-        memory[1][point], memory[2][point] = memory[0][point], 0.0
-    held = first_moment, 0.0, first_moment, second_moment, 0.0, 0.0
-    return pressed, (shear, stretched, lost, 0.0, along, 0.0, 0.0) + held, True  # noqa: RUF005
-
-
-@kernel
-def _add_facet_excess(law, point, contact, bounds, sums):  # type: ignore
-    """Return sums with what a facet presses beyond the linear law, and the means of that."""
-    (g0, g1, r0, r1), (total, moment, by_gap, by_place, by_square) = bounds, sums
-    x, y, share = law.place[point], law.place[point + 1], law.depth_share[point]
-    # the excess has no lag
-    closings = x * r0 - g0, y * r0 - g0, x * r1 - g1, y * r1 - g1
-    excess, (k00, k01, k11) = facet_step_excess(
-        contact.normal_stiffness, contact.closing_rate, closings, 0.0, 1.0
-    )
-    near, far = k00 + k01, k01 + k11
-    total -= share * (excess[0] + excess[1])
-    moment -= share * (x * excess[0] + y * excess[1])
-    by_gap += share * (near + far)
-    by_place += share * (x * near + y * far)
-    by_square += share * (x * x * k00 + 2.0 * x * y * k01 + y * y * k11)
-    return (total, moment, by_gap, by_place, by_square), excess
+    return sums, rubs
 
 
 @inlined_kernel

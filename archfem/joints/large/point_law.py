@@ -13,6 +13,7 @@ import numpy as np
 from archfem._numba import inlined_kernel, kernel
 from archfem.joints.contact_law import SLIP_LIMIT_TOLERANCE, ContactLaw
 from archfem.joints.large.closing_law import excess_means, facet_step_excess, point_step_excess
+from archfem.joints.large.lanes import any_lane, greatest, least, select
 from archfem.joints.normal_law import GAUSS_POINTS, GAUSS_WEIGHTS
 
 # Parameters of the law at one place
@@ -34,9 +35,26 @@ def joint_means(contact, ends, first, second, facet):  # type: ignore
     that, the fraction closed, and its rate. Rates of a facet are of (1, 1), (1, 2) and (2, 2).
     """
     means = linear_means(contact, ends, first, second, facet)
-    if contact.closing_rate > 0.0:
-        return _add_excess(contact, ends, (first, second), facet, means)
-    return means
+    if contact.closing_rate == 0.0:
+        return means
+    more, k = _step_excess(contact, ends, (first, second), facet)
+    normal, taken, rates, time, moves = means
+    normal, taken = (
+        (normal[0] - more[0], normal[1] - more[1]),
+        (taken[0] + more[0], taken[1] + more[1]),
+    )
+    return normal, taken, (rates[0] - k[0], rates[1] - k[1], rates[2] - k[2]), time, moves
+
+
+@inlined_kernel
+def _step_excess(contact, ends, rates, facet):  # type: ignore
+    """Return means over a step of the traction beyond the linear law, and its derivatives."""
+    stiffness, rate, (first, second) = contact.normal_stiffness, contact.closing_rate, rates
+    if facet:
+        closings = -ends[0], -ends[1], -ends[2], -ends[3]
+        return facet_step_excess(stiffness, rate, closings, first, second)
+    more, slope = point_step_excess(stiffness, rate, -ends[0], -ends[2], first, second)
+    return (more, 0.0), (slope, 0.0, 0.0)
 
 
 @inlined_kernel
@@ -46,29 +64,6 @@ def linear_means(contact, ends, first, second, facet):  # type: ignore
         return _facet_means(contact, ends, first, second)
     normal, taken, rate, time, moves = _point_means(contact, ends[0], ends[2], first, second)
     return (normal, 0.0), (taken, 0.0), (rate, 0.0, 0.0), (time, 0.0), (moves, 0.0, 0.0)
-
-
-@inlined_kernel
-def _add_excess(contact, ends, rates, facet, means):  # type: ignore
-    """Return `joint_means` with the traction by which a joint exceeds the linear law."""
-    if not facet:
-        return add_point_excess(contact, ends, rates, means)
-    stiffness, rate = contact.normal_stiffness, contact.closing_rate
-    closings = -ends[0], -ends[1], -ends[2], -ends[3]
-    (near, far), (k00, k01, k11) = facet_step_excess(stiffness, rate, closings, rates[0], rates[1])
-    normal, taken, slopes, time, moves = means
-    normal, taken = (normal[0] - near, normal[1] - far), (taken[0] + near, taken[1] + far)
-    return normal, taken, (slopes[0] - k00, slopes[1] - k01, slopes[2] - k11), time, moves
-
-
-@inlined_kernel
-def add_point_excess(contact, ends, rates, means):  # type: ignore
-    """Return `joint_means` at a place, with the traction beyond the linear law."""
-    stiffness, rate = contact.normal_stiffness, contact.closing_rate
-    more, slope = point_step_excess(stiffness, rate, -ends[0], -ends[2], rates[0], rates[1])
-    normal, taken, slopes, time, moves = means
-    normal, taken = (normal[0] - more, normal[1]), (taken[0] + more, taken[1])
-    return normal, taken, (slopes[0] - slope, slopes[1], slopes[2]), time, moves
 
 
 @inlined_kernel
@@ -162,45 +157,101 @@ def _uniform_means(contact, ends, rate):  # type: ignore
 
 @inlined_kernel
 def mean_tractions(contact, ends, lag, facet):  # type: ignore
-    """Return means of the traction as `joint_means`, and their derivatives by gaps at the end."""
-    # open during the whole step; what a joint presses beyond the linear law has no lag
-    if min(ends) > 0.0 and contact.closing_rate == 0.0:
-        return (0.0, 0.0), (0.0, 0.0, 0.0)
-    whole = (0.5 + lag) * contact.normal_stiffness
-    if facet and contact.closing_rate == 0.0:
-        if max(ends) > 0.0:
-            return _divided_tractions(contact, ends, lag)
-        normal = _uniform_means(contact, ends, 0.0)[0]
-        return normal, (whole / 3.0, whole / 6.0, whole / 3.0)
-    # the derivative is that of a spring which is never open, less that of the release
-    normal, _, rates, _, _ = joint_means(contact, ends, lag, 1.0 + lag, facet)
+    """Return means of the traction as `linear_means`, and their derivatives by gaps at the end.
+
+    Gaps are shifted by the lag; what a joint presses beyond the linear law has none.
+    """
+    stiffness = contact.normal_stiffness
     if facet:
-        return normal, (whole / 3.0 - rates[0], whole / 6.0 - rates[1], whole / 3.0 - rates[2])
-    return normal, (whole - rates[0], 0.0, 0.0)
+        means, rates = linear_tractions(stiffness, ends, lag)
+    else:
+        # the derivative is that of a spring which is never open, less that of the release
+        normal, _, taken, _, _ = _point_means(contact, ends[0], ends[2], lag, 1.0 + lag)
+        means, rates = (normal, 0.0), ((0.5 + lag) * stiffness - taken, 0.0, 0.0)
+    if contact.closing_rate == 0.0:
+        return means, rates
+    more, k = _step_excess(contact, ends, (lag, 1.0 + lag), facet)
+    means = means[0] - more[0], means[1] - more[1]
+    return means, (rates[0] + k[0], rates[1] + k[1], rates[2] + k[2])
 
 
-@kernel
-def _divided_tractions(contact, ends, lag):  # type: ignore
-    """Return `mean_tractions` of the linear law along a facet of which parts are open."""
-    # as `_divided_means`, with no derivatives but those that the traction needs
+@inlined_kernel
+def linear_tractions(stiffness, ends, lag):  # type: ignore
+    """Return means over a step of the linear traction times φ_i along a facet, and derivatives.
+
+    The derivatives are those of `mean_tractions`.
+    """
     a, c, b, d = ends
-    _, _, breaks = _zero_crossings(ends)
-    whole, normals, rates = (0.5 + lag) * contact.normal_stiffness, (0.0, 0.0), (0.0, 0.0, 0.0)
-    for piece in range(3):
-        begin, length = breaks[piece], breaks[piece + 1] - breaks[piece]
-        middle = begin + 0.5 * length
-        is_open = a + middle * (c - a) > 0.0 and b + middle * (d - b) > 0.0
-        if length <= 0.0 or is_open:
-            continue
-        for k in range(len(GAUSS_POINTS)):
-            place = begin + GAUSS_POINTS[k] * length
-            near, far = 1.0 - place, place
-            before, after = near * a + far * c, near * b + far * d
-            mean, _, taken, _, _ = _point_means(contact, before, after, lag, 1.0 + lag)
-            weight = GAUSS_WEIGHTS[k] * length
-            normals = _add_ends(normals, weight * mean, near, far)
-            rates = _add_pairs(rates, weight * (whole - taken), near, far)
-    return normals, rates
+    whole, none = (0.5 + lag) * stiffness, 0.0 * stiffness
+    if not any_lane(greatest(greatest(a, c), greatest(b, d)) > 0.0):  # closed
+        share = stiffness * (1 / 12)
+        near, far, third = share * (a + b), share * (c + d), whole * (1 / 3)
+        return (2.0 * near + far, near + 2.0 * far), (third, 0.5 * third, third)
+    if not any_lane(least(least(a, c), least(b, d)) <= 0.0):  # open
+        return (none, none), (none, none, none)
+    # zero crossings at start and end divide the facet into three parts, of which one at most is
+    # closed all the time
+    low = select((a <= 0.0) ^ (c <= 0.0), a / (a - c), 0.0)
+    high = select((b <= 0.0) ^ (d <= 0.0), b / (b - d), 0.0)
+    one, two = least(low, high), greatest(low, high)
+    first_closed, first_moves = _part_state(ends, 0.0, one)
+    second_closed, second_moves = _part_state(ends, one, two)
+    third_closed, third_moves = _part_state(ends, two, 1.0)
+    begin = select(first_closed, 0.0, select(second_closed, one, two))
+    end = select(first_closed, one, select(second_closed, two, 1.0))
+    length = select(first_closed | second_closed | third_closed, end - begin, 0.0)
+    # ∫ of products of linear functions between both ends of that part
+    p0, p1, begun, slope = 1.0 - begin, 1.0 - end, a + b, c + d - a - b
+    s0, s1 = begun + begin * slope, begun + end * slope
+    share = stiffness * length * (1 / 12)
+    near = share * (s0 * (2.0 * p0 + p1) + s1 * (p0 + 2.0 * p1))
+    far = share * (s0 * (2.0 * begin + end) + s1 * (begin + 2.0 * end))
+    share = whole * length * (1 / 6)
+    k00 = 2.0 * share * (p0 * p0 + p0 * p1 + p1 * p1)
+    k01 = share * (2.0 * p0 * begin + p0 * end + p1 * begin + 2.0 * p1 * end)
+    k11 = 2.0 * share * (begin * begin + begin * end + end * end)
+    sums = near, far, k00, k01, k11
+    if any_lane(first_moves):
+        sums = _add_crossing(stiffness, ends, lag, (first_moves, 0.0, one), sums)
+    if any_lane(second_moves):
+        sums = _add_crossing(stiffness, ends, lag, (second_moves, one, two), sums)
+    if any_lane(third_moves):
+        sums = _add_crossing(stiffness, ends, lag, (third_moves, two, 1.0), sums)
+    return (sums[0], sums[1]), (sums[2], sums[3], sums[4])
+
+
+@inlined_kernel
+def _part_state(ends, begin, end):  # type: ignore
+    """Return whether a part of a facet is closed during a step, and whether it opens or closes."""
+    (a, c, b, d), middle = ends, 0.5 * (begin + end)
+    before, after = a + middle * (c - a) <= 0.0, b + middle * (d - b) <= 0.0
+    is_part = begin < end
+    return is_part & before & after, is_part & (before ^ after)
+
+
+@inlined_kernel
+def _add_crossing(stiffness, ends, lag, part, sums):  # type: ignore
+    """Add the means of a part that opens or closes during the step, by Gauss's rule."""
+    (a, c, b, d), (moves, begin, end), (near, far, k00, k01, k11) = ends, part, sums
+    length, whole = select(moves, end - begin, 0.0), (0.5 + lag) * stiffness
+    for k in range(len(GAUSS_POINTS)):
+        y = begin + GAUSS_POINTS[k] * length
+        x = 1.0 - y
+        before, after = x * a + y * c, x * b + y * d
+        inverse = 1.0 / select(moves, abs(before) + abs(after), 1.0)
+        closing, opened = least(before, after), greatest(before, after) * inverse
+        square = 0.5 * opened * opened
+        taken = select(
+            before > 0.0,
+            lag * (opened - square) + (1.0 + lag) * square,
+            lag * square + (1.0 + lag) * (opened - square),
+        )
+        weight = GAUSS_WEIGHTS[k] * length
+        mean = -0.5 * weight * stiffness * closing * closing * inverse
+        rate = weight * (whole - stiffness * taken)
+        near, far = near + x * mean, far + y * mean
+        k00, k01, k11 = k00 + x * x * rate, k01 + x * y * rate, k11 + y * y * rate
+    return near, far, k00, k01, k11
 
 
 @inlined_kernel
@@ -208,13 +259,12 @@ def damping_tractions(contact, ends, lag, facet):  # type: ignore
     """Return means of what the lag of damping adds to the traction, from gaps without it."""
     a, c, b, d = ends
     p, q = lag * (b - a), lag * (d - c)
-    if facet and max(ends) <= 0.0 and max(a + p, c + q, b + p, d + q) <= 0.0:
-        return (
-            contact.normal_stiffness / 6.0 * (2.0 * p + q),
-            contact.normal_stiffness / 6.0 * (p + 2.0 * q),
-        )
-    n0, n1 = linear_means(contact, (a + p, c + q, b + p, d + q), lag, 1.0 + lag, facet)[0]
-    m0, m1 = linear_means(contact, ends, 0.0, 1.0, facet)[0]
+    stiffness, lagged = contact.normal_stiffness, (a + p, c + q, b + p, d + q)
+    if not facet:
+        later = _point_means(contact, lagged[0], lagged[2], lag, 1.0 + lag)[0]
+        return later - _point_means(contact, a, b, 0.0, 1.0)[0], 0.0
+    (n0, n1), _ = linear_tractions(stiffness, lagged, lag)
+    (m0, m1), _ = linear_tractions(stiffness, ends, 0.0)
     return n0 - m0, n1 - m1
 
 
@@ -264,21 +314,27 @@ def instant_release(contact, gaps, facet):  # type: ignore
 @inlined_kernel
 def facet_energy(contact, first, last):  # type: ignore
     """Return the energy of a facet of unit length, its force, and its moment about the middle."""
-    # closed from the end that is pressed most, over this share of the length
-    low, high = min(first, last), max(first, last)
-    share = 1.0 if high <= 0.0 else (low / (low - high) if low < 0.0 else 0.0)
+    energy, force, moment = linear_energy(contact.normal_stiffness, first, last)
+    if contact.closing_rate > 0.0:
+        mean, (near, far), _ = _excess_between(contact, first, last)
+        energy, force, moment = energy + mean, force - near - far, moment + 0.5 * (near - far)
+    return energy, force, moment
+
+
+@inlined_kernel
+def linear_energy(stiffness, first, last):  # type: ignore
+    """Return `facet_energy` of the linear law."""
+    # closed from the end that is pressed most, over a share of the length
+    low, high = least(first, last), greatest(first, last)
+    share = select(high <= 0.0, 1.0, select(low < 0.0, low / (low - high), 0.0))
     # with the gap at the other end, or 0 where the closed part ends before
-    high = min(high, 0.0)
-    third = contact.normal_stiffness / 6.0 * share
+    high = least(high, 0.0)
+    third = stiffness * (1 / 6) * share
     near, far = third * (2.0 * low + high), third * (low + 2.0 * high)
     near, far = near + (1.0 - share) * far, share * far
-    if first > last:
-        near, far = far, near
-    energy = 0.5 * (first * near + last * far)
-    if contact.closing_rate > 0.0:
-        mean, (one, other), _ = _excess_between(contact, first, last)
-        energy, near, far = energy + mean, near - one, far - other
-    return energy, near + far, 0.5 * (far - near)
+    is_turned = first > last
+    near, far = select(is_turned, far, near), select(is_turned, near, far)
+    return 0.5 * (first * near + last * far), near + far, 0.5 * (far - near)
 
 
 @inlined_kernel
@@ -294,43 +350,67 @@ def shear_limit(contact, normal, closed):  # type: ignore
 
 
 @inlined_kernel
+def sign(x):  # type: ignore
+    """Return the sign of a number, 0 of 0."""
+    return select(x > 0.0, 1.0, select(x < 0.0, -1.0, 0.0))
+
+
+@inlined_kernel
+def _clip(x, limit):  # type: ignore
+    """Return a number clipped to ± a limit."""
+    return least(greatest(x, -limit), limit)
+
+
+@inlined_kernel
 def shear_means(first, change, lag, limit):  # type: ignore
     """Return mean shear over a step, what slip loses of it, derivatives by change and limit, loss.
 
     The loss is an energy times the shear stiffness. A point that sticks during the whole step has
     the derivatives 1/2 + lag and 0.
     """
-    trial = first + (0.5 + lag) * change
-    stuck = max(abs(first), abs(first + change), abs(trial)) <= limit
-    # at an instant, also within the tolerance of the limit
-    if stuck or (change == 0.0 and abs(first) <= (1.0 + SLIP_LIMIT_TOLERANCE) * limit):
-        return trial, 0.0, 0.5 + lag, 0.0, lag * change * change
-    means = _sliding_means(first, change, lag, limit)
-    # slips at an instant: the shear follows the limit
-    if change == 0.0 and abs(first) > limit:
-        return means[0], means[1], 0.0, np.sign(means[0]), means[4]
+    shear = first + (0.5 + lag) * change
+    most = greatest(greatest(abs(first), abs(first + change)), abs(shear))
+    # at an instant, beyond the tolerance of the limit
+    moves = (change != 0.0) | (abs(first) > (1.0 + SLIP_LIMIT_TOLERANCE) * limit)
+    slides, none = (most > limit) & moves, 0.0 * first
+    means = shear, none, none + 0.5 + lag, none, lag * change * change
+    if any_lane(slides):
+        means = _select_means(slides, _sliding_means(first, change, lag, limit), means)
     return means
 
 
-@kernel
+@inlined_kernel
+def _select_means(mask, one, other):  # type: ignore
+    """Return the first means where a condition holds, else the second."""
+    return (
+        select(mask, one[0], other[0]),
+        select(mask, one[1], other[1]),
+        select(mask, one[2], other[2]),
+        select(mask, one[3], other[3]),
+        select(mask, one[4], other[4]),
+    )
+
+
+@inlined_kernel
 def _sliding_means(first, change, lag, limit):  # type: ignore
-    """Return `shear_means` of a point that slips during a step."""
+    """Return `shear_means` of a point that slips during a step, or at an instant."""
     # elastic shear at the start and the end, clipped to the limit
-    start = min(max(first, -limit), limit)
-    last = min(max(start + change, -limit), limit)
+    start = _clip(first, limit)
+    trial, moves = start + change, change != 0.0
+    last = _clip(trial, limit)
     # fraction of the step in which the point slips
-    over = start + change - last
-    slid = min(max(over / change, 0.0), 1.0) if over != 0.0 and change != 0.0 else 0.0
+    over = trial - last
+    slid = least(greatest(over / select(moves, change, 1.0), 0.0), 1.0)
+    slid = select((over != 0.0) & moves, slid, 0.0)
     # mean shear, with damping clipped to the limit
     mean = start + 0.5 * change - 0.5 * over * slid
-    shear = min(max(mean + lag * change, -limit), limit)
-    # derivatives by the elastic change and by the limit
-    if abs(mean + lag * change) > limit:
-        by_change, by_limit = 0.0, np.sign(shear)
-    else:
-        lost = np.sign(first) if abs(first) > limit else 0.0
-        by_change = 0.5 * (1.0 - slid) ** 2 + lag
-        by_limit = (1.0 - slid) * lost + slid * np.sign(change)
+    damped = mean + lag * change
+    shear, held = _clip(damped, limit), 1.0 - slid
+    # slips at the limit all the step, or at an instant: the shear follows the limit
+    follows = (abs(damped) > limit) | ((change == 0.0) & (abs(first) > limit))
+    lost = select(abs(first) > limit, sign(first), 0.0)
+    by_change = select(follows, 0.0, 0.5 * held * held + lag)
+    by_limit = select(follows, sign(shear), held * lost + slid * sign(change))
     # loss: excess at the start, friction, damping
-    rubbing = 0.5 * (first**2 - start**2) + abs(over) * limit + (shear - mean) * change
+    rubbing = 0.5 * (first * first - start * start) + abs(over) * limit + (shear - mean) * change
     return shear, first + change - last, by_change, by_limit, rubbing
