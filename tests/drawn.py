@@ -1,6 +1,7 @@
 """Drawings of outlines, as files that tests read, and a comparison of a structure with them."""
 
 import json
+import re
 
 import ezdxf
 import numpy as np
@@ -69,3 +70,54 @@ def assert_same(found, given, tolerance):
         assert mine.ends == pytest.approx(joint.ends, abs=tolerance)
         assert (mine.part, mine.role) == (joint.part, joint.role)
         assert mine.contact == joint.contact
+
+
+PORTAL = """
+[structure]
+shape = "outlines"
+file = "portal.dxf"
+snap = "4 mm"
+[structure.layers]
+RING = { part = "arch", role = "ring" }
+WEST = { part = "west pier", role = "pier" }
+EAST = { part = "east pier", role = "pier" }
+SLAB = { part = "slab", fixed = true }
+[model]
+fidelity = "rigid"
+"""
+
+
+def draw_portal(folder, moved=(), change=None, header=4, on_piers=False):
+    """Draw an arch on piers of three courses in mm, off by up to 1.5 mm, and write its case.
+
+    Stones are named by layer and number; `moved` puts some on other layers, and `change` may edit
+    the polygons by these names. `on_piers` has both piers on one layer.
+    """
+    sizes = {"radius": 1.6, "thickness": 0.3, "voussoirs": 11, "pier_breadth": 0.45}
+    drawn = af.arch_on_piers(**sizes, courses=[0.4, 0.45, 0.5], chords=1)
+    layers = {"arch": "RING", "left pier": "WEST", "right pier": "EAST"}
+    stones, chance = {}, np.random.default_rng(5)
+    for block in drawn.blocks:
+        if not block.fixed:
+            layer = layers[block.part]
+            number = 1 + sum(name.startswith(layer) for name in stones)
+            stones[f"{layer} {number}"] = 1e3 * block.points
+    low = min(points[:, 1].min() for points in stones.values())
+    stones["SLAB 1"] = np.array(
+        [[-2500.0, low - 300.0], [2500.0, low - 300.0], [2500.0, low], [-2500.0, low]]
+    )
+    stones = {name: at + chance.uniform(-1.5, 1.5, at.shape) for name, at in stones.items()}
+    if change is not None:
+        change(stones)
+    drawing = ezdxf.new()
+    drawing.units = header
+    for name, points in stones.items():
+        layer = dict(moved).get(name, name.split()[0])
+        layer = "PIERS" if on_piers and layer in ("WEST", "EAST") else layer
+        drawing.modelspace().add_lwpolyline(points, close=True, dxfattribs={"layer": layer})
+    drawing.saveas(folder / "portal.dxf")
+    text = PORTAL
+    if on_piers:
+        text = re.sub("WEST.*\nEAST.*", 'PIERS = { part = "piers", role = "pier" }', text)
+    (case := folder / "portal.toml").write_text(text)
+    return case

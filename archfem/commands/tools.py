@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from archfem import _numba, _optional
-from archfem._display import write_progress_line
+from archfem._display import DOUBT_MARK, write_progress_line
 from archfem._files import path_inside, read_listed
 from archfem.cases import result_text
 from archfem.cases.case import Case, read_settings
@@ -31,6 +31,7 @@ from archfem.limit.collapse import Collapse, Outcome, describe_crushing
 from archfem.limit.thickness import minimum_thickness
 from archfem.masonry.ring_thickness import find_ring
 from archfem.motion.suite import Suite
+from archfem.statics.equilibrium import structure_doubts
 from archfem.units import format_mm
 
 PIP_INSTALL = f"{sys.executable} -m pip install"
@@ -88,7 +89,7 @@ def _check_case(options: argparse.Namespace) -> int:
     return ExitCode.DOUBTFUL if at_rest.doubts else 0
 
 
-def thickness(options: argparse.Namespace) -> None:
+def thickness(options: argparse.Namespace) -> int:
     """Find the least thickness of a ring at rest, scaled about its middle line."""
     case = Case.read(options.case, options.changes)
     ring, limit = find_ring(case.structure, options.part), case.limit
@@ -103,6 +104,9 @@ def thickness(options: argparse.Namespace) -> None:
         f"geometric factor of safety: {ring.thickness / least:.3g}; "
         f"{describe_crushing(limit.strength, case.structure)}"
     )
+    doubts = structure_doubts(case.structure)
+    print(*(f"{DOUBT_MARK}{doubt}\n" for doubt in doubts), sep="", end="")
+    return ExitCode.DOUBTFUL if doubts else 0
 
 
 def animate(options: argparse.Namespace) -> None:

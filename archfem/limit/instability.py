@@ -72,7 +72,7 @@ def explain_instability(structure: Structure) -> str | None:
     block = rigid.blocks[rigid.free[int(speeds.argmax())]].name
     return missing or (
         f"no compression in its joints can hold '{block}', however deep and rough they are: add a "
-        "support, or check the outline"
+        "support, or check the outline, and that the drawing is upright"
     )
 
 

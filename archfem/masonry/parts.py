@@ -15,10 +15,13 @@ from dataclasses import Field, dataclass, replace
 from typing import Any, ClassVar, Protocol, TypeVar
 
 import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 
-from archfem._typing import Array
+from archfem._typing import Array, Numbers
 from archfem.errors import InvalidStructure, logger
-from archfem.masonry.block import Block
+from archfem.masonry.block import Block, as_point, say_place
+from archfem.units import format_mm
 
 # Rings and piers are assessed; other parts follow their support.
 PART_ROLES = ("ring", "pier", "other")
@@ -53,7 +56,9 @@ def assign_roles(
     roles = _collect_roles((*members, *others))
     for each in members:
         if each.part not in roles:
-            roles[each.part] = infer_role(each.part)
+            # nothing depends on the role of a support
+            fixed = all(getattr(m, "fixed", False) for m in members if m.part == each.part)
+            roles[each.part] = infer_role(each.part, warn=not fixed)
     return tuple(each if each.role else replace(each, role=roles[each.part]) for each in members)
 
 
@@ -78,7 +83,7 @@ def _collect_roles(members: Sequence[Member]) -> dict[str, str]:
     return {part: member.role for part, member in first.items()}
 
 
-def infer_role(part: str) -> str:
+def infer_role(part: str, *, warn: bool = True) -> str:
     """Infer the role of a part from the words of its name; warn where they are ambiguous."""
     # words of the name of a part, in the singular, that identify its role
     role_words = {
@@ -97,7 +102,7 @@ def infer_role(part: str) -> str:
     singular = {word.removesuffix(plural) for word in words for plural in ("", "s", "es")}
     named = [role for role in PART_ROLES if singular & role_words[role]]
     role = named[0] if named else "other"
-    if len(named) != 1:
+    if warn and len(named) != 1:
         why = f"has words of {' and '.join(named)}" if named else "has no word of a known role"
         logger.warning(
             "part '%s' is taken for %s: its name %s. Set its role to ring, pier or other: "
@@ -114,6 +119,52 @@ def select_assessed_parts(roles: Mapping[str, str]) -> tuple[str, ...]:
     """Return the parts whose failures and motions are assessed, in their order."""
     # rings and piers; without any, as in a single wall, all parts
     return tuple(part for part, role in roles.items() if role != "other") or tuple(roles)
+
+
+def find_misplaced(
+    blocks: Sequence[Block], pairs: Numbers, normals: Array, depths: Array
+) -> dict[int, str]:
+    """Find stones that may be on a wrong layer of a drawing, and describe each.
+
+    A few stones apart from the others of their ring or pier carry a pier, lie on one as piers do,
+    or stand between voussoirs. The last stone of a ring is as broad as its pier at one end alone.
+    """
+    parts = np.array(["" if b.fixed or b.role == "other" else b.part for b in blocks])
+    sides = parts[pairs]
+    same, moving = sides[:, 0] == sides[:, 1], (sides != "").all(axis=1)
+    links = np.ones(np.count_nonzero(same & moving)), pairs[same & moving].T
+    pieces = connected_components(coo_matrix(links, (len(blocks), len(blocks))), directed=False)[1]
+    sizes = np.bincount(pieces)[pieces]
+    largest = {part: sizes[parts == part].max() for part in {*parts}}
+    # other arches of one part are no strays
+    small = [2 * n <= largest[part] for n, part in zip(sizes, parts, strict=True)]
+    touched: dict[tuple[int, str], list[tuple[int, int, Array]]] = {}
+    found = {}
+    for number in np.flatnonzero(~same & moving):
+        pair, normal, depth = pairs[number].tolist(), normals[number], depths[number]
+        for (a, b), away in ((pair, normal), (pair[::-1], -normal)):
+            # a stray within a ring cuts it into pieces, which may be small too
+            if small[a] and not (small[b] and sizes[b] < sizes[a]):
+                touched.setdefault((int(pieces[a]), parts[b]), []).append((a, b, away))
+            elif (blocks[a].role, blocks[b].role) == ("ring", "pier") and away[1] < -0.5:
+                mine = (sides == parts[a]).any(axis=1) & moving
+                usual = float(np.median(depths[mine & same])) if (mine & same).any() else np.inf
+                one_end = depths[mine & ~same].min() < 1.15 * usual
+                if one_end and depth > max(1.3 * usual, np.ptp(blocks[b].points[:, 0]) / 1.05):
+                    why = f"{format_mm(depth)} broad as '{blocks[b].name}' below, where its joints"
+                    found[a] = f"{why} are {format_mm(usual)} deep", f"'{parts[b]}'"
+    for (piece, _), faces in touched.items():
+        (a, b, _), away = faces[0], np.array([face for *_, face in faces])
+        # a ring lies on piers, and a pier carries rings: neither is the other way round
+        bed = (np.abs(away) if blocks[a].role == "pier" else away)[:, 1].max() > 0.5
+        if bed if blocks[b].role == "pier" else (away @ away.T).min() < -0.7:
+            beside = " or ".join(f"'{part}'" for other, part in touched if other == piece)
+            found[a] = "apart from most others of it", beside
+    return {
+        number: f"'{blocks[number].name}' at {say_place(as_point(blocks[number].centroid))} m is a "
+        f"stone of '{parts[number]}', {why}: it may be one of {part}"
+        for number, (why, part) in found.items()
+    }
 
 
 @dataclass(frozen=True, eq=False)

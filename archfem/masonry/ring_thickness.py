@@ -9,7 +9,7 @@ from archfem._typing import Array, Metres, Numbers
 from archfem._validation import check_between, validate_arguments, validate_methods
 from archfem.errors import InvalidInput, InvalidStructure
 from archfem.masonry.block import Block, as_point, check_simple
-from archfem.masonry.structure import Joint, Structure, join_names
+from archfem.masonry.structure import CONTACT_TOLERANCE, Joint, Structure, join_names
 
 
 @validate_methods
@@ -56,7 +56,8 @@ class Ring:
         blocks, faces = [], dict[tuple[int, int], Array]()
         for place, number in enumerate(self.stones):
             pair = self.joints[place : place + 2]
-            block, ends = _scale_stone(old.blocks[number], [old.joints[j] for j in pair], factor)
+            at = [old.joints[j] for j in pair]
+            block, ends = _scale_stone(old.blocks[number], at, factor, old.size)
             check_simple(block.points, block.name)
             blocks.append(block)
             faces |= {(joint, place): face for joint, face in zip(pair, ends, strict=True)}
@@ -108,7 +109,7 @@ def find_ring(structure: Structure, part: str | None = None) -> Ring:
             names = join_names([structure.joints[number].name for number in numbers], "; ")
             raise InvalidInput(
                 f"'{structure.blocks[k].name}' has {len(numbers)} joints ({names}): a ring whose "
-                "thickness changes is one layer of stones that carry nothing else"
+                "thickness changes is one layer of stones, none missing, that carry nothing else"
             )
     return Ring(structure, *_follow_ring(structure, stones, touching))
 
@@ -124,9 +125,13 @@ def _follow_ring(
         if not {*structure.joints[number].blocks} <= stones
     ]
     if len(springings) != 2:
+        pairs = [structure.joints[number].blocks for number, _ in springings]
+        names = [" to ".join(f"'{structure.blocks[k].name}'" for k in pair) for pair in pairs]
+        # a stone on a wrong layer interrupts the ring, or is no stone of it
+        usual = "give each ring a part of its own, and stones of piers the pier's"
         raise InvalidInput(
-            f"the ring has {len(springings)} springings, and needs two: draw its stones from one "
-            "fixed support to another"
+            f"the ring has {len(springings)} springings ({join_names(names)}), and needs two: "
+            f"{next(iter(structure.misplaced.values()), usual)}"
         )
     number, stone = min(springings)
     joints, order = [number], [stone]
@@ -140,11 +145,15 @@ def _follow_ring(
 
 
 def _scale_stone(
-    block: Block, joints: Sequence[Joint], factor: float
+    block: Block, joints: Sequence[Joint], factor: float, size: float
 ) -> tuple[Block, tuple[Array, Array]]:
     """Return a stone with scaled depth, and its faces at both joints (2, 2), intrados first."""
     points = block.points
-    corners = [[_nearest(points, end) for end in joint.ends] for joint in joints]
+    near = CONTACT_TOLERANCE * size
+    # faces of a stone deeper than its neighbours end beyond the joints
+    spans = [block.face_span(joint.ends, near) for joint in joints]
+    faces = [j.intrados + np.outer(s, j.tangent) for j, s in zip(joints, spans, strict=True)]
+    corners = [[_nearest(points, end) for end in ends] for ends in faces]
     (first_in, first_out), (last_in, last_out) = corners
     if len({*corners[0], *corners[1]}) < 4:
         raise InvalidInput(
@@ -166,8 +175,7 @@ def _scale_stone(
         middle = points[[start, end]].mean(axis=0)
         new[between] = middle + factor * (points[between] - middle)
     scaled = replace(block, outline=tuple(map(as_point, new)))
-    faces = new[corners[0]], new[corners[1]]
-    return scaled, faces
+    return scaled, (new[corners[0]], new[corners[1]])
 
 
 def _nearest(points: Array, place: Array) -> int:

@@ -23,7 +23,7 @@ from archfem._validation import check_between, check_fields, check_type
 from archfem.errors import InvalidInput, InvalidStructure
 from archfem.masonry.block import Block, Point, as_point, check_overlaps, say_place
 from archfem.masonry.materials import Contact
-from archfem.masonry.parts import assign_roles, select_assessed_parts
+from archfem.masonry.parts import assign_roles, find_misplaced, select_assessed_parts
 from archfem.units import G
 
 
@@ -46,8 +46,9 @@ def find_number(kind: str, names: Sequence[str], requested: str | int) -> int:
 
 def suggest_name(word: str, known: Iterable[str], likeness: float = 0.6) -> str:
     """Suggest the name most similar to a misspelt one; empty where none is similar."""
-    near = difflib.get_close_matches(word, list(known), 1, likeness)
-    return f"did you mean '{near[0]}'?" if near else ""
+    folded = {name.casefold(): name for name in known}
+    near = difflib.get_close_matches(word.casefold(), folded, 1, likeness)
+    return f"did you mean '{folded[near[0]]}'?" if near else ""
 
 
 def join_names(names: Sequence[str], comma: str = ", ") -> str:
@@ -368,9 +369,10 @@ class Structure(ResultDisplay):
             if nearest is not None:
                 away = f", {1e3 * gaps[nearest]:.3g} mm from '{nearest}', "
                 away += "which a larger snap of a drawing joins"
+            names = join_names([f"'{block.name}'" for block in loose])
             raise InvalidStructure(
-                f"blocks {[block.name for block in loose]} rest on nothing: join each, through "
-                "others, to a fixed block, which has fixed = true, in a drawing by its layer"
+                f"blocks {names} rest on nothing: join each, through others, to a fixed block, "
+                "which has fixed = true, in a drawing by its layer"
                 f"; '{loose[0].name}' is at {say_place(as_point(loose[0].centroid))}{away}"
             )
 
@@ -419,6 +421,11 @@ class Structure(ResultDisplay):
         """Whether each joint counts: of a ring or pier, and no head joint (n_joints,)."""
         parts = select_assessed_parts({joint.part: joint.role for joint in self.joints})
         return ~self.heads & np.array([joint.part in parts for joint in self.joints], dtype=bool)
+
+    @cached_property
+    def misplaced(self) -> dict[int, str]:
+        """Stones that may be of another part than theirs, and why in words, by number."""
+        return find_misplaced(self.blocks, self.pairs, self.normals, self.depths)
 
     @cached_property
     def assessment(self) -> str:

@@ -55,7 +55,7 @@ from archfem.statics.relaxation import (
     solve_local,
     solve_or_relax,
 )
-from archfem.units import MPa, kPa, mm
+from archfem.units import MPa, format_mm, kPa, mm
 
 # Median depth of a ring's joints above which a wrong unit is likely [m]: of arches that span more
 # than 60 m the deepest are about that
@@ -477,9 +477,12 @@ def dead_load_doubts(dead: Equilibrium, friction: float | None = None) -> tuple[
 
 
 def structure_doubts(structure: Structure) -> list[Doubt]:
-    """Return doubts about fixed blocks, about the size of stones, and about fill in one piece."""
-    fixed = [*_doubt_inner_supports(structure), *_doubt_springers(structure)]
-    return [*fixed, *_doubt_depth(structure), *fill_doubts(structure)]
+    """Return doubts about fixed blocks, parts and size of stones, and about fill in one piece."""
+    fixed = [*_doubt_inner_supports(structure), *_doubt_ends(structure)]
+    remedy = "if so, give it that part, in a drawing by its layer"
+    parts = [Doubt(cause, remedy) for cause in structure.misplaced.values()]
+    sizes = [*_doubt_slope(structure), *_doubt_depth(structure)]
+    return [*fixed, *parts, *sizes, *fill_doubts(structure)]
 
 
 def _doubt_depth(structure: Structure) -> list[Doubt]:
@@ -496,27 +499,50 @@ def _doubt_depth(structure: Structure) -> list[Doubt]:
     ]
 
 
-def _doubt_springers(structure: Structure) -> list[Doubt]:
-    """Doubt fixed blocks of the size of a voussoir between an abutment and a ring."""
-    blocks, doubts = structure.blocks, []
-    fixed = np.array([block.fixed for block in blocks])
-    backed = set(structure.pairs[fixed[structure.pairs].all(axis=1)].ravel().tolist())
-    for joint, pair in zip(structure.joints, structure.pairs.tolist(), strict=True):
-        support, free = pair if fixed[pair[0]] else pair[::-1]
-        if fixed[free] or support not in backed or joint.role != "ring":
-            continue
+def _doubt_ends(structure: Structure) -> Iterator[Doubt]:
+    """Doubt fixed blocks like a voussoir or course between a fixed one and a ring or pier."""
+    blocks, pairs = structure.blocks, structure.pairs.tolist()
+    fixed = [pair for pair in pairs if blocks[pair[0]].fixed and blocks[pair[1]].fixed]
+    heights = structure.centroids[:, 1]
+    both = sorted((*fixed, *(pair[::-1] for pair in fixed)), key=lambda pair: -heights[pair[1]])
+    behind = dict(both)  # the lowest one that each fixed block touches
+    for joint, support, free, outward in _free_faces(structure):
         block, stone = blocks[support], blocks[free]
-        # one that has the part of the ring is fixed on purpose, not by its layer
-        if block.part != joint.part and block.area <= 1.5 * stone.area:
-            doubts.append(
-                Doubt(
-                    f"'{block.name}' at {say_place(as_point(block.centroid))} cannot move, and is "
-                    f"hardly larger than '{stone.name}' beside it: the ring has a stone less",
-                    "if it is a stone of the ring, give it the ring's part, in a drawing by its "
-                    "layer; if it is none, draw it as one with the abutment behind it",
-                )
+        size = np.ptp(block.points, axis=0)
+        # one that has the part of the ring or pier is fixed on purpose, not by its layer
+        if support not in behind or joint.role == "other" or block.part == joint.part:
+            continue
+        like = block.area <= 1.5 * stone.area
+        if joint.role == "pier":  # footings project
+            below = heights[behind[support]] < block.points[:, 1].min()
+            like = below and outward[1] > 0.5 and size[0] <= 1.05 * joint.depth
+        courses = (b for b in blocks if b.role == "pier" and not b.fixed)
+        if like or any(np.allclose(np.ptp(b.points, axis=0), size, rtol=0.03) for b in courses):
+            beside = f"'{blocks[behind[support]].name}'"
+            yield Doubt(
+                f"'{block.name}' at {say_place(as_point(block.centroid))} m "
+                f"({format_mm(size[0])} broad) is fixed, as is {beside} beside it, and carries "
+                f"'{joint.part}': by its size it may be a stone of that, which is weaker then",
+                "if it is, give it the part of that ring or pier, in a drawing by its layer; if "
+                f"it is none, draw it as one with {beside}",
             )
-    return doubts
+
+
+def _doubt_slope(structure: Structure) -> Iterator[Doubt]:
+    """Doubt piers whose beds all slope alike, as in a drawing that is turned a little."""
+    role = np.array([joint.role == "pier" for joint in structure.joints], dtype=bool)
+    beds = np.flatnonzero(role & structure.judged & (np.abs(structure.normals[:, 1]) > 0.5))
+    if len(beds) < 4 or np.ptp(structure.middles[beds, 0]) < 2.0 * structure.depths[beds].max():
+        return
+    x, y = structure.normals[beds].T
+    slopes = np.degrees(np.arctan(-x / y))
+    slope = float(np.median(slopes))
+    # a corner that errs by 2 mm turns a bed of half a metre by 0.3°
+    if abs(slope) > 1.0 and np.abs(slopes - slope).max() < 0.5 * abs(slope):
+        yield Doubt(
+            f"all beds of the piers slope by about {slope:.2g}°, positive up to the right",
+            "turn the drawing, unless the piers lean as built",
+        )
 
 
 def _free_faces(structure: Structure) -> Iterator[tuple[Joint, int, int, Array]]:

@@ -56,7 +56,8 @@ def draw_outlines(
     frame = every[0].frame
     bounds = np.concatenate([each.drawn for each in every])
     low, high = bounds.min(axis=0), bounds.max(axis=0)
-    scale = min(np.array([Size.PAGE - 0.8, 5.6]) / (high - low))  # [inch / unit]
+    extent = np.maximum(high - low, 1e-3 * max(high - low))  # polylines in x and z are flat
+    scale = min(np.array([Size.PAGE - 0.8, 5.6]) / extent)  # [inch / unit]
     wide, tall = scale * (high - low) + [0.8, 1.6]
     figure = new_figure(max(0.75 * Size.COLUMN, wide), max(0.35 * Size.COLUMN, tall))
     axes = figure.add_subplot()

@@ -6,6 +6,7 @@ from importlib import metadata
 import imageio.v2 as imageio
 import numpy as np
 import pytest
+from drawn import draw_portal
 
 import archfem as af
 from archfem import _optional
@@ -147,3 +148,14 @@ def test_the_least_thickness_of_a_ring_is_printed(tmp_path, capsys):
     assert "geometric factor of safety: 1.86;" in said
     assert af.commands.main(["thickness", str(path), "--part", "dome"]) == 1
     assert "'dome' is no ring" in capsys.readouterr().err
+
+
+def test_a_thickness_names_a_stone_on_a_wrong_layer(tmp_path, capsys):
+    """A course that prolongs the ring is in doubt, and one apart from it is an error."""
+    for moved, code in (("WEST 3", 3), ("WEST 1", 1)):
+        path = draw_portal(tmp_path, {moved: "RING"})
+        assert af.commands.main(["thickness", str(path)]) == code
+        said = "".join(capsys.readouterr())
+        assert "'RING 1' at (-1.600, " in said
+        assert "may be one of 'west pier'" in said
+        assert ("least thickness" in said) == (code == 3)

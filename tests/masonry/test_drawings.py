@@ -10,7 +10,7 @@ from pathlib import Path
 import ezdxf
 import numpy as np
 import pytest
-from drawn import assert_same, dxf, geojson, layers_of, square
+from drawn import assert_same, draw_portal, dxf, geojson, layers_of, square
 
 import archfem as af
 from archfem.cases.result_text import describe_depths
@@ -289,7 +289,7 @@ def test_blocks_inserted_in_a_drawing_are_read(tmp_path, monkeypatch):
     assert found.blocks[1].centroid == pytest.approx([5.5, 2.5])
     # without a row of the table the stones of an insert are named, as any other
     del layers["PIER"]
-    with pytest.raises(af.InvalidInput, match=r"of layer 'PIER' .* on it: 2, the first about"):
+    with pytest.raises(af.InvalidInput, match=r"of layer 'PIER' \(closed outlines: 2, the first"):
         af.read_outlines(tmp_path / "blocks.dxf", layers=layers)
     assert drawings.MAX_ENTITIES == 100_000
     monkeypatch.setattr(drawings, "MAX_ENTITIES", 1000)  # a hundred times as many take seconds
@@ -489,3 +489,57 @@ def test_median_depths_are_by_part():
     assert depths.endswith("median 700 mm of 'left pier', 350 mm of 'arch', 700 mm of 'right pier'")
     ring = af.circular_arch(radius=1.0, thickness=0.2, embrace=150.0, voussoirs=7)
     assert describe_depths(ring).splitlines()[0].endswith("; median 200 mm")
+
+
+def test_a_small_drawing_needs_its_unit_in_the_case(tmp_path):
+    """Centimetres in a file that says millimetres; a model in a laboratory may be as small."""
+
+    def shrink(stones):
+        stones.update({name: 0.1 * points for name, points in stones.items()})
+
+    case = draw_portal(tmp_path, change=shrink)
+    with pytest.raises(af.InvalidInput, match=r'typically 0\.0\d+ m large.*, 5 m by unit = "cm"'):
+        af.Case.read(case)
+    small, large = (
+        af.Case.read(case, [f"structure.unit={unit}", f"structure.snap={snap} mm"]).structure.size
+        for unit, snap in (("mm", 0.4), ("cm", 4.0))
+    )
+    assert large == pytest.approx(10.0 * small, rel=1e-3)
+
+
+def test_words_that_several_stones_have_in_them_are_no_names(tmp_path):
+    drawing = ezdxf.new(units=ezdxf.units.M)
+    space = drawing.modelspace()
+    for k, name in enumerate(["sill", "granite"]):
+        space.add_lwpolyline(square(k, 0), close=True, dxfattribs={"layer": "STONE"})
+        for y, words in ((0.3, name), (0.6, "granite")):
+            space.add_text(words, dxfattribs={"insert": (k + 0.5, y), "height": 0.05})
+    drawing.saveas(path := tmp_path / "notes.dxf")
+    assert [outline.name for outline in read_drawing(path)] == ["sill", "STONE 2"]
+
+
+def test_a_vertex_that_is_drawn_twice_is_one(tmp_path):
+    def repeat(stones):
+        corners = stones["RING 4"]
+        stones["RING 4"] = np.array([*corners[[0, 0, 1, 2, 2, 3, 0]]])
+
+    repeated = af.Case.read(draw_portal(tmp_path, change=repeat)).structure
+    (block,) = (block for block in repeated.blocks if block.name == "RING 4")
+    assert len(block.points) == 4
+    assert repeated.fingerprint == af.Case.read(draw_portal(tmp_path)).structure.fingerprint
+
+
+def test_stones_on_a_sheet_are_not_in_model_space(tmp_path):
+    drawing = ezdxf.new(units=ezdxf.units.M)
+    drawing.paperspace().add_lwpolyline(square(0, 0), close=True)
+    drawing.saveas(path := tmp_path / "sheet.dxf")
+    with pytest.raises(af.InvalidInput, match="draw them in model space, not on a sheet"):
+        read_drawing(path)
+
+
+@pytest.mark.parametrize("layer", ["RIGN", "Ring"])
+def test_a_misspelt_layer_is_the_one_it_is_like(tmp_path, layer):
+    case = draw_portal(tmp_path, {"RING 4": layer})
+    words = rf"of layer '{layer}' \(closed outlines: 1, .*\) nothing is said: did you mean 'RING'\?"
+    with pytest.raises(af.InvalidInput, match=words):
+        af.Case.read(case)

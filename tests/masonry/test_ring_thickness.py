@@ -3,6 +3,7 @@
 import ezdxf
 import numpy as np
 import pytest
+from drawn import draw_portal
 
 import archfem as af
 from archfem.masonry import find_ring
@@ -147,7 +148,10 @@ def test_unequal_stones_that_no_longer_touch_do_not_stand(tmp_path):
     [
         (lambda: find_ring(af.column(breadth=1.0, heights=[1.0])), "there are 0 rings"),
         (lambda: find_ring(ring_of_seven(), part="dome"), "'dome' is no ring"),
-        (lambda: find_ring(filled()), "has 3 joints .*one layer of stones that carry nothing"),
+        (
+            lambda: find_ring(filled()),
+            "has 3 joints .*one layer of stones, none missing, that carry",
+        ),
         (lambda: find_ring(ring_of_seven()).with_thickness(0.0), "thickness"),
         (lambda: find_ring(ring_of_seven()).with_thickness(2.5), "crosses or touches itself"),
     ],
@@ -155,6 +159,23 @@ def test_unequal_stones_that_no_longer_touch_do_not_stand(tmp_path):
 def test_what_is_no_ring_is_refused(build, message):
     with pytest.raises(ValueError, match=message):
         build()
+
+
+def test_a_stone_may_be_more_than_twice_as_deep_as_its_neighbours(tmp_path):
+    """Its faces end far beyond its joints, whose ends are nearer to the intrados."""
+
+    def deepen(stones):
+        stones["RING 6"][2:] *= 2.14 / 1.75  # the extrados of the keystone: 0.69 m for 0.3 m
+
+    ring = find_ring(af.Case.read(draw_portal(tmp_path, change=deepen)).structure)
+    (key,) = (block for block in ring.with_thickness(0.15).blocks if block.name == "RING 6")
+    assert np.ptp(key.points[:, 1]) == pytest.approx(0.5 * 0.69, abs=0.01)
+
+
+def test_a_missing_voussoir_is_named_as_a_cause(tmp_path):
+    case = draw_portal(tmp_path, change=lambda stones: stones.pop("RING 6"))
+    with pytest.raises(af.InvalidInput, match=r"'RING \d' has 1 joints .* of stones, none missing"):
+        find_ring(af.Case.read(case).structure)
 
 
 def ring_of_seven():

@@ -176,6 +176,17 @@ def test_an_unknown_name_is_warned_of_once_with_ways_to_set_its_role(warnings):
     assert len(warnings()) == 3  # its blocks have their roles now
 
 
+def test_the_role_of_a_part_that_is_fixed_is_never_warned_of(warnings):
+    column = af.column(breadth=1.0, heights=[1.0, 1.0])
+    parts = [
+        replace(block, part="plinth" if block.fixed else "pier", role="") for block in column.blocks
+    ]
+    replace(column, blocks=tuple(parts))
+    assert warnings() == []
+    replace(column, blocks=(*parts[:2], replace(parts[2], part="plinth")))
+    assert len(warnings()) == 1
+
+
 def test_a_role_of_one_block_holds_for_all_of_its_part(warnings):
     made = without_roles(viaduct("west vault", "east arch", "pier"))
     assert len(warnings()) == 1

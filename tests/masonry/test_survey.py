@@ -87,7 +87,9 @@ def test_material_and_layer_of_a_feature(tmp_path):
 
 def test_layers_must_be_those_of_the_file(tmp_path, stack):
     path = dxf(tmp_path / "stack.dxf", stack)
-    with pytest.raises(af.errors.InvalidInput, match="of layer 'column-fixed' nothing is said"):
+    with pytest.raises(
+        af.errors.InvalidInput, match=r"'column-fixed' \(.*\) nothing is said: name"
+    ):
         af.read_outlines(path, layers={"column": af.masonry.Layer()})
     layers = {"column": af.masonry.Layer(), "column-fixed": af.masonry.Layer(ignore=True)}
     assert len(af.read_outlines(path, layers=layers).blocks) == 2

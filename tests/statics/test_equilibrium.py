@@ -7,8 +7,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from drawn import draw_portal
 
 import archfem as af
+from archfem.masonry.block import say_place
 from archfem.statics import Equilibrium, dead_load, equilibrium, self_weight
 from archfem.statics.equilibrium import (
     _increment_load,
@@ -222,7 +224,7 @@ def test_a_voussoir_on_the_layer_of_the_abutments_is_a_doubt(part):
     assert len(doubts) == (part == "abutment")
     for doubt in doubts:
         assert doubt.cause.startswith(f"'{blocks[1].name}' at (")
-        assert f"hardly larger than '{blocks[2].name}' beside it" in doubt.cause
+        assert "and carries 'arch': by its size it may be a stone of that" in doubt.cause
 
 
 @pytest.mark.parametrize(("factor", "doubts"), [(1.0, 0), (10.0, 1), (25.4, 1)])
@@ -265,6 +267,75 @@ def test_a_fixed_course_on_one_that_moves_is_a_doubt(tmp_path, capsys):
         said = capsys.readouterr().out
         assert said.count("m cannot move, but lies on '") == 2
         assert ("N ≥ 0.00 kN, as nothing is carried by " in said) == (command[0] != "limit")
+
+
+@pytest.mark.parametrize(
+    ("moved", "name", "why"),
+    [
+        ({"WEST 1": "SLAB"}, "SLAB 1", "mm broad) is fixed, as is 'SLAB 2' beside it, and carries"),
+        ({"WEST 1": "SLAB", "WEST 2": "SLAB"}, "SLAB 2", "as is 'SLAB 1' beside it, and carries"),
+        (dict.fromkeys(["WEST 1", "WEST 2", "WEST 3"], "SLAB"), "SLAB 3", "carries 'arch': by its"),
+        ({"WEST 1": "RING"}, "RING 1", "of 'arch', apart from most others of it: it may be one of"),
+        ({"WEST 2": "RING"}, "RING 1", "from most others of it: it may be one of 'west pier'"),
+        ({"WEST 3": "RING"}, "RING 1", "mm broad as 'WEST 2' below, where its joints are 299 mm"),
+        ({"WEST 2": "EAST"}, "EAST 1", "of 'east pier', apart from most others of it: it may be o"),
+        ({"RING 4": "EAST"}, "EAST 1", "apart from most others of it: it may be one of 'arch'"),
+        ({"RING 11": "WEST"}, "WEST 4", "of it: it may be one of 'arch' or 'east pier'"),
+    ],
+)
+def test_a_stone_on_a_wrong_layer_of_a_drawing_is_a_doubt(tmp_path, moved, name, why, capsys):
+    case = draw_portal(tmp_path, moved, on_piers=len(moved) == 3)
+    structure = af.Case.read(case).structure
+    (doubt,) = structure_doubts(structure)
+    (block,) = (block for block in structure.blocks if block.name == name)
+    assert doubt.cause.startswith(f"'{name}' at {say_place(block.centroid)} m ")
+    assert why in doubt.cause
+    assert "in a drawing by its layer" in doubt.remedy
+    assert af.commands.main(["check", str(case)]) == 3
+    assert f"in doubt: '{name}' at " in capsys.readouterr().out
+
+
+def lay_footings(stones):
+    """Put a footing below each pier, broader by a tenth on each side, above a lower slab."""
+    for name, course in (("SLAB 2", "WEST 1"), ("SLAB 3", "EAST 3")):
+        (left, low), (right, _) = stones[course].min(axis=0), stones[course].max(axis=0)
+        left, right = left - 45.0, right + 45.0
+        corners = [[left, low - 300.0], [right, low - 300.0], [right, low], [left, low]]
+        stones[name] = np.array(corners)
+    stones["SLAB 1"] -= [0.0, 300.0]
+
+
+def turn(stones, angle):
+    c, s = np.cos(np.radians(angle)), np.sin(np.radians(angle))
+    for name in stones:
+        stones[name] = stones[name] @ [[c, s], [-s, c]]
+
+
+@pytest.mark.parametrize("change", [None, lay_footings, lambda stones: turn(stones, 0.5)])
+@pytest.mark.parametrize("on_piers", [False, True])
+def test_a_sound_drawing_has_no_doubts(tmp_path, change, on_piers):
+    """On footings, with both piers on one layer, and turned by less than a survey errs."""
+    case = draw_portal(tmp_path, change=change, on_piers=on_piers)
+    assert structure_doubts(af.Case.read(case).structure) == []
+
+
+def test_two_arches_of_one_part_are_no_strays(tmp_path):
+    def repeat(stones):
+        for name in [name for name in stones if not name.startswith("SLAB")]:
+            stones[f"{name} again"] = stones[name] + [4000.0, 0.0]
+        stones["SLAB 1"][1:3, 0] += 4000.0
+
+    case = draw_portal(tmp_path, change=repeat)
+    assert structure_doubts(af.Case.read(case).structure) == []
+    with pytest.raises(af.InvalidInput, match=r"has 4 springings .*: give each ring a part of its"):
+        af.masonry.find_ring(af.Case.read(case).structure)
+
+
+@pytest.mark.parametrize("angle", [2.0, -2.0])
+def test_a_drawing_that_is_turned_is_a_doubt(tmp_path, angle):
+    case = draw_portal(tmp_path, change=lambda stones: turn(stones, angle))
+    (doubt,) = structure_doubts(af.Case.read(case).structure)
+    assert doubt.cause.startswith(f"all beds of the piers slope by about {angle:.2g}°")
 
 
 def test_a_fixed_wall_on_pieces_of_fill_is_none():

@@ -116,3 +116,10 @@ def test_a_failed_check_says_where_the_picture_is(tmp_path, capsys, monkeypatch)
     assert af.commands.main(["check", str(case)]) == 1
     assert "wrote" not in capsys.readouterr().err
     assert not picture.exists()
+
+
+def test_polylines_in_x_and_z_are_drawn_flat(tmp_path):
+    drawing = ezdxf.new(units=ezdxf.units.M)
+    drawing.modelspace().add_polyline3d([(0, 0, 0), (1, 0, 0), (1, 0, 1)], close=True)
+    drawing.saveas(path := tmp_path / "upright.dxf")
+    assert draw_outlines(path).axes

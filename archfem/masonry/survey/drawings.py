@@ -164,7 +164,9 @@ def _limit_memory(more: int = 2**30) -> Iterator[None]:
 def _check_sizes(outlines: list[Outline]) -> None:
     """Refuse a drawing without outlines, with too many, or whose unit is evidently wrong."""
     if not outlines:
-        raise InvalidInput("it has no closed outlines to read")
+        raise InvalidInput(
+            "it has no closed outlines to read: in a DXF draw them in model space, not on a sheet"
+        )
     points = sum(len(each.points) for each in outlines)
     if points > 20_000:  # every edge is compared with every vertex
         raise InvalidInput(
@@ -174,11 +176,11 @@ def _check_sizes(outlines: list[Outline]) -> None:
     _check_unit([each.points for each in outlines], outlines[0].frame)
 
 
-def _check_unit(polygons: Sequence[Array], frame: Frame) -> None:
+def _check_unit(polygons: Sequence[Array], frame: Frame, least: float = 0.02) -> None:
     """Refuse polygons [m] whose size shows that the unit is wrong."""
     # the median diagonal is insensitive to a few long blocks, such as a fill
     typical = float(np.median([np.hypot(*np.ptp(each, axis=0)) for each in polygons]))
-    if 0.02 <= typical <= 20.0:
+    if least <= typical <= 20.0:
         return
     points = np.concatenate(polygons)
     away = np.abs(points).max(axis=0)
@@ -311,13 +313,17 @@ def _read_dxf(
     # before ends are compared, whose distance a wrong unit would misstate
     known = [np.multiply(each.points, frame.factor)[:, :2] for each in polylines if each.points]
     if corners.size and len(corners) == sum(map(len, known)):
-        _check_unit(known, frame)
+        # a unit of the case is deliberate, as of a model in a laboratory
+        _check_unit(known, frame, 0.1 if unit is None else 0.02)
     outlines = [_read_polyline(entity, frame, snap, corners) for entity in polylines]
     texts = []
     for entity in read:
         if text := entity.text:
             place = _check_coordinates(entity.points, f"the text '{text}'", frame.factor)[0]
             texts.append((text, place))
+    # what many stones have in common, as their material, is the name of none
+    said = Counter(text for text, _ in texts)
+    texts = [each for each in texts if said[each[0]] == 1]
     counts = Counter[str]()
     for outline in outlines:
         counts[outline.layer] += 1
@@ -455,7 +461,7 @@ def _block_name(outline: Outline, texts: list[tuple[str, Array]], number: int) -
 def _check_polygon(given: Any, name: str, factor: float) -> Array:
     """Return the vertices of a polygon without a repeated last one (n, 2) [m]."""
     points = _check_plane(given, name, factor, f"{name} does not lie", "draw")
-    points = points[:-1] if np.array_equal(points[0], points[-1]) else points
+    points = points[np.any(points != np.roll(points, -1, axis=0), axis=1)]  # no edge of no length
     if len(points) < 3:
         raise InvalidInput(f"{name} has {len(points)} vertices: a block has at least 3")
     return points

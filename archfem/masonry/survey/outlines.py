@@ -36,7 +36,7 @@ from archfem.masonry.materials import (
     Material,
 )
 from archfem.masonry.parts import Direction, assign_roles, find_directions
-from archfem.masonry.structure import CONTACT_TOLERANCE, Structure
+from archfem.masonry.structure import CONTACT_TOLERANCE, Structure, suggest_name
 from archfem.masonry.survey.drawings import Frame, Outline, read_drawing, read_physical_curves
 from archfem.units import G, in_unit
 
@@ -229,9 +229,10 @@ def _check_layers(outlines: list[Outline], layers: Mapping[str, Layer], path: st
     if strange := sorted(there - set(layers)):
         stones = [outline for outline in outlines if outline.layer == strange[0]]
         about = stones[0].frame.place(stones[0].points.mean(axis=0))
+        hint = suggest_name(strange[0], layers, 0.7) or "name its part, or ignore it"
         raise InvalidInput(
-            f"{path}: of layer '{strange[0]}' nothing is said: name its part, or ignore it; closed "
-            f"outlines on it: {len(stones)}, the first about {about}"
+            f"{path}: of layer '{strange[0]}' (closed outlines: {len(stones)}, the first about "
+            f"{about}) nothing is said: {hint}"
         )
     expected = {name for name, layer in layers.items() if not layer.ignore}
     if missing := sorted(expected - there):
