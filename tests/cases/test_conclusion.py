@@ -132,6 +132,8 @@ def test_a_push_is_no_margin_of_what_moves(case, outcomes, verified, moves):
     rows[:] = [("limit analysis", "the site's 0.2 g", "mechanism", "0.9")]
     least = "the least margin is 0.9, for a push by the site's 0.2 g to begin to move it"
     assert [*conclusion._describe_margin(data, rows)] == [least, *filter(None, [moves])]
+    unshaken = [*conclusion._describe_margin(data_of(case), rows)]
+    assert unshaken == [least, "shaken it may begin to move at less"]
 
 
 @pytest.mark.parametrize("verified", ["rocks", None])

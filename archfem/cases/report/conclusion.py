@@ -272,7 +272,7 @@ def _describe_ranges(ranges: Sequence[VerdictRange]) -> Iterator[str]:
         far = moved[max(moved)]
         motion = far.dataset.attrs.get("motion")
         under = f"it moves farthest under '{motion}': " * (len(ranges) > 1)
-        yield under + far.displacements.partition(";")[0]
+        yield under + far.displacements.partition(";")[0].replace("ments", "ments are", 1)
 
 
 def _say_single_changes(ranges: Sequence[VerdictRange]) -> Iterator[str]:
@@ -306,7 +306,8 @@ def _describe_margin(data: ReportData, rows: Sequence[Row]) -> Iterator[str]:
                 apart.append(f"a push of {size} times {demand}{over}{of} is no margin: {moves}")
             else:
                 words = f"{size}{over}, for a push by {demand} to begin to move it{of}"
-                margins.append((least, [words, *filter(None, [moves])]))
+                then = moves if data.runs else "shaken it may begin to move at less"
+                margins.append((least, [words, *filter(None, [then])]))
     margins += _describe_scales(data, [row for row in rows if row[0] == RESULTS["scale"]])
     for k, (_, (first, *others)) in enumerate(sorted([*margins, *sorted(checks)[:1]])):
         rank = ("the least margin is", "the next is", "then follows")[min(k, 2)]
