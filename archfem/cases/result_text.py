@@ -552,7 +552,10 @@ def state_ratings(rated: Sequence[tuple[Rating, Sequence[str]]]) -> Statement:
         rows.append(("rating", name, f"{found.outcome}, {found.place}", factor))
         for code, (of_code, words) in found.by_codes.items():
             rows.append(("rating", f"{name} {code}", words, f"{of_code:.4g}"))
-        sentences += [repr(found), *found.describe_codes()]
+        own = [repr(found)]
+        if factor != "-":
+            own = [f"rating for {name}: factor {factor}, {found.outcome}", f"worst {found.place}"]
+        sentences += [*own, *found.describe_codes()]
         if found is rated[0][0]:
             sentences += [*found.describe_pressure(), *found.describe_backing()]
     return Statement(sentences, rows, [doubt for _, own in rated for doubt in own])

@@ -132,6 +132,8 @@ def test_a_push_is_no_margin_of_what_moves(case, outcomes, verified, moves):
     rows[:] = [("limit analysis", "the site's 0.2 g", "mechanism", "0.9")]
     least = "the least margin is 0.9, for a push by the site's 0.2 g to begin to move it"
     assert [*conclusion._describe_margin(data, rows)] == [least, *filter(None, [moves])]
+    unshaken = [*conclusion._describe_margin(data_of(case), rows)]
+    assert unshaken == [least, "shaken it may begin to move at less"]
 
 
 @pytest.mark.parametrize("verified", ["rocks", None])
@@ -147,9 +149,9 @@ def test_a_check_of_what_begins_to_move_is_one_of_displacements_where_it_moves(c
     ]
     if verified:
         expected = [
-            "the least margin is 0.842, on the EC8 spectrum of PGA 0.2 g, by code, right, which it "
-            "fails",
-            "it is one of displacements, for in the runs it moves, and falls in none",
+            "the least margin is 0.842 by displacements, on the EC8 spectrum of PGA 0.2 g, by "
+            "code, right",
+            "the check passes for what is at rest, and in the runs it moves, and falls in none",
         ]
     assert [*conclusion._describe_margin(data, [row])] == expected
 
@@ -167,7 +169,7 @@ def test_the_margin_of_scales_ends_where_it_is_dislocated(case):
     data = data_of(case)
     vars(data)["pairs"] = ("a", "b", "c", "d")
     assert [*conclusion._describe_margin(data, rows)] == [
-        "the least margin is 1.38 on 'a', PGA 0.2 g, the least of 2 motions",
+        "the least margin is 1.38 on 'a', PGA 0.2 g, of 2 motions",
         "it moves as a mechanism from 0.85 × or less on, is dislocated from 1.41 × on and falls "
         "from 4.5 × on",
         "it falls first under 'b', from 2.10 × on",
@@ -224,8 +226,8 @@ def test_a_displacement_has_the_range_of_its_time_steps_and_single_changes_are_s
     same = "it falls with none of 1 single changes"
     moved = "unvaried it is displaced by 20 mm, by 120 mm with half the time step"
     assert [*conclusion._say_single_changes(ranges)] == [
-        f"under 'a' and 'b' {same}",
-        f"under 'a' and 'b' {moved}",
+        f"under 'a' and 'b': {same}",
+        f"under 'a' and 'b': {moved}",
     ]
     assert [*conclusion._say_single_changes(ranges[:1])] == [same, moved]
     assert next(conclusion._describe_ranges(ranges)) == (

@@ -200,7 +200,7 @@ def test_demand_and_capacity_stand_beside_their_doubts(kept, undrawn):
     alone = report_data.ReportData(case, {}, found.folder)
     question, result, margin = build_conclusion(alone).pieces[:3]
     assert question.text == texts[0]
-    assert result.lead == "Result"
+    assert result.lead == "Result:"
     assert result.text.startswith("Limit analysis: it turns, at 4.8 times the load")
     assert margin.text.startswith("The least margin is 0.5 (0.45 with one weight a body), on the ")
     outcomes = "the given load: it turns, at 4.8 times the load, factor 4.8; LM1: passes without "
@@ -623,7 +623,7 @@ first = { synthetic = { seed = 1 } }
 @pytest.mark.parametrize(
     ("command", "given", "found"),
     [
-        ("rate", ["--vehicle", "LM1"], "Rating of 'a small bridge' for LM1: factor"),
+        ("rate", ["--vehicle", "LM1"], "Rating for LM1: factor"),
         (
             "limit",
             ["--set", "limit.horizontal=1.0"],

@@ -85,7 +85,11 @@ def test_of_factors_the_least_is_the_worst():
         "in the study 'd' lowers the push most, from 0.25 g to 0.2 g",
         "1 of 4 cases begins to move below the site's acceleration: 'd', at 0.926 of it",
     ]
-    assert study_findings.tabulate_study(found).head == ["case", "push [g]", "push over site"]
+    assert study_findings.tabulate_study(found).head == [
+        "case",
+        "push [g]",
+        "over the site's acceleration",
+    ]
     varied = xr.Dataset(
         {"factor": (("friction", "width"), [[0.6, 0.7], [0.5, 0.4]])},
         {"friction": [0.5, 0.4], "width": [1.0, 2.0]},

@@ -618,7 +618,8 @@ def test_factors_of_codes_are_stated_with_outcome_and_range():
     assert bare.describe_codes()[0].startswith(f"lorry {names[0]}: factor ")
     assert [*by_cs454.by_codes] == [code]  # for Eurocodes another axle may be the worst
     (row, *rows), sentences = state_ratings([(given, [])])[1::-1]
-    assert [repr(given), factors, *lines] == sentences[:6]
+    first = f"rating for lorry: factor {given.factor:.4g}, {given.outcome}"
+    assert [first, f"worst {given.place}", factors, *lines] == sentences[:7]
     assert row[1:3] == ("lorry", f"{given.outcome}, {given.place}")
     assert rows == [
         ("rating", f"lorry {name}", says, f"{x:.4g}") for name, (x, says) in given.by_codes.items()

@@ -70,6 +70,9 @@ MAX_RANGES = 2
 # Fidelity of the variations of a verdict
 VARIED_FIDELITY = "rigid"
 
+# Results that may be of a push
+PUSHES = RESULTS["limit"], RESULTS["pushover"]
+
 # Results of runs: histories, and their variations
 _HISTORIES, _VARIATIONS = "time histories", "variations"
 
@@ -81,8 +84,8 @@ PLACEHOLDER = "Name of the project"
 
 _FACTORS = (
     "; factor: the multiple of the demand at which a check is just passed or a load makes a "
-    "mechanism, up to which a scaled motion neither fells nor dislocates it, or at which a fall has "
-    "a probability of one half"
+    "mechanism, up to which a scaled motion neither fells nor dislocates it, or at which a fall "
+    "has a probability of one half"
 )
 
 
@@ -240,7 +243,7 @@ def _build_paragraphs(
         none = ", and displacements have no range" * (not data.verdict_ranges)
         changes.append(f"{join_words(single)} were not varied{none}")
     return {
-        "Does it stand?" if data.runs else "Result": answer,
+        "Does it stand?" if data.runs else "Result:": answer,
         "By which margin?": [*_describe_margin(data, rows), *_say_vertical(data)],
         "What would change the answer?": changes,
     }
@@ -269,7 +272,7 @@ def _describe_ranges(ranges: Sequence[VerdictRange]) -> Iterator[str]:
         far = moved[max(moved)]
         motion = far.dataset.attrs.get("motion")
         under = f"it moves farthest under '{motion}': " * (len(ranges) > 1)
-        yield under + far.displacements.partition(";")[0]
+        yield under + far.displacements.partition(";")[0].replace("ments", "ments are", 1)
 
 
 def _say_single_changes(ranges: Sequence[VerdictRange]) -> Iterator[str]:
@@ -279,7 +282,7 @@ def _say_single_changes(ranges: Sequence[VerdictRange]) -> Iterator[str]:
         for text in each.what_changes:
             texts.setdefault(text, []).append(f"'{each.dataset.attrs.get('motion')}'")
     for text, motions in texts.items():
-        yield f"under {join_words(motions)} {text}" if len(ranges) > 1 else text
+        yield f"under {join_words(motions)}: {text}" if len(ranges) > 1 else text
 
 
 def _describe_margin(data: ReportData, rows: Sequence[Row]) -> Iterator[str]:
@@ -287,12 +290,13 @@ def _describe_margin(data: ReportData, rows: Sequence[Row]) -> Iterator[str]:
     moves, apart = _say_motion(data), list[str]()
     margins, checks = list[tuple[float, list[str]]](), list[tuple[float, list[str]]]()
     for name, demand, outcome, factor in rows:
-        check = name.partition("assessment: ")[2]
+        check, pushed = name.partition("assessment: ")[2], name in PUSHES
         if factor == "-":
-            continue
-        if check:
+            if pushed and data.runs:  # without runs it is the answer
+                apart.append(f"{name}, beside no demand: {outcome.partition(';')[0]}")
+        elif check:
             checks.append(_describe_check(data, (check, outcome, factor), moves))
-        elif name in (RESULTS["limit"], RESULTS["pushover"]) and demand.startswith("the site"):
+        elif pushed and demand.startswith("the site"):
             bound = "at most " * ("(" in factor)  # the least found, without proof that none is less
             over = " over what is assumed of the fill" * (" to " in factor)
             least, size = float(factor.partition(" ")[0]), f"{bound}{factor}"
@@ -302,7 +306,8 @@ def _describe_margin(data: ReportData, rows: Sequence[Row]) -> Iterator[str]:
                 apart.append(f"a push of {size} times {demand}{over}{of} is no margin: {moves}")
             else:
                 words = f"{size}{over}, for a push by {demand} to begin to move it{of}"
-                margins.append((least, [words, *filter(None, [moves])]))
+                then = moves if data.runs else "shaken it may begin to move at less"
+                margins.append((least, [words, *filter(None, [then])]))
     margins += _describe_scales(data, [row for row in rows if row[0] == RESULTS["scale"]])
     for k, (_, (first, *others)) in enumerate(sorted([*margins, *sorted(checks)[:1]])):
         rank = ("the least margin is", "the next is", "then follows")[min(k, 2)]
@@ -318,18 +323,15 @@ def _describe_check(
     ratios, opened, bodies = factor.partition(" (")
     over = " over what is assumed of the fill" * (" to " in factor)
     least, by = float(factor.partition(" ")[0]), f"on {name_spectrum(data)}, by {check}"
-    moved, begins = re.search(r"([\d.]+) by displacements", factor), list[str]()
+    moved = re.search(r"([\d.]+) by displacements", factor)
     if moved and moves:  # what moves at less than the push that begins it is judged by how far
-        least, ratios, opened, bodies = float(moved[1]), moved[1], "", ""
-        begins = [f"it is one of displacements, for {moves}"]
-    elif moved:
-        begins = [
-            f"{ratios} times the spectrum begins to move it",
-            f"if it moved, it could be displaced by {moved[1]} times the demand",
-        ]
+        begins = f"the check passes for what is at rest, and {moves}"
+        return float(moved[1]), [f"{moved[1]} by displacements, {by}", begins]
+    begins = f"{ratios} times the spectrum begins to move it"
+    then = f"if it moved, it could be displaced by {moved[1]} times the demand" if moved else ""
     _, only, assumed = outcome.partition(" only with ")
     only = f", passed only with {assumed}" if only else ", which it fails" * (least < 1.0)
-    return least, [f"{ratios}{over}{opened}{bodies}, {by}{only}", *begins]
+    return least, [f"{ratios}{over}{opened}{bodies}, {by}{only}", *[begins, then] * bool(moved)]
 
 
 # States that a search of scales finds, in the words of its outcome and of the conclusion
@@ -358,7 +360,7 @@ def _describe_scales(data: ReportData, rows: Sequence[Row]) -> Iterator[tuple[fl
         return
     least, first, row = made[0]
     words = f"{row[3]} on {row[1]}{', which it fails' * (least < 1.0)}"
-    words += f", the least of {len(made)} motions" * (len(made) > 1)
+    words += f", of {len(made)} motions" * (len(made) > 1)
     found = {name: _list_scaled(row[2]) for _, name, row in made}
     ends = [f"{_SCALED[state]} from {scale} on" for state, scale in found[first].items()]
     ends += [] if {"falls", "first mechanism"} & found[first].keys() else ["falls in no run"]

@@ -423,7 +423,8 @@ def _build_single_changes(found: VerdictRange, pair: str) -> list[Any]:
         {"largest displacement": ("case", [sizes[k] for k in order], {"units": "mm"})},
         {"case": [changes[k].name for k in order]},
     )
-    caption = f"Largest displacement by each single change{under}; a fall has none."
+    falls = "; a fall has none" * any(np.isnan(sizes))
+    caption = f"Largest displacement by each single change{under}{falls}."
     head = ("single change", "outcome", "largest displacement", "at the end")
     rows = [
         (each.name, each.outcome, *map(format_mm, (each.displacement, each.residual)))

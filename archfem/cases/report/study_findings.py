@@ -18,7 +18,8 @@ from archfem.view.pages.document import Grid
 
 # Findings that a report shows, those that decide first: of factors the least is the worst, and
 # those of a push are shown in g
-_FACTORS = ("push", "push_over_site", "factor", "without_pressure")
+OVER_SITE = "over the site's acceleration"
+_FACTORS = ("push", OVER_SITE, "factor", "without_pressure")
 _SIZES = ("residual_displacement", "largest_displacement")
 MAX_CASES = 24
 MAX_NAMES = 4  # of cases in a sentence
@@ -76,6 +77,8 @@ def read_study(data: ReportData) -> StudyFindings | None:
 def collect_findings(title: str, text: str, table: xr.Dataset) -> StudyFindings:
     """Return the worst point of each case of the table of a study."""
     table = table.drop_dims("entry", errors="ignore")
+    if "push_over_site" in table:
+        table = table.rename(push_over_site=OVER_SITE)
     frame = table.to_dataframe().reset_index()
     differing = [str(name) for name in table.coords if frame[name].nunique() > 1]
     keys = [name for name in differing if name not in _NO_CASE] or differing
@@ -150,9 +153,9 @@ def say_what_changes(found: StudyFindings) -> Iterator[str]:
     elif falling:
         yield text.removesuffix("; of the others ")
     # undefined without a demand
-    below = [row for row in rows if row.get("push_over_site", np.nan) < 1.0]
+    below = [row for row in rows if row.get(OVER_SITE, np.nan) < 1.0]
     if below:
-        listed = [f"{found.label(row)}, at {row['push_over_site']:.3g} of it" for row in below]
+        listed = [f"{found.label(row)}, at {row[OVER_SITE]:.3g} of it" for row in below]
         count = f"{len(below)} of {len(rows)} cases begin{'s' * (len(below) == 1)} to move"
         more = f" and {len(below) - MAX_NAMES} more" * (len(below) > MAX_NAMES)
         yield f"{count} below the site's acceleration: {'; '.join(listed[:MAX_NAMES])}{more}"
