@@ -435,7 +435,7 @@ class CollapseScale:
         if self.moves <= self.held:
             least = min(search.runs[0].scale for search in self.searches.values())
             met = f"a mechanism from {self.moves:#.3g} ×{' or less' * (self.moves == least)}, {met}"
-        steps = join_names([f"{1e3 * dt:g}" for dt in self._every])
+        steps = join_names([f"{1e3 * dt:g}" for dt in sorted(self._every, reverse=True)])
         varied = f"; varied were the scale and the time step ({steps} ms), and no property"
         return _say_bracket("stands", self.held, self.pga, met) + self._say_tested() + varied
 
