@@ -117,9 +117,9 @@ def follow_fall(
         resting = is_resting(model, state, shaken=ending is not Ending.FINISHED)
         resting = resting or swings_little(history)
         fall = replace(classify_collapse(structure, [frame], origin), resting=resting)
-    # throughout the last fifth; records change their sign there
-    size = np.abs(motion.horizontal)
-    held = bool(size[-len(size) // 5 :].min() > 0.5 * size.max())
+    # throughout the last fifth, in which a record changes its sign
+    push = motion.horizontal * np.sign(motion.horizontal[-1])
+    held = bool(push[-len(push) // 5 :].min() > 0.5 * np.abs(push).max())
     doubts += doubt_collapse(structure, fall, held)
     if fall.kind in FALLEN_STATES and whole:
         doubts += _doubt_joints(structure, motion, start.time)

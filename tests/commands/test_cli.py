@@ -90,6 +90,18 @@ def test_a_title_is_printed_as_far_as_the_terminal_has_letters(encoding, tmp_pat
     assert printed.startswith(expected[encoding])
 
 
+def test_check_leaves_a_search_of_minutes_to_limit(capsys):
+    """A linear programme is solved at once; a search without dilatancy takes minutes in walls."""
+    given = ["check", str(RING), "--set", "model.fidelity=rigid", "--set", "limit.horizontal=1.0"]
+    for friction, says in (
+        ("coulomb", "mechanism, at "),
+        ("nonassociated", "archfem limit` search"),
+    ):
+        assert af.commands.main([*given, "--set", f"limit.friction={friction}"]) == 0
+        said = capsys.readouterr().out
+        assert [says in line for line in said.splitlines() if "limit analysis: " in line] == [True]
+
+
 def test_check_command(capsys):
     assert af.commands.main(["check", str(RING), "--set", "model.fidelity=rigid"]) == 0
     said = capsys.readouterr().out

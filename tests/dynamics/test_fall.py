@@ -103,6 +103,19 @@ def test_a_fall_of_which_rigid_blocks_know_nothing_is_doubted(stiffness, push, d
     assert any("as rigid blocks none falls" in cause for cause in causes) == doubted
 
 
+@pytest.mark.parametrize(
+    ("last", "remedy"), [(0.7, "hold the push longer"), (-0.7, "motion.rest=10")]
+)
+def test_a_push_to_the_end_is_to_be_held_longer(last, remedy):
+    """A block slides at 0.7 g with μ = 0.6, and for a while when the ground turns."""
+    contact = af.Contact(1e9, 4e8, 0.6)
+    block = af.column(breadth=1.0, heights=[0.4], contact=contact)
+    ground = af.Motion(np.r_[np.full(60, 0.7 * G), np.full(3, last * G)], 0.01)
+    run = af.Analysis(block, fidelity="rigid", displacements="large", dt=2e-3).run(ground)
+    assert run.fall.kind == "dislocated"
+    assert [remedy in x.remedy for x in run.doubts if "still move" in x.cause] == [True]
+
+
 @pytest.mark.parametrize(("followed", "outcome"), [(0.2, "unknown"), (0.6, "fallen")])
 @pytest.mark.parametrize("whole", [True, False])
 def test_a_fall_that_cannot_be_followed_keeps_what_is_known(followed, outcome, whole, monkeypatch):
