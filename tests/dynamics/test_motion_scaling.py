@@ -337,7 +337,7 @@ def test_the_fall_of_steps_too_long_for_sliding_is_stated_and_bounds_nothing(mon
     low, high = min(given.bracket(dt).upper for dt in given.searches), given.longer[0.005]
     high = high["collapse"].upper
     assert f"the first fall from {low:#.3g} to {high:#.3g} ×: between" in doubt
-    assert "time step (5, 2.5, 3, 1.5 ms), and no property" in str(given)
+    assert "time step (5, 3, 2.5, 1.5 ms), and no property" in str(given)
     steps = [row[0] for row in given.rows()[1]]
     assert {*steps} == {"5 ms", "2.5 ms", "3 ms", "1.5 ms"}
     assert all(row[2] == "as given" for row in given.rows()[1])
