@@ -136,6 +136,16 @@ def test_a_push_is_no_margin_of_what_moves(case, outcomes, verified, moves):
     assert unshaken == [least, "shaken it may begin to move at less"]
 
 
+@pytest.mark.parametrize(("factor", "counts"), [("1.03", True), ("1.01", False)])
+def test_a_run_stronger_than_a_push_says_nothing_of_it(case, factor, counts):
+    """The run has 2 m/s², 1.02 times the 0.2 g of the site."""
+    data = data_of(case, a=verdict_of(verified="rocks"))
+    vars(data)["case"] = af.Case.of({**case.settings, "assessment": SPECTRUM})
+    rows = [("limit analysis", "the site's 0.2 g", "mechanism", factor)]
+    (text,) = conclusion._describe_margin(data, rows)
+    assert ("is no margin" in text) == counts
+
+
 @pytest.mark.parametrize("verified", ["rocks", None])
 def test_a_check_of_what_begins_to_move_is_one_of_displacements_where_it_moves(case, verified):
     data = data_of(case, a=verdict_of(verified=verified))

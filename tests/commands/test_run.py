@@ -290,7 +290,7 @@ motion = {{ file = "tap.txt", dt = 0.01, units = "m/s2" }}
     said = again.splitlines()[0].partition(": ")[2].partition(";")[0]
     assert f"Scale of the motion: {said}" in words  # the conclusion
     met = "falls" if runs else "forms a mechanism"
-    margin = rf"is {factor[1]} on 'tap', PGA [\d.]+ g(, which it fails)?: up to there it {met} in"
+    margin = rf"is {factor[1]} on 'tap', PGA [\d.]+ g(, which it fails)?\. It [^.]*.*?{met} from "
     assert re.search(margin, words)
     shown = words.split("Scale of the motion")[-1]  # the section
     assert ("at the scales [× the motion]" if runs else head) in shown
@@ -339,7 +339,8 @@ def test_scales_of_the_pairs_of_a_suite_stand_side_by_side(searched, tmp_path, c
     words = " ".join(read_page((out / "report.html").read_text(encoding="utf-8")).words)
     least = f"The least margin is {factors['strong']} on 'strong', PGA "
     assert least in words
-    assert "the least of 2 motions; 'middle' was not scaled." in words
+    assert ", of 2 motions. It moves as a mechanism from " in words.partition(least)[2]
+    assert " 'middle' was not scaled." in words
     for pair in ("strong", "weak"):
         assert f"Residual displacement under '{pair}' over the scale" in words
         assert f"Runs of the search under '{pair}'" in words
@@ -353,7 +354,7 @@ def test_scales_of_the_pairs_of_a_suite_stand_side_by_side(searched, tmp_path, c
     assert af.commands.main(["report", str(out)]) == 0
     words = " ".join(read_page((out / "report.html").read_text(encoding="utf-8")).words)
     assert least in words
-    assert "the least of 3 motions." in words
+    assert ", of 3 motions. It " in words
     assert "not scaled" not in words
     assert af.commands.main([*given, "--set", "materials.stone.unit_weight=21e3"]) in (0, 3)
     assert made[3:] == ["weak", "strong", "middle"]

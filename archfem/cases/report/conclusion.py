@@ -232,11 +232,9 @@ def _build_paragraphs(
     changes = [*_say_single_changes(data.verdict_ranges)]
     if (study := read_study(data)) is not None:
         changes += say_what_changes(study)
-    if fill := list_elastic_fill(data):
-        carries = "is elastic in the runs and carries tension, which soil does not"
-        changes.append(f"{join_names(fill)} {carries}")
-    if data.runs and not doubtful:
-        changes.append("the checks of the numbers raise no doubt")
+    if fill := join_names(list_elastic_fill(data)):
+        changes.append(f"{fill} is elastic in the runs and carries tension, which soil does not")
+    changes += ["the checks of the numbers raise no doubt"] * (bool(data.runs) and not doubtful)
     if doubtful:
         changes.append(f"the doubts below, on {join_names(doubtful)}, may change this")
     if single := list_unvaried(data):
@@ -263,16 +261,10 @@ def _describe_ranges(ranges: Sequence[VerdictRange]) -> Iterator[str]:
             for each in ranges
         ]
         yield f"in variations of its properties it falls {join_words(counts)}"
-    moved = {
-        float(np.nanmax(each.dataset["displacement"].values[~each.falls])): each
-        for each in ranges
-        if each.displacements
-    }
-    if moved:
-        far = moved[max(moved)]
-        motion = far.dataset.attrs.get("motion")
-        under = f"it moves farthest under '{motion}': " * (len(ranges) > 1)
-        yield under + far.displacements.partition(";")[0].replace("ments", "ments are", 1)
+    if moved := [each for each in ranges if each.displacements]:
+        far = max(moved, key=lambda x: np.nanmax(x.dataset["displacement"].values[~x.falls]))
+        most = f"it moves farthest under '{far.dataset.attrs.get('motion')}': " * (len(ranges) > 1)
+        yield most + far.displacements.partition(";")[0].replace("ments", "ments are", 1)
 
 
 def _say_single_changes(ranges: Sequence[VerdictRange]) -> Iterator[str]:
@@ -287,19 +279,22 @@ def _say_single_changes(ranges: Sequence[VerdictRange]) -> Iterator[str]:
 
 def _describe_margin(data: ReportData, rows: Sequence[Row]) -> Iterator[str]:
     """Yield the least factor on the demand of an earthquake, maybe as a range, and the others."""
-    moves, apart = _say_motion(data), list[str]()
+    apart = list[str]()
     margins, checks = list[tuple[float, list[str]]](), list[tuple[float, list[str]]]()
     for name, demand, outcome, factor in rows:
         check, pushed = name.partition("assessment: ")[2], name in PUSHES
         if factor == "-":
             if pushed and data.runs:  # without runs it is the answer
                 apart.append(f"{name}, beside no demand: {outcome.partition(';')[0]}")
-        elif check:
+            continue
+        least = float(factor.partition(" ")[0])
+        moves = _say_motion(data, least)
+        if check:
             checks.append(_describe_check(data, (check, outcome, factor), moves))
         elif pushed and demand.startswith("the site"):
             bound = "at most " * ("(" in factor)  # the least found, without proof that none is less
             over = " over what is assumed of the fill" * (" to " in factor)
-            least, size = float(factor.partition(" ")[0]), f"{bound}{factor}"
+            size = f"{bound}{factor}"
             of = " with elastic joints" if name == RESULTS["pushover"] else " as rigid blocks"
             of *= bool(bound) or name == RESULTS["pushover"]
             if moves and least >= 1.0:  # shaken it moves before
@@ -376,9 +371,14 @@ def _describe_scales(data: ReportData, rows: Sequence[Row]) -> Iterator[tuple[fl
     yield least, texts
 
 
-def _say_motion(data: ReportData) -> str:
-    """Say that a structure moves in a run, maybe without a fall; empty if it moves in none."""
-    verdicts = [run.verdict for run in data.runs.values()]
+def _say_motion(data: ReportData, factor: float) -> str:
+    """Say that a structure moves in a run no stronger than a multiple of the site's acceleration.
+
+    It is empty if it moves in none. Without a spectrum the runs are the demand.
+    """
+    push = np.nan_to_num(factor * _peak_of_spectrum(data), nan=np.inf)
+    runs = [run for run in data.runs.values() if _peak_of_ground(run) <= push]
+    verdicts = [run.verdict for run in runs]
     if not any(x.mechanisms.get("verified") or x.outcome in FALLEN_STATES for x in verdicts):
         return ""
     held = all(verdict.outcome in COLLAPSE_STATES[:2] for verdict in verdicts)
