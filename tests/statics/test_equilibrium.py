@@ -331,6 +331,16 @@ def test_two_arches_of_one_part_are_no_strays(tmp_path):
         af.masonry.find_ring(af.Case.read(case).structure)
 
 
+@pytest.mark.parametrize(
+    ("moved", "count"),
+    [({"WEST 1": "SLAB", "EAST 3": "SLAB"}, 2), ({"WEST 3": "RING", "EAST 1": "RING"}, 0)],
+)
+def test_courses_of_both_piers_are_judged_by_their_breadth_alone(tmp_path, moved, count):
+    """No pier has a course as high as those on the ground; rings may widen at both ends."""
+    structure = af.Case.read(draw_portal(tmp_path, moved)).structure
+    assert len(structure_doubts(structure)) == count
+
+
 def test_a_course_with_the_ring_above_a_footing_is_one_doubt(tmp_path):
     """The footing, hardly larger than that course, is no stone of the ring."""
 
