@@ -157,7 +157,8 @@ def find_misplaced(
         (a, b, _), away = faces[0], np.array([face for *_, face in faces])
         # a ring lies on piers, and a pier carries rings: neither is the other way round
         bed = (np.abs(away) if blocks[a].role == "pier" else away)[:, 1].max() > 0.5
-        if bed if blocks[b].role == "pier" else (away @ away.T).min() < -0.7:
+        others = np.array([face for key in touched if key[0] == piece for *_, face in touched[key]])
+        if bed if blocks[b].role == "pier" else (away @ others.T).min() < -0.7:
             beside = " or ".join(f"'{part}'" for other, part in touched if other == piece)
             found[a] = "apart from most others of it", beside
     return {

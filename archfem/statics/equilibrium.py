@@ -509,15 +509,16 @@ def _doubt_ends(structure: Structure) -> Iterator[Doubt]:
     for joint, support, free, outward in _free_faces(structure):
         block, stone = blocks[support], blocks[free]
         size = np.ptp(block.points, axis=0)
-        # one that has the part of the ring or pier is fixed on purpose, not by its layer
-        if support not in behind or joint.role == "other" or block.part == joint.part:
+        if support not in behind or joint.role == "other" or free in structure.misplaced:
             continue
         like = block.area <= 1.5 * stone.area
         if joint.role == "pier":  # footings project
             below = heights[behind[support]] < block.points[:, 1].min()
             like = below and outward[1] > 0.5 and size[0] <= 1.05 * joint.depth
         courses = (b for b in blocks if b.role == "pier" and not b.fixed)
-        if like or any(np.allclose(np.ptp(b.points, axis=0), size, rtol=0.03) for b in courses):
+        like = like or any(np.allclose(np.ptp(b.points, axis=0), size, rtol=0.03) for b in courses)
+        # one that has the part of the ring or pier is fixed on purpose, not by its layer
+        if like and block.part != joint.part:
             beside = f"'{blocks[behind[support]].name}'"
             yield Doubt(
                 f"'{block.name}' at {say_place(as_point(block.centroid))} m "

@@ -331,6 +331,48 @@ def test_two_arches_of_one_part_are_no_strays(tmp_path):
         af.masonry.find_ring(af.Case.read(case).structure)
 
 
+@pytest.mark.parametrize(
+    ("moved", "count"),
+    [({"WEST 1": "SLAB", "EAST 3": "SLAB"}, 2), ({"WEST 3": "RING", "EAST 1": "RING"}, 0)],
+)
+def test_courses_of_both_piers_are_judged_by_their_breadth_alone(tmp_path, moved, count):
+    """No pier has a course as high as those on the ground; rings may widen at both ends."""
+    structure = af.Case.read(draw_portal(tmp_path, moved)).structure
+    assert len(structure_doubts(structure)) == count
+
+
+def test_a_course_with_the_ring_above_a_footing_is_one_doubt(tmp_path):
+    """The footing, hardly larger than that course, is no stone of the ring."""
+
+    def narrow(stones):
+        lay_footings(stones)
+        stones["SLAB 2"][:2, 1] += 120.0
+        stones["SLAB 3"][:2, 1] += 120.0
+        stones["SLAB 1"] += [0.0, 120.0]
+
+    case = draw_portal(tmp_path, {"WEST 1": "RING"}, change=narrow)
+    (doubt,) = structure_doubts(af.Case.read(case).structure)
+    assert doubt.cause.startswith("'RING 1' at (-1.600, ")
+
+
+@pytest.mark.parametrize(("moved", "kind"), [("RING 11 2", "SPAN"), ("RING 5 2", "SPAN")])
+def test_a_voussoir_with_the_ring_of_another_span_is_a_doubt(tmp_path, moved, kind):
+    """Two spans that share no pier, as of two rings on one layer each."""
+
+    def repeat(stones):
+        for name in [name for name in stones if not name.startswith("SLAB")]:
+            stones[f"{name} 2"] = stones[name] + [4000.0, 0.0]
+        stones["SLAB 1"][1:3, 0] += 4000.0
+
+    second = {f"RING {k} 2": kind for k in range(1, 12)}
+    case = draw_portal(tmp_path, second | {moved: "RING"}, change=repeat)
+    ring = 'RING = { part = "arch", role = "ring" }'
+    case.write_text(case.read_text().replace(ring, f'{ring}\n{kind} = {{ role = "ring" }}'))
+    (doubt,) = structure_doubts(af.Case.read(case).structure)
+    assert doubt.cause.startswith("'RING 12' at (")
+    assert f"it may be one of '{kind}'" in doubt.cause
+
+
 @pytest.mark.parametrize("angle", [2.0, -2.0])
 def test_a_drawing_that_is_turned_is_a_doubt(tmp_path, angle):
     case = draw_portal(tmp_path, change=lambda stones: turn(stones, angle))
