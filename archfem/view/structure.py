@@ -53,6 +53,7 @@ from archfem.view.style import (
     limit_width,
     new_figure,
     outline_bounds,
+    panel_grid,
     set_title,
     structure_axes,
     structure_figure,
@@ -491,7 +492,7 @@ def draw_critical(structure: Structure, run: History, model: Model | None = None
         return draw_during(structure, run, joints, model)
     low, high = outline_bounds(structure)
     # side by side, unless they would be less than half as high as wide
-    rows, columns = (1, 2) if 2.0 * (high - low)[1] > (high - low)[0] else (2, 1)
+    rows, columns = panel_grid(2) if 2.0 * (high - low)[1] > (high - low)[0] else (2, 1)
     with limit_width(25.4 * Size.PAGE / columns):
         size = structure_figure(structure).get_size_inches()
         figure = new_figure(*size)

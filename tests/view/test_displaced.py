@@ -82,6 +82,8 @@ def test_the_largest_displacement_is_kept_without_fields():
 def test_a_run_without_fields_is_drawn_at_its_largest_displacement():
     stones = af.column(breadth=0.4, heights=[0.8, 0.8])
     _, run = shake(stones, af.Motion.synthetic(seed=3, duration=2.0, pga=2.5))
+    with af.view.limit_width(85.0):
+        assert len(draw_critical(stones, run).axes) == 2
     figure = draw_critical(stones, run)
     assert len(figure.axes) == 2
     title = " ".join(figure.axes[1].get_title().split())

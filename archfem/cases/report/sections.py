@@ -181,6 +181,8 @@ def build_structure_section(data: ReportData) -> Section:
         TextBlock(extent),
         *_describe_drawing(data),
         _tabulate_parts(structure),
+        # tables stand before figures, which leave room where they move to the next page
+        *([] if data.dead is None else [_tabulate_dead_load(data.dead)]),
     ]
     beside = data.dead is not None and drawn[0] < MAX_SLENDERNESS * drawn[1]
     with limit_width(HALF_WIDTH) if beside else nullcontext():
@@ -196,8 +198,6 @@ def build_structure_section(data: ReportData) -> Section:
         blocks.append(replace(FigureBlock.of(figure, caption), beside=beside))
     if data.dead is None:
         blocks += data.read_figure("dead.png", _THRUST)
-    else:
-        blocks.append(_tabulate_dead_load(data.dead))
     caption = "Principal compression under dead load."
     blocks += data.read_result("dead_stress", caption, table="Largest stresses of each part")
     caption = "A block cut free: forces on it, and their closing."
@@ -311,7 +311,7 @@ def _build_assessment(data: ReportData) -> list[Any]:
     if "all else is under one assumption: " in text:
         caption = f"{caption[:-1]}, under the assumption on the fill that has the least margin."
     figures = [figure for name in names for figure in data.read_figure(name, caption)]
-    return [TextBlock("\n\n".join(texts), "lines"), *figures, _define_assessment(data)]
+    return [TextBlock("\n\n".join(texts), "lines"), _define_assessment(data), *figures]
 
 
 def _define_assessment(data: ReportData) -> Grid:
@@ -361,7 +361,7 @@ def _build_search(data: ReportData, name: str, pair: str) -> list[Any]:
     head = ("time step", "the structure", "at the scales [× the motion]")
     text = blocks[0].text.rpartition("\n\n")[0]
     table = Grid(head, rows, f"Runs of the search{under}", "words")
-    return [TextBlock(text, "lines"), *blocks[1:], table]
+    return [TextBlock(text, "lines"), table, *blocks[1:]]
 
 
 def _build_study(data: ReportData) -> list[Any]:
