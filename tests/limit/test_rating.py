@@ -135,7 +135,7 @@ def test_a_strength_that_is_not_given_is_stated_by_hand():
     expected = float(roots.max())
     assert found.crushing == pytest.approx(expected, rel=1e-4)  # by tangents
     assert found.crushing < 0.995 * found.factor
-    words = f"counts; at 5 MPa the least factor is {expected:.4g}"
+    words = f"(56 MPa of the preset is not given); at 5 MPa the least factor is {expected:.4g}"
     assert words in str(found)
     given = af.rate(stone, axle, width=2.0, strength=5e6)
     assert given.factor == pytest.approx(expected, rel=1e-4)

@@ -520,7 +520,7 @@ def list_doubts(data: ReportData) -> list[tuple[str, str]]:
     verdicts = [run.verdict for run in data.runs.values()]
     doubts = [(_HISTORIES, text) for text in _merge_doubts([v.doubts for v in verdicts])]
     for found in data.verdict_ranges:
-        under = f"under '{found.dataset.attrs['motion']}': " * (len(data.verdict_ranges) > 1)
+        under = f"under '{found.dataset.attrs.get('motion')}': " * (len(data.verdict_ranges) > 1)
         doubts += [(_VARIATIONS, text) for text in _doubt_displacement(data, found)]
         doubts += [(_VARIATIONS, f"{under}{doubt.cause}") for doubt in found.doubts]
     if data.verdict_ranges and (fill := list_elastic_fill(data)):
