@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from archfem._typing import Array
 from archfem._validation import check_number
-from archfem.errors import InvalidInput, logger
-from archfem.masonry.block import Block, check_simple, triangulate_polygon
+from archfem.errors import InvalidInput, InvalidStructure, logger
+from archfem.masonry.block import Block, triangulate_polygon
 from archfem.masonry.stiffness_ratio import find_soft_blocks
 from archfem.masonry.structure import CONTACT_TOLERANCE, Structure
 
@@ -298,10 +298,16 @@ def drop_straight_vertices(points: Array, straight: float = 1e-7) -> Array:
 
 def split_convex(points: Array) -> list[Piece]:
     """Split an outline into convex pieces, as numbers of its vertices, anticlockwise."""
+    import shapely
+
     outline = tuple(range(len(points)))
     if _is_convex(points, outline):
         return [outline]
-    check_simple(points, "a block that falls")
+    if not shapely.Polygon(points).is_valid:
+        raise InvalidStructure(
+            f"an outline of {len(points)} vertices near {points[0]} crosses itself: "
+            "correct it there"
+        )
     pieces: list[Piece] = [tuple(corners) for corners in triangulate_polygon(points).tolist()]
     while (merged := _merge_two(points, pieces)) is not None:
         pieces = merged
