@@ -168,6 +168,7 @@ def test_a_search_of_a_fall_has_one_facet_of_fill_on_each_stone(footbridge, monk
     )
     motion, seen = af.Motion(np.array([0.0, 1.0, 0.0]), dt=0.01), []
     monkeypatch.setattr(History, "doubts", ())
+    monkeypatch.setattr(History, "mechanisms", {})
 
     def slide(model, *_, **__):
         seen.append(model.size)

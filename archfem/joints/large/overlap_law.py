@@ -333,7 +333,9 @@ def _sum_points(law, segment, ends, overlap, lag, memory):  # type: ignore
         sums = add_pressure(sums, share, (x0, x1), pressed)
         # shear of the point, or of both ends of the facet
         (near, far), (k00, k01, k11) = friction_limits(law, point, segment, pressed, lagged, lag)
-        is_free = near == 0.0 and far == 0.0 and contact.resistance == 0.0
+        # faces that touch without pressure stick: without that a first tangent would be singular
+        touches = min(lagged) == 0.0 == max(lagged)
+        is_free = near == 0.0 and far == 0.0 and contact.resistance == 0.0 and not touches
         for end in range(stride):
             if is_free:
                 lost += _follow_free_point(law, point + end, measures, memory)
