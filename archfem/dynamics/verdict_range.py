@@ -61,6 +61,17 @@ class VerdictRange(ResultDisplay):
         return np.asarray(self.dataset["outcome"].values == COLLAPSE_STATES[1])
 
     @property
+    def decisive(self) -> NDArray[np.bool_]:
+        """Whether the structure falls; where it never does, whether it is dislocated (runs,)."""
+        return self.dislocated if self.is_dislocation_worst else self.falls
+
+    @property
+    def is_dislocation_worst(self) -> bool:
+        """Whether the structure is dislocated in some answered runs, and falls in none."""
+        falls, parted = (x[self.answered].any() for x in (self.falls, self.dislocated))
+        return bool(parted and not falls)
+
+    @property
     def answered(self) -> NDArray[np.bool_]:
         """Whether a run has an answer (runs,)."""
         return self.dataset["error"].values == ""
@@ -98,7 +109,7 @@ class VerdictRange(ResultDisplay):
     def importance(self) -> dict[str, float]:
         """Return the share of the variance of the outcomes that each property explains [-].
 
-        An outcome is 1 for a fall and 0 without; where all or none fall, it is the rank of a run by
+        An outcome is 1 where `decisive`, else 0; where all or none are, it is the rank of a run by
         its residual displacement. The share is the correlation ratio, numbers in three parts of
         their range (a first-order index of sensitivity; Saltelli and others, Global Sensitivity
         Analysis, 2008, section 1.2.6).
@@ -106,8 +117,8 @@ class VerdictRange(ResultDisplay):
         Returns:
             By property, in descending order; chance alone explains about 2 / runs.
         """
-        falls = self.falls[self.answered]
-        outcomes = falls.astype(float) if self.is_mixed else self._residual_ranks()
+        decisive = self.decisive[self.answered]
+        outcomes = decisive.astype(float) if self.is_mixed else self._residual_ranks()
         shares = {
             name: _correlation_ratio(self.dataset[name].values[self.answered], outcomes)
             for name in self.properties
@@ -116,8 +127,8 @@ class VerdictRange(ResultDisplay):
 
     @property
     def is_mixed(self) -> bool:
-        """Whether some runs fall, and others do not."""
-        return len(np.unique(self.falls[self.answered])) > 1
+        """Whether some runs are decisive, and others are not."""
+        return len(np.unique(self.decisive[self.answered])) > 1
 
     def _residual_ranks(self) -> Array:
         """Return the rank of each answered run by its residual displacement (runs,)."""
@@ -135,8 +146,8 @@ class VerdictRange(ResultDisplay):
     def count(self) -> str:
         """How often the structure falls, and is dislocated."""
         falls, parted = (each[self.answered].sum() for each in (self.falls, self.dislocated))
-        also = f", dislocated in {parted}" if parted else ""
-        return f"falls in {falls}{also} of {self.answered.sum()}"
+        also = f" and is dislocated in {parted}" if parted else ""
+        return f"falls in {falls or 'none'} of {self.answered.sum()} variations{also}"
 
     @property
     def displacements(self) -> str:
@@ -169,7 +180,11 @@ class VerdictRange(ResultDisplay):
             words = [_name_change(name, run[name].item()) for name in changed] or [UNVARIED]
             numbers = float(run["displacement"]), float(run["residual"])
             changes.append(SingleChange(words[0], str(run["outcome"].item()), *numbers))
-        return sorted(changes, key=lambda each: (-each.rank, -each.displacement))
+        return sorted(changes, key=lambda each: (-each.rank, -self.measure(each)))
+
+    def measure(self, change: "SingleChange") -> float:
+        """Return the displacement of a change that governs: the residual for a dislocation [m]."""
+        return change.residual if self.is_dislocation_worst else change.displacement
 
     @property
     def what_changes(self) -> list[str]:
@@ -188,16 +203,22 @@ class VerdictRange(ResultDisplay):
             )
             return [f"unvaried it falls, and {few}"]
         names = f"{len(fallen)} {count}: {join_names([each.name for each in fallen])}"
-        clauses = [f"it falls with {names if fallen else f'none {count}'}"]
         parted = [each.name for each in held if each.rank > given.rank]
+        neither = "is dislocated or " * (self.is_dislocation_worst and not parted)
+        clauses = [f"it {neither}falls with {names if fallen else f'none {count}'}"]
         if parted:
             clauses.append(f"it is dislocated with {len(parted)}: {join_names(parted)}")
-        moved = sorted(held, key=lambda each: -each.displacement)[:2]
-        far = MAX_RATIO_OF_DISPLACEMENTS * given.displacement
-        larger = [each for each in moved if each.displacement > far] or moved[:1]
-        listed = [f"{format_mm(each.displacement)} with {each.name}" for each in larger]
-        own = f"unvaried it is displaced by {format_mm(given.displacement)}"
-        return [*clauses, ", by ".join([own, *listed])]
+        return [*clauses, self._compare_displacements(given, held)]
+
+    def _compare_displacements(self, given: "SingleChange", held: "list[SingleChange]") -> str:
+        """Say how far the unvaried structure is displaced, and with which changes farthest."""
+        moved = sorted(held, key=lambda each: -self.measure(each))[:2]
+        far = MAX_RATIO_OF_DISPLACEMENTS * self.measure(given)
+        larger = [each for each in moved if self.measure(each) > far] or moved[:1]
+        listed = [f"{format_mm(self.measure(each))} with {each.name}" for each in larger]
+        verb = "remains" if self.is_dislocation_worst else "is"
+        own = f"unvaried it {verb} displaced by {format_mm(self.measure(given))}"
+        return ", by ".join([own, *listed])
 
     @property
     def unanswered(self) -> str:
@@ -211,46 +232,53 @@ class VerdictRange(ResultDisplay):
         if not (self.answered & self.dataset["sampled"].values).any():
             errors = [error for error in self.dataset["error"].values if error]
             return f"{len(errors)} of {len(self.answered)} runs have no answer: {errors[0]}"
-        text = self.headline + self._count_groups()
+        text = f"{self.headline}; {self.groups}"
         text += f", under '{motion}' alone" if (motion := self.dataset.attrs.get("motion")) else ""
         return text + self.unanswered
 
     @property
     def headline(self) -> str:
         """How often the structure falls, and where, without the falls among sampled runs."""
-        return f"{self.count}: {self._where}" if self.is_mixed else self.count
+        return f"{self.count}: {self.where}" if self.is_mixed else self.count
 
-    def _count_groups(self) -> str:
-        """Return the falls of runs that vary one property, and of the sample with its interval."""
-        falls, sampled = self.falls, self.dataset["sampled"].values
-        words, (low, high) = [], self.interval()
+    @property
+    def groups(self) -> str:
+        """Decisive runs of those that vary one property, and of the sample, with its interval."""
+        sampled, (low, high) = self.dataset["sampled"].values, self.interval()
+        words = []
         for name, group in ("one property", ~sampled), ("all", sampled):
             if own := int((self.answered & group).sum()):
-                fallen = int(falls[self.answered & group].sum())
-                words.append(f"{fallen} of the {own} that vary {name}")
-        return f"; {', '.join(words)} ({low:.0%} to {high:.0%} at 95%)"
+                count = int(self.decisive[self.answered & group].sum())
+                words.append(f"{count} of the {own} that vary {name}")
+        share = f"{low:.0%} to {high:.0%} at 95%"
+        if self.is_dislocation_worst:
+            return f"{', '.join(words)}; share of falls {share}"
+        return f"{', '.join(words)} ({share})"
 
     @cached_property
-    def _where(self) -> str:
-        """The one or two conditions that separate runs that fall from others by more than chance.
+    def where(self) -> str:
+        """The one or two conditions that separate decisive runs from others by more than chance.
 
         They are tested by sampled runs: those of single changes share all other properties.
         """
-        rows, falls, conditions = self.answers, self.falls[self.answered], list[str]()
-        chosen = np.ones(len(falls), dtype=bool)
+        rows, decisive = self.answers, self.decisive[self.answered]
+        chosen, conditions = np.ones(len(decisive), dtype=bool), list[str]()
         for _ in range(2):
             tested = chosen & rows["sampled"].values
             among = rows.isel(run=np.flatnonzero(tested))
-            best = _find_condition(among, self.properties, falls[tested])
+            best = _find_condition(among, self.properties, decisive[tested])
             if best is None:
                 break
             conditions.append(self._condition_text(best))
             chosen &= best.holds(rows)
+        runs, verb = (
+            ("dislocations", "are dislocated") if self.is_dislocation_worst else ("falls", "fall")
+        )
         if not conditions:
-            return "no property separates falls from the others by more than chance"
-        inside, where = int(falls[chosen].sum()), " and ".join(conditions)
-        which = "all falls" if inside == falls.sum() else f"{inside} of the falls"
-        return f"{which} with {where}, where {inside} of {int(chosen.sum())} fall"
+            return f"no property separates {runs} from the others by more than chance"
+        inside, where = int(decisive[chosen].sum()), " and ".join(conditions)
+        which = f"all {runs}" if inside == decisive.sum() else f"{inside} of the {runs}"
+        return f"{which} are with {where}, where {inside} of {int(chosen.sum())} {verb}"
 
     def _condition_text(self, condition: "Condition") -> str:
         """Return a condition in words, with joint stiffness in MPa/mm rather than as a factor."""
@@ -285,19 +313,20 @@ class VerdictRange(ResultDisplay):
         return cls(read_dataset(path, "file of a verdict's range"))
 
     def table(self) -> str:
-        """Return falls by value, and what each property explains of them if some fall."""
-        falls, rows = self.falls[self.answered], []
+        """Return falls, or else dislocations, by value, and what each property explains of them."""
+        decisive, rows = self.decisive[self.answered], []
         data = self.answers
         for name, share in self.importance().items():
             groups = _group_values(data[name].values)
             cells = [
-                f"{label}: {int(falls[chosen].sum())} of {int(chosen.sum())}"
+                f"{label}: {int(decisive[chosen].sum())} of {int(chosen.sum())}"
                 for label, chosen in groups
             ]
             explained = [f"{share:.0%}"] if self.is_mixed else []
             rows.append([property_text(name), *explained, ", ".join(cells)])
-        head = ["explains, of the variance of fall or none"] if self.is_mixed else []
-        return align_columns(["property", *head, "falls"], rows)
+        head = ["explains, of the variance of the outcome"] if self.is_mixed else []
+        counted = "dislocated" if self.is_dislocation_worst else "falls"
+        return align_columns(["property", *head, counted], rows)
 
     def __str__(self) -> str:
         """Sentence, doubts, displacements, and a line for each property."""

@@ -553,7 +553,7 @@ def draw_verdict_range(verdicts: VerdictRange) -> Figure:
     add_legend_below(figure, 3, handles=panels[0].get_legend_handles_labels()[0])
     text = verdicts.headline
     if verdicts.is_mixed:
-        text += "; shares are of the variance of fall or none"
+        text += "; shares are of the variance of the outcome"
     set_figure_title(figure, text)
     return figure
 

@@ -8,7 +8,7 @@ import xarray as xr
 
 import archfem as af
 from archfem.cases import result_text
-from archfem.cases.report import conclusion, sections
+from archfem.cases.report import conclusion, doubts, sections
 from archfem.cases.report.report_data import ReportData
 from archfem.dynamics import VerdictRange
 from archfem.models.model import Doubt
@@ -76,13 +76,13 @@ def test_equal_doubts_of_runs_are_one_with_the_range_of_its_numbers(case):
     )
     every = {"a": [one], "b": [two], "c": [three, Doubt("it turns", "")]}
     data = data_of(case, **{name: verdict_of(doubts=each) for name, each in every.items()})
-    assert [text for _, text in conclusion.list_doubts(data)] == [
+    assert [text for _, text in doubts.list_doubts(data)] == [
         "2 of 3 runs: rigid differs by 0.092 to 0.1 in |e|, of joint 4 by 8 to 12 mm",
         "1 of 3 runs: rigid differs by 0.053 in |e|, of joint 5 by 9 mm",
         "1 of 3 runs: it turns",
     ]
     alone = data_of(case, a=verdict_of(doubts=[one]))
-    assert [text for _, text in conclusion.list_doubts(alone)] == [one.cause]
+    assert [text for _, text in doubts.list_doubts(alone)] == [one.cause]
 
 
 def test_the_weightiest_doubts_of_a_result_are_not_folded_away(case):
@@ -96,7 +96,7 @@ def test_the_weightiest_doubts_of_a_result_are_not_folded_away(case):
     )
     assert text == (
         "In doubt, time histories: Blocks fall, and as rigid blocks none falls. Joints let it "
-        "fall. A corner was displaced by 3 mm. 3 more stand with the result."
+        "fall. A corner was displaced by 3 mm. 3 more: see section 'Response'."
     )
 
 
@@ -123,14 +123,14 @@ def test_a_push_is_no_margin_of_what_moves(case, outcomes, verified, moves):
             for size, body in bodies.items()
         ]
     else:
-        ranks = dict(zip(bodies, ("the next is", "the least margin is"), strict=True))
         expected = [
-            f"{ranks[size]} {size}, for a push by the site's 0.2 g to begin to move it {body}"
-            for size, body in reversed(bodies.items())
+            f"a push begins to move it {body} at {size} times the site's 0.2 g, "
+            "which is no collapse"
+            for size, body in bodies.items()
         ]
     assert [*conclusion._describe_margin(data, rows)] == expected
     rows[:] = [("limit analysis", "the site's 0.2 g", "mechanism", "0.9")]
-    least = "the least margin is 0.9, for a push by the site's 0.2 g to begin to move it"
+    least = "a push begins to move it at 0.9 times the site's 0.2 g, which is no collapse"
     assert [*conclusion._describe_margin(data, rows)] == [least, *filter(None, [moves])]
     unshaken = [*conclusion._describe_margin(data_of(case), rows)]
     assert unshaken == [least, "shaken it may begin to move at less"]
@@ -199,25 +199,95 @@ def test_the_margin_of_scales_ends_where_it_is_dislocated(case):
     assert [*conclusion._describe_margin(data, rows)][1] == "it falls in no run"
 
 
+def test_the_answer_has_displacements_the_first_fall_and_the_checks(case):
+    """First falls are of all motions and time steps, on page 1 in one range; bounds decide none."""
+    falls = {
+        "a": "a mechanism from 0.5 × or less, falls at 0.34 g (1.30 × the motion)",
+        "b": "falls at 0.4 g (1.41 × the motion), the other time step first falls at 1.51 ×",
+    }
+    result, holds = "scale of the motion", "stands at 0.3 g (1.1 × the motion)"
+    rows = [(result, f"'{name}', PGA 0.2 g", f"{holds}, {x}", "1.1") for name, x in falls.items()]
+    steps = "its time steps find the first fall from"
+    rigid = "blocks fall, and as rigid blocks none falls"
+    loose = f"at 1.30 × by 2 ms (likewise at 1.38 × by 1 ms): {rigid}"
+    scaled = [f"under 'a': {steps} 1.30 to 1.38 ×: between 1.27 and 1.30 × by 5 ms"]
+    scaled += [f"under 'b': {steps} 1.41 to 1.51 ×: between 1.38 and 1.41 × by 5 ms"]
+    scaled += [f"under '{name}': {loose}" for name in "ab"]
+    check = (
+        "assessment: damage, right and left",
+        "0.09 m",
+        "0.06 m, fails",
+        "0.592 (0.488 bodies)",
+    )
+    data = data_of(case, a=verdict_of(displacement=0.06), b=verdict_of(displacement=0.08))
+    bound = "the curve is an upper bound"
+    vars(data)["statements"] = {
+        "assessment": result_text.Statement([], [check], [bound]),
+        "scale": result_text.Statement([], rows, scaled),
+    }
+    answer = (
+        "moves by 60 to 80 mm, first falls at 1.30 × the motion (1.30 to 1.51 over motions and "
+        "time steps); the displacement check of damage is not met (0.488 to 0.592 × the spectrum)"
+    )
+    facts = dict(conclusion.list_facts(data))
+    assert facts["verdict"] == f"stands under 2 of 2 motions, {answer}"
+    assert facts["in doubt"] == "scale of the motion"
+    pieces = conclusion.build_conclusion(data).pieces
+    assert pieces[0].text == f"The structure stands under all 2 motions of PGA 0.20 g, {answer}."
+    texts = [getattr(piece, "text", "") for piece in pieces]
+    assert f"In doubt, kinematic assessment: T{bound[1:]}." in texts
+    assert (
+        "In doubt, scale of the motion: Under 'a' and 'b': blocks fall, and as rigid blocks none "
+        "falls. Under 'a' and 'b' it first falls between 1.30 and 1.51 × over its time steps."
+    ) in texts
+    assert any("The doubts below, on scale of the motion, may change this." in x for x in texts)
+    passed = (
+        "assessment: damage, right",
+        "0.09 m",
+        "0.1 m, passes",
+        "1.1 (0.842 by displacements)",
+    )
+    data.statements["assessment"] = result_text.Statement([], [passed], [bound])
+    facts = dict(conclusion.list_facts(data))
+    rested = "the displacement check of damage, right is met at rest (0.842 by displacements)"
+    assert facts["verdict"].endswith(rested)
+    assert facts["in doubt"] == "kinematic assessment, scale of the motion"
+
+
+def test_of_unequal_outcomes_the_worst_is_the_first(case):
+    every = {"a": verdict_of(), "b": verdict_of("dislocated", 0.2), "c": verdict_of("fallen")}
+    data = data_of(case, range_of(0.1, 0.1), **every)
+    text = (
+        "falls under 1, stands dislocated under 1, stands under 1 of 3 motions, moves by 100 to 200"
+    )
+    assert dict(conclusion.list_facts(data))["verdict"] == f"{text} mm"
+    data.verdict_ranges[0].dataset["outcome"] = "run", np.array(["stands", "dislocated"])
+    varied = "falls in none of 2 variations and is dislocated in 1"
+    assert dict(conclusion.list_facts(data))["verdict"] == f"{text} mm; {varied}"
+    text = conclusion.build_conclusion(data).pieces[0].text
+    assert text.startswith("The structure falls under 1 of 3 motions of PGA 0.20 g: c; it stands d")
+    assert "0.20 g: a; it moves by 100 to 200 mm. Under 'first' it falls in none of 2 var" in text
+
+
 def test_doubts_of_several_motions_are_one(case):
     """With ranges of a few numbers, else in the numbers of the first; others stay as they are."""
-    doubts = [
+    given = [
         ("scale", f"under '{name}': at {scale} × by 2 ms: joints let it fall")
         for name, scale in (("a", "1.48"), ("b", "2.18"))
     ]
-    doubts += [
+    given += [
         ("scale", f"under '{name}': it falls between {low} and {low}1 ×, by 1 ms from {low}2 ×")
         for name, low in (("a", "1.4"), ("b", "2.4"), ("c", "1.7"))
     ]
-    doubts += [("risk", "it errs by 1.5 %"), ("risk", "it errs by 2.5 %")]
-    assert [*conclusion._merge_motions(doubts)] == [
+    given += [("risk", "it errs by 1.5 %"), ("risk", "it errs by 2.5 %")]
+    assert [*doubts._merge_motions(given)] == [
         ("scale", "under 'a' and 'b': at 1.48 to 2.18 × by 2 ms: joints let it fall"),
         (
             "scale",
             "under 'a': it falls between 1.4 and 1.41 ×, by 1 ms from 1.42 ×; likewise under 'b' "
             "and 'c'",
         ),
-        *doubts[-2:],
+        *given[-2:],
     ]
 
 
@@ -235,17 +305,17 @@ def test_a_displacement_has_the_range_of_its_time_steps_and_single_changes_are_s
     )
     same = "it falls with none of 1 single changes"
     moved = "unvaried it is displaced by 20 mm, by 120 mm with half the time step"
-    assert [*conclusion._say_single_changes(ranges)] == [
+    assert [*conclusion._say_causes(ranges)] == [
         f"under 'a' and 'b': {same}",
         f"under 'a' and 'b': {moved}",
     ]
-    assert [*conclusion._say_single_changes(ranges[:1])] == [same, moved]
-    assert next(conclusion._describe_ranges(ranges)) == (
-        "in variations of its properties it falls in 0 of 3 under 'a' and in 0 of 3 under 'b'"
-    )
+    assert [*conclusion._say_causes(ranges[:1])] == [same, moved]
+    assert [*conclusion._describe_ranges(ranges)][:2] == [
+        f"under '{motion}' it falls in none of 3 variations" for motion in "ab"
+    ]
 
 
-def test_single_changes_are_drawn_and_tabulated_the_worst_first():
+def test_single_changes_are_drawn_and_tabulated_the_worst_first(case):
     """The bar of a fall would hide the others; where all are alike there is no picture."""
     found = range_of(0.02, 0.12, 9.0)
     found.dataset["sampled"][:] = False
@@ -253,7 +323,7 @@ def test_single_changes_are_drawn_and_tabulated_the_worst_first():
     found.dataset["sign"] = "run", np.array(["as given", "as given", "reversed"])
     found.dataset.attrs["properties"] = ["dt", "sign"]
     found.dataset["outcome"] = "run", np.array(["stands", "stands", "fallen"])
-    figure, table = sections._build_single_changes(found, "a")
+    figure, table = sections._build_single_changes(data_of(case), found, "a")
     assert [row[:2] for row in table.rows] == [
         ("motion reversed", "fallen"),
         ("half the time step", "stands"),
@@ -264,9 +334,21 @@ def test_single_changes_are_drawn_and_tabulated_the_worst_first():
     assert [bar.get_width() for bar in axes.patches] == pytest.approx(
         [20.0, np.nan, 120.0], nan_ok=True
     )
+    found.dataset["outcome"] = "run", np.array(["stands", "stands", "dislocated"])
+    found.dataset["residual"] = "run", np.array([0.01, 0.03, 0.06])
+    figure, table = sections._build_single_changes(data_of(case), found, "a")
+    (axes,) = figure.figure.axes
+    assert [bar.get_width() for bar in axes.patches] == pytest.approx([10.0, 60.0, 30.0])
+    limits = [x.get_xdata()[0] for x in axes.get_lines() if x.get_linestyle() == "-"]
+    assert limits == pytest.approx([50.0])  # a tenth of the column's breadth
+    assert figure.caption.endswith("'a'; beyond the line, 50 mm, it counts as dislocated.")
+    assert "by the residual displacement, the worst first" in table.caption
+    found.dataset["outcome"][2] = "fallen"
     found.dataset["displacement"][:] = 0.02
-    assert [each.kind for each in sections._build_single_changes(found, "")] == ["grid"]
-    assert sections._build_single_changes(range_of(0.1, 0.1, sampled=True), "") == []
+    assert [each.kind for each in sections._build_single_changes(data_of(case), found, "")] == [
+        "grid"
+    ]
+    assert sections._build_single_changes(data_of(case), range_of(0.1, sampled=True), "") == []
 
 
 @pytest.mark.parametrize(
@@ -284,7 +366,7 @@ def test_single_changes_are_drawn_and_tabulated_the_worst_first():
 )
 def test_a_run_and_its_unvaried_variation_may_differ_by_half(case, found, says):
     data = data_of(case, found, first=verdict_of(displacement=0.109))
-    texts = [text for result, text in conclusion.list_doubts(data) if result == "variations"]
+    texts = [text for result, text in doubts.list_doubts(data) if result == "variations"]
     assert len(texts) == (says != "")
     assert says in "".join(texts)
 

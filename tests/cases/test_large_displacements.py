@@ -131,12 +131,12 @@ def test_a_range_in_the_folder_stands_in_place_of_what_a_run_cannot_know(held):
     assert summarise_outcomes(data, [held]) == "stands; falls in 1 of 4 variations"
     lead, changes = sentences_of(data)
     # the share alone would be surer than four runs are: beta.ppf(0.975, 2, 3)
-    assert " In variations of its properties it falls in 1 of 4: no property" in lead
-    assert " It does so in 1 of the 4 that vary all (1% to 81% at 95%). " in lead
+    assert " It falls in 1 of 4 variations: 1 of the 4 that vary all (1% to 81% at 95%). " in lead
     moved = "1 mm to 3 mm, in 95 % of 3 runs 3 mm or less"
     assert lead.endswith(f" Largest displacements are {moved}.")
     unvaried = "Motion, lengths, size of the motions and fidelity were not varied."
-    assert changes == f"The checks of the numbers raise no doubt. {unvaried}"
+    chance = "No property separates falls from the others by more than chance. "
+    assert changes == f"{chance}The checks of the numbers raise no doubt. {unvaried}"
     words = [piece.text for piece in _build_mechanism(data, held) if hasattr(piece, "text")]
     assert words[0].startswith("Outcome: stands; falls in 1 of 4 variations. Mechanism: ")
     assert not any("not varied" in line for line in words)
@@ -147,7 +147,7 @@ def test_a_range_in_the_folder_stands_in_place_of_what_a_run_cannot_know(held):
     pieces = build_conclusion(doubted).pieces
     assert "In doubt, variations: Fill is rigid." in [getattr(x, "text", "") for x in pieces]
     (table,) = (each for each in pieces[:-1] if each.kind == "grid")
-    outcome = f"falls in 1 of 4; largest displacements {moved} (in doubt)"
+    outcome = f"falls in 1 of 4 variations; largest displacements {moved} (in doubt)"
     assert ("variations", "the same motion", outcome, "-") in table.rows
     # of several motions it is that of one alone
     both = ReportData(data.case, {"shake": held, "other": held})

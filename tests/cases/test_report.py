@@ -26,6 +26,7 @@ from archfem.cases.report.response import build_joint_section, supported_weight_
 from archfem.cases.report.sections import (
     _build_rating,
     build_input_section,
+    build_sections,
 )
 from archfem.cases.result_text import ResultTable
 from archfem.cases.run import carry_out, replace_run
@@ -161,7 +162,8 @@ def test_demand_and_capacity_stand_beside_their_doubts(kept, undrawn):
             (
                 f"assessment: {name}, right and left",
                 f"{demand} of the spectrum of the motion",
-                f"{capacity} (in doubt)",
+                # an upper bound on what fails raises no doubt about it
+                capacity if "fails" in capacity else f"{capacity} (in doubt)",
                 factor,
             )
             for name, demand, capacity, factor in (
@@ -181,11 +183,12 @@ def test_demand_and_capacity_stand_beside_their_doubts(kept, undrawn):
     leads = ["Does it stand?", "By which margin?", "What would change the answer?"]
     assert [each.lead for each in sentences if each.kind == "words"][1:4] == leads
     assert texts[1:4] == [
-        "The structure forms no mechanism under all 2 motions of PGA 0.05 g.",
+        "The structure forms no mechanism under all 2 motions of PGA 0.05 g; the displacement "
+        "check of a code is not met (0.45 to 0.5 × the spectrum).",
         "The least margin is 0.5 (0.45 with one weight a body), on the spectrum of the motion, by "
         "a code, right and left, which it fails. The runs have a vertical motion too, of up to "
         "0.03 g; limit analysis and kinematic assessment have none.",
-        "The doubts below, on limit analysis, kinematic assessment, may change this. Lengths, "
+        "The doubts below, on limit analysis, may change this. Lengths, "
         "stiffness, friction, damping, time step and fidelity "
         "were not varied, and displacements have no range.",
     ]
@@ -195,18 +198,35 @@ def test_demand_and_capacity_stand_beside_their_doubts(kept, undrawn):
         "Note, kinematic assessment: Faces slide flat.",
     ]
     facts = dict(list_facts(data))
-    assert facts["in doubt"] == "limit analysis, kinematic assessment"
-    assert facts["verdict"] == "no mechanism in 2 of 2 runs; fails a code, right and left"
+    assert facts["in doubt"] == "limit analysis"
+    failed = "the displacement check of a code is not met (0.45 to 0.5 × the spectrum)"
+    assert facts["verdict"] == f"forms no mechanism under 2 of 2 motions; {failed}"
     alone = report_data.ReportData(case, {}, found.folder)
     question, result, margin = build_conclusion(alone).pieces[:3]
     assert question.text == texts[0]
     assert result.lead == "Result:"
-    assert result.text.startswith("Limit analysis: it turns, at 4.8 times the load")
+    turns = "it turns, at 4.8 times the load"
+    assert result.text.startswith(f"T{failed[1:]}. Limit analysis: {turns}")
     assert margin.text.startswith("The least margin is 0.5 (0.45 with one weight a body), on the ")
-    outcomes = "the given load: it turns, at 4.8 times the load, factor 4.8; LM1: passes without "
-    outcomes += "all, factor 1.25; 2.844 m/s² of the spectrum of the motion: 8.212 m/s², passes, "
-    outcomes += "factor 2.89; "
-    assert dict(list_facts(alone))["verdict"].startswith(outcomes)
+    outcomes = (
+        f"{failed}; the given load: {turns}, factor 4.8; LM1: passes without all, factor 1.25"
+    )
+    assert dict(list_facts(alone))["verdict"].startswith(f"{outcomes}; PGA 3")
+    # [suite] is in the case; its motions are those of the rate
+    for ends in (
+        "may change this. Lengths and friction were not varied.",
+        "not varied. No motion was run, though [suite] is in the case.",
+    ):
+        leads = {getattr(x, "lead", ""): x for x in build_conclusion(alone).pieces}
+        assert leads["What would change the answer?"].text.endswith(ends)
+        alone.statements.pop("risk", None)
+    assert {("assessment: q", "2 (Circolare 7/2019, C8.7.1.2.1.7)", "default")} < {
+        tuple(row) for row in build_input_section(alone).pieces[0].rows
+    }
+    titles = {section.title for section in build_sections(data)}
+    assert {*conclusion.SECTIONS.values()} - titles <= {
+        *("Response", "Pushover", "Scale of the motion", "Range over uncertain properties")
+    }
     assert signatures.rows == [("author", "A. Mason", "", ""), ("checked by", "", "", "")]
 
 
@@ -710,7 +730,7 @@ def test_a_kinematic_assessment_alone_has_a_report(unplotted, tmp_path, capsys):
     assert "ag 0.25" in words.split("Norms and methods")[2]
     inputs = " ".join(words.split("Assumptions, units")[0].split())
     assert "assessment: direction right and left default" in inputs
-    assert "assessment: limit state NTC-2018 SLV default assessment: q 2 default" in inputs
+    assert "assessment: limit state NTC-2018 SLV default assessment: q 2 (Circ" in inputs
     assert "player" not in words  # of a run that there is not
 
 
@@ -849,8 +869,10 @@ def test_the_conclusion_states_outcomes_falls_and_the_range(kept, unplotted):
         verdicts["second"], outcome="fallen", doubts=(af.models.model.Doubt("it leaks", "mend it"),)
     )
     text = " ".join(piece.text for piece in build_conclusion(data).pieces if piece.kind == "words")
-    assert "The structure forms no mechanism under 1 of 2 motions of PGA 0.05 g: first." in text
-    assert "The structure falls under 1 of 2 motions of PGA 0.05 g: second." in text
+    answer = (
+        "The structure falls under 1 of 2 motions of PGA 0.05 g: second; it forms no mechanism "
+    )
+    assert f"{answer}under 1 of 2 motions of PGA 0.05 g: first." in text
     # the remedy is not for the client
     assert "In doubt, time histories: 1 of 2 runs: it leaks." in text
     assert "raise no doubt" not in text

@@ -29,11 +29,11 @@ def study(falls=(), cases=30, **attrs):
 
 def test_each_case_has_a_row_and_those_that_fall_are_the_first():
     grid = study_findings.tabulate_study(study(falls=[29]))
-    assert grid.head == ["case", "residual displacement [m]", "under", "outcome"]
+    assert grid.head == ["case", "residual displacement [m]", "outcome"]
     assert len(grid.rows) == study_findings.MAX_CASES
-    assert grid.rows[0] == ["case 29", "1.7", "second", "fallen, in 1 of 2"]
+    assert grid.rows[0] == ["case 29", "1.7", "fallen, in 1 of 2"]
     assert grid.rows[1][0] == "case 0"
-    assert grid.caption.endswith("worst motion; 6 of 30 cases are left out, of which 0 fall")
+    assert grid.caption.endswith("over its motions; 6 of 30 cases are left out, of which 0 fall")
     many = study_findings.tabulate_study(study(falls=range(27)))
     assert many.caption.endswith("6 of 30 cases are left out, of which 3 fall")
     assert "left out" not in study_findings.tabulate_study(study(cases=24)).caption
@@ -56,17 +56,44 @@ def test_cases_with_doubts_stand_before_others():
         ),
         (
             [8],
-            "in the study 1 of 9 cases falls: 'case 8'; of the others 'case 7' raises the "
-            "residual displacement most, from 1 mm to 8 mm",
+            "in the study 1 of 9 cases falls: 'case 8', under 1 of 2 motions; of the others "
+            "'case 7' raises the residual displacement most, from 1 mm to 8 mm",
         ),
         (
             range(1, 9),
-            "in the study 8 of 9 cases fall: 'case 1', 'case 2', 'case 3', 'case 4' and 4 more",
+            "in the study 8 of 9 cases fall: 'case 1', under 1 of 2 motions; 'case 2', under 1 of "
+            "2 motions; 'case 3', under 1 of 2 motions; 'case 4', under 1 of 2 motions and 4 more",
         ),
     ],
 )
 def test_one_sentence_says_what_changes_the_answer(falls, words):
     assert [*study_findings.say_what_changes(study(falls, 9))] == [words]
+
+
+def test_a_row_has_the_largest_of_each_column_and_noise_is_no_finding():
+    """The residual is largest under another motion than the displacement, which decides."""
+    rows = [
+        ("as is", 64.0, 11.8),
+        ("as is", 80.0, 11.3),
+        ("thin", 76.0, 11.4),
+        ("thin", 87.0, 11.9),
+    ]
+    names, largest, residual = zip(*rows, strict=True)
+    sizes = {"residual_displacement": residual, "largest_displacement": largest}
+    table = xr.Dataset(
+        {name: ("point", 1e-3 * np.array(x), {"units": "m"}) for name, x in sizes.items()}
+        | {"fall": ("point", ["stands"] * 4)},
+        {"case": ("point", [*names]), "pair": ("point", ["a", "b"] * 2)},
+    )
+    found = study_findings.collect_findings("", "", table)
+    assert study_findings.tabulate_study(found).rows == [
+        ["as is", "0.08", "0.0118", "stands"],
+        ["thin", "0.087", "0.0119", "stands"],
+    ]
+    assert [*study_findings.say_what_changes(found)] == ["in the study none of 2 cases falls"]
+    table["largest_displacement"][3] = 0.109
+    (text,) = study_findings.say_what_changes(study_findings.collect_findings("", "", table))
+    assert text.endswith(", and 'thin' raises the largest displacement most, from 80 mm to 109 mm")
 
 
 def test_of_factors_the_least_is_the_worst():

@@ -44,7 +44,7 @@ def test_the_interval_is_that_of_clopper_and_pearson(falls, count, confidence):
 def test_runs_beside_the_sample_count_for_the_sentence_alone():
     found = made_up([True, False, False, True], [False, False, True, True], sign=list("aabb"))
     assert found.share == 0.5
-    assert found.sentence.startswith("falls in 2 of 4: ")
+    assert found.sentence.startswith("falls in 2 of 4 variations: ")
     shares = "; 1 of the 2 that vary one property, 1 of the 2 that vary all (1% to 99% at 95%)"
     assert shares in found.sentence
 
@@ -60,13 +60,13 @@ def test_no_share_is_given_where_no_run_falls_or_every_one_does():
         *("a:", "0", "of", "2,", "b:", "0", "of", "2"),
     ]
     assert "%" not in all_fall.table()
-    assert one.table().startswith("property  explains, of the variance of fall or none")
+    assert one.table().startswith("property  explains, of the variance of the outcome")
     assert "33%" in one.table()  # between groups 1/4, of all 3/4
     for found, shown in ((none, False), (all_fall, False), (one, True)):
         figure = found.plot()
         titles = [figure.axes[0].get_title(loc=place) for place in ("left", "center", "right")]
         assert any("explains 33%" in title for title in titles) == shown
-        assert ("shares are of the variance of fall or none" in figure.get_suptitle()) == shown
+        assert ("shares are of the variance of the outcome" in figure.get_suptitle()) == shown
 
 
 def test_shares_agree_with_the_sentence():
@@ -76,7 +76,7 @@ def test_shares_agree_with_the_sentence():
     falls = (rows % 2 == 1) & (rows % 8 == 1)
     residual = np.where(falls, 9.0, 1.0 + friction)
     found = made_up(falls, residual=residual, damping_kind=damping, friction=friction)
-    assert "all falls with damping kind 'stiffness', where 30 of 120 fall" in found.sentence
+    assert "all falls are with damping kind 'stiffness', where 30 of 120 fall" in found.sentence
     shares = found.importance()
     assert shares["damping_kind"] == pytest.approx(1.0 / 7.0)  # (1/8)² over 1/8 · 7/8
     assert shares["friction"] < 0.01
@@ -95,7 +95,7 @@ def test_doubts_follow_the_sentence_and_are_kept(tmp_path):
 def test_dislocated_runs_are_counted_and_drawn_apart():
     names = {"sign": list("aabbb"), "error": ["", "", "", "", "broken"]}
     found = made_up([True, False, False, False, False], parted=[1, 4], **names)
-    assert found.count == "falls in 1, dislocated in 1 of 4"
+    assert found.count == "falls in 1 of 4 variations and is dislocated in 1"
     assert found.sentence.startswith(found.count)
     assert found.dislocated.tolist() == [False, True, False, False, True]
     (axes, *_) = found.plot().axes
@@ -114,6 +114,32 @@ def test_dislocated_runs_are_counted_and_drawn_apart():
     assert "dislocated" not in upright.sentence
     # neither the line nor the words of falls where none is
     assert [x.get_label() for x in upright.plot().axes[0].get_lines()] == ["stands"]
+
+
+def test_dislocations_are_explained_where_none_falls():
+    """All have one damping; the single changes are the worst first by what remains."""
+    rows = np.arange(48)
+    damping, parted = np.where(rows % 2, "mass", "stiffness"), (rows % 4 == 3) & (rows >= 4)
+    values = {"damping_kind": damping, "friction": np.linspace(-0.1, 0.1, 48)}
+    values["friction"][:2] = 0.0
+    found = made_up([False] * 48, rows >= 2, parted=parted, **values)
+    for name, ends in ("displacement", [0.09, 0.05]), ("residual", [0.01, 0.04]):
+        found.dataset[name] = "run", np.append(ends, np.zeros(46))
+    where = "all dislocations are with damping kind 'mass', where 11 of 24 are dislocated"
+    groups = "0 of the 2 that vary one property, 11 of the 46 that vary all"
+    counted = f"falls in none of 48 variations and is dislocated in 11: {where}; {groups}; share of"
+    assert found.sentence.startswith(f"{counted} falls 0% to ")
+    assert found.table().splitlines()[0].split()[-1] == "dislocated"
+    assert "mass: 11 of 24, stiffness: 0 of 24" in found.table()
+    assert next(iter(found.importance())) == "damping_kind"
+    assert [each.name for each in found.single_changes] == ["damping kind 'mass'", "unvaried"]
+    assert found.what_changes == [
+        "it is dislocated or falls with none of 1 single changes",
+        "unvaried it remains displaced by 10 mm, by 40 mm with damping kind 'mass'",
+    ]
+    found.dataset["outcome"][5] = "fallen"
+    assert [each.name for each in found.single_changes] == ["unvaried", "damping kind 'mass'"]
+    assert "the 46 that vary all (" in found.sentence
 
 
 def test_displacements_of_the_runs_that_hold_are_a_range():
@@ -200,7 +226,8 @@ def test_a_broken_single_change_is_the_last_and_counts_for_none():
 def test_the_sentence_names_the_only_motion():
     """An interval of one motion holds for that motion; without a name motions are varied."""
     found = made_up([False] * 4, sign=list("aabb"))
-    assert found.sentence == "falls in 0 of 4; 0 of the 4 that vary all (0% to 60% at 95%)"
+    shares = "0 of the 4 that vary all (0% to 60% at 95%)"
+    assert found.sentence == f"falls in none of 4 variations; {shares}"
     found.dataset.attrs["motion"] = "synthetic 1"
     assert found.sentence.endswith("(0% to 60% at 95%), under 'synthetic 1' alone")
 
@@ -214,7 +241,7 @@ def test_a_run_without_an_answer_neither_stands_nor_falls():
     )
     assert found.answered.tolist() == [True] * 4 + [False]
     assert found.share == 0.5
-    assert found.sentence.startswith("falls in 2 of 4")
+    assert found.sentence.startswith("falls in 2 of 4 variations")
     assert found.sentence.endswith(" have no answer")
     assert found.unanswered.startswith("; 1 of ")
     without = made_up([True, False, False, True], sign=names[:4])
@@ -276,22 +303,22 @@ def test_a_deciding_property_explains_all_and_a_constant_one_nothing():
         (
             {"k_n": np.array([0.5, 0.8, 1.5, 2.5]), "sign": list("abab")},
             [True, True, False, False],
-            "all falls with k_n below 2.3 MPa/mm, where 16 of 16 fall",
+            "all falls are with k_n below 2.3 MPa/mm, where 16 of 16 fall",
         ),
         (
             {"friction": np.array([-0.1, 0.0, 0.05, 0.1])},
             [False, False, True, True],
-            "all falls with friction above that given +0.025, where 16 of 16 fall",
+            "all falls are with friction above that given +0.025, where 16 of 16 fall",
         ),
         (
             {"damping_ratio": np.array([0.5, 1.0, 1.5, 2.0])},
             [True, False, False, False],
-            "all falls with damping ratio below × 0.75, where 8 of 8 fall",
+            "all falls are with damping ratio below × 0.75, where 8 of 8 fall",
         ),
         (
             {"joint_rule": ["exact", "rigid", "rigid", "exact"], "dt": list("hhgh")},
             [False, True, False, False],
-            "all falls with joint rule 'rigid' and dt 'h', where 8 of 8 fall",
+            "all falls are with joint rule 'rigid' and dt 'h', where 8 of 8 fall",
         ),
     ],
 )
@@ -341,11 +368,14 @@ def test_a_rule_of_all_falls_separates_better_than_one_run():
     soft[40] = 0.4
     falls = np.isin(np.arange(250), (5, 23, 40, 61, 88))
     sentence = made_up(falls, k_s=soft, joint_rule=rule).sentence
-    assert "all falls with joint rule 'exact'" in sentence
+    assert "all falls are with joint rule 'exact'" in sentence
 
 
 def test_without_a_difference_no_condition_is_named():
-    for falls, first in ((False, "falls in 0 of 3; "), (True, "falls in 3 of 3; ")):
+    for falls, first in (
+        (False, "falls in none of 3 variations; "),
+        (True, "falls in 3 of 3 variations; "),
+    ):
         assert made_up([falls] * 3, sign=list("aba")).sentence.startswith(first)
 
 

@@ -1,6 +1,7 @@
-"""Head and conclusion of a report: who signs what, outcome with margin and range, doubts."""
+"""Head and conclusion of a report: who signs what, outcome with margin and range."""
 
 import re
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from hashlib import sha256
@@ -12,32 +13,42 @@ import numpy as np
 from archfem._files import read_file_list
 from archfem.cases import result_text
 from archfem.cases.case import REPORT_KEYS
-from archfem.cases.report.motion_rules import note_checks
+from archfem.cases.report.doubts import (
+    HISTORIES,
+    VARIATIONS,
+    list_checks,
+    list_decisive_doubts,
+    list_doubts,
+    list_elastic_fill,
+    list_notes,
+    list_unvaried,
+    peak_of_ground,
+    peak_of_spectrum,
+    read_spectrum,
+    weigh,
+)
 from archfem.cases.report.report_data import SHOWN_RESULTS, ReportData
-from archfem.cases.report.study_findings import list_studied, read_study, say_what_changes
+from archfem.cases.report.study_findings import read_study, say_what_changes
 from archfem.cases.result_text import RESULTS, Row
 from archfem.dynamics.collapse_state import COLLAPSE_STATES, FALLEN_STATES, CollapseState
 from archfem.dynamics.history import History
 from archfem.dynamics.verdict import NO_RANGE
 from archfem.dynamics.verdict_range import (
     HALF_STEP,
-    MAX_RATIO_OF_DISPLACEMENTS,
     UNVARIED,
     VerdictRange,
 )
-from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import join_names, join_words
-from archfem.models.model import Doubt
 from archfem.units import STANDARD_GRAVITY, format_mm
 from archfem.view.pages.document import Grid, Section, TextBlock
 
-# Outcomes of runs as verbs; small displacements end where blocks begin to move as a mechanism
+# Outcomes of runs as verbs, the worst first; small displacements end where blocks begin to move
 _VERBS = {
-    "stands": "stands",
-    "dislocated": "stands dislocated",
-    "partly fallen": "falls in part",
     "fallen": "falls",
+    "partly fallen": "falls in part",
     "mechanism": "becomes a mechanism",
+    "dislocated": "stands dislocated",
+    "stands": "stands",
     "no mechanism": "forms no mechanism",
     "unknown": "has no known outcome",
 }
@@ -49,32 +60,31 @@ def describe_origin(data: ReportData) -> str:
     return f"report of archfem {import_module('archfem').__version__} · case {digest}"
 
 
-# Ratio of the peaks of motions and spectrum beyond which they are different demands: those of
-# matched motions exceed the target by a tenth
-MAX_RATIO_OF_PEAKS = 1.25
-
-# Doubts of a result that the conclusion states; the others stand with the result
+# Doubts of a result that the conclusion states; the others stand in the section of the result
 MAX_DOUBTS = 3
+SECTIONS = {
+    HISTORIES: "Response",
+    VARIATIONS: "Range over uncertain properties",
+    RESULTS["limit"]: "Limit analysis",
+    RESULTS["pushover"]: "Pushover",
+    RESULTS["rating"]: "Rating for a vehicle",
+    RESULTS["assessment"]: "Kinematic assessment",
+    RESULTS["scale"]: "Scale of the motion",
+    RESULTS["risk"]: "Annual rate of collapse",
+}
 
-# Doubts that outweigh others, the first most: a conclusion states these before others
-_WEIGHTY = ("as rigid blocks none falls", "fall", "displace")
-
-# Numbers of a doubt that differ from run to run: names of joints end in whole ones
-_NUMBER = re.compile(
-    r"(\d+\.\d+(?:e[-+]?\d+)?|\d+(?= (?:mm|m|ms|s|g|%|of)\b)|(?<= of )\d+|\d+(?=%))"
-)
-
-# Numbers of a doubt beyond which their ranges over several motions would be hard to read
-MAX_RANGES = 2
+# States that a search of scales finds first, in the words of the answer
+_FIRST_STATES = {
+    "dislocated": "is first dislocated",
+    "falls": "first falls",
+    "first mechanism": "first forms a mechanism",
+}
 
 # Fidelity of the variations of a verdict
 VARIED_FIDELITY = "rigid"
 
 # Results that may be of a push
 PUSHES = RESULTS["limit"], RESULTS["pushover"]
-
-# Results of runs: histories, and their variations
-_HISTORIES, _VARIATIONS = "time histories", "variations"
 
 # What commands keep of results that they have not finished
 _BEGUN = {RESULTS["risk"]: "risk_samples.nc", RESULTS["verdict_range"]: "variations"}
@@ -100,7 +110,7 @@ def list_facts(data: ReportData) -> list[tuple[str, str]]:
     runs, structure = list(data.runs.values()), data.case.structure
     blocks = [("structure", f"{len(structure.free)} blocks, {len(structure.joints)} joints")]
     blocks += [("joints", structure.assessment)] if structure.assessment else []
-    doubtful = list(dict.fromkeys(result for result, _ in list_doubts(data)))
+    doubtful = list_decisive_doubts(data, list_doubts(data))
     doubts = [("in doubt", ", ".join(doubtful))] if doubtful else []
     if not runs:
         # the place of a vehicle is in the conclusion
@@ -108,35 +118,56 @@ def list_facts(data: ReportData) -> list[tuple[str, str]]:
             f"{demand}: {outcome.partition(', with')[0]}, factor {factor}".removesuffix(
                 ", factor -"
             )
-            for _, (_, demand, outcome, factor) in _capacity_rows(data)
-            if factor != "-" or demand == "no demand given"
+            for name, (_, demand, outcome, factor) in _capacity_rows(data)
+            if name != RESULTS["assessment"] and (factor != "-" or demand == "no demand given")
         ]
-        return [*signed, *([("verdict", "; ".join(factors))] if factors else []), *doubts, *blocks]
+        verdict = "; ".join([*_say_checks(data), *factors])
+        return [*signed, *([("verdict", verdict)] if verdict else []), *doubts, *blocks]
     peak = [("motions" if len(runs) > 1 else "motion", _describe_peaks(runs))]
-    verdict = "; ".join([summarise_outcomes(data, runs), *_list_failed_checks(data)])
+    did = ", ".join([summarise_outcomes(data, runs), *_say_movement(data)])
+    varied = [each.count for each in data.verdict_ranges if each.decisive.any()] * (len(runs) > 1)
+    verdict = "; ".join([did, *varied[:1], *_say_checks(data)])
     return [*signed, ("verdict", verdict), *doubts, *blocks, *peak]
 
 
-def _list_failed_checks(data: ReportData) -> Iterator[str]:
-    """Yield the checks of a norm that are not passed; the linear one is no verdict of its own."""
-    stated = data.statements.get("assessment")
-    rows = [*stated.rows] if stated else []
-    for name, _, outcome, _ in [x for x in rows if "linear, q" not in x[0]] or rows:
-        if "passes" not in outcome or "only with" in outcome:
-            some = " under some assumptions on the fill" * ("only with" in outcome)
-            yield f"fails {name.partition(': ')[2]}{some}"
+def _say_movement(data: ReportData) -> Iterator[str]:
+    """Yield how far the structure moves where it does not fall, and at which scale it falls."""
+    verdicts = [run.verdict for run in data.runs.values()]
+    sizes = [x.displacement for x in verdicts if x.outcome in COLLAPSE_STATES[:2]]
+    if sizes and np.isfinite(sizes).all():
+        low, high = (format_mm(end(sizes)) for end in (min, max))
+        yield f"moves by {low.removesuffix(' mm')} to {high}" if low != high else f"moves by {low}"
+    rows = data.statements["scale"].rows if "scale" in data.statements else []
+    for state, words in _FIRST_STATES.items():
+        # those of other time steps stand in the same words
+        pattern = rf"{state} (?:from|at) (?:[\d.]+ g \()?([\d.]+) ×"
+        found = sorted((x for row in rows for x in re.findall(pattern, row[2])), key=float)
+        if found:
+            over = " and ".join(["motions"] * (len(rows) > 1) + ["time steps"])
+            ends = f" ({found[0]} to {found[-1]} over {over})" * (found[0] != found[-1])
+            yield f"{words} at {found[0]} × the motion{ends}"
 
 
-def _peak_of_ground(run: History) -> float:
-    """Return the horizontal peak acceleration of a run [g]."""
-    # Files of older versions have the acceleration at their steps alone.
-    recorded = np.abs(run.dataset["ground"].values[:, 0]).max()
-    return float(run.dataset.attrs.get("pga", recorded)) / STANDARD_GRAVITY
+def _say_checks(data: ReportData) -> Iterator[str]:
+    """Yield whether the checks of an assessment are met, and by how much."""
+    for name, demand, outcome, factor in list_checks(data):
+        kind = "displacement check" if demand.endswith(" m") else "check"
+        ratios = re.findall(r"\d+(?:\.\d+)?(?:e[-+]?\d+)?", factor)
+        ends = dict.fromkeys((min(ratios, key=float), max(ratios, key=float)))
+        met, by = "is met", f"{' to '.join(ends)} × the spectrum"
+        if "only with" in outcome:
+            met = "is not met under some assumptions on the fill"
+        elif "passes" not in outcome:
+            met = "is not met"
+        elif moved := re.search(r"[\d.]+ by displacements", factor):
+            met, by = "is met at rest", moved[0]
+        of = name.partition(": ")[2].removesuffix(", right and left")
+        yield f"the {kind} of {of} {met} ({by})"
 
 
 def _describe_peaks(runs: Iterable[History]) -> str:
     """Return the least and the largest peak acceleration of some runs."""
-    peaks = sorted(map(_peak_of_ground, runs))
+    peaks = sorted(map(peak_of_ground, runs))
     return f"PGA {' to '.join(dict.fromkeys(f'{peaks[k]:.2f}' for k in (0, -1)))} g"
 
 
@@ -144,7 +175,11 @@ def summarise_outcomes(data: ReportData, runs: Sequence[History]) -> str:
     """Return outcome, and doubts or range, of a run, or how many runs have each outcome."""
     verdict = runs[0].verdict
     if len(runs) > 1:
-        return result_text.count_outcomes([run.verdict for run in runs])
+        counts = Counter(run.verdict.outcome for run in runs)
+        words = ", ".join(
+            f"{verb} under {counts[outcome]}" for outcome, verb in _VERBS.items() if counts[outcome]
+        )
+        return f"{words} of {len(runs)} motions"
     if verdict.fall is not None:
         # lost blocks have a line of their own
         verdict = replace(verdict, fall=replace(verdict.fall, time=None))
@@ -157,7 +192,7 @@ def summarise_outcomes(data: ReportData, runs: Sequence[History]) -> str:
     text = verdict.headline.removesuffix(f"; {NO_RANGE}")
     if found is None:
         return text
-    return f"{text}; {found.count} variations{found.unanswered}"
+    return f"{text}; {found.count}{found.unanswered}"
 
 
 def build_conclusion(data: ReportData) -> Section:
@@ -166,26 +201,28 @@ def build_conclusion(data: ReportData) -> Section:
     every = list_doubts(data)
     stated = {text: result for result, text in reversed(every)}
     for text, result in stated.items():
-        # a doubt of several results is stated once, without the scales of which it is true, too
-        if text.partition("×")[2].partition(": ")[2] not in stated:
+        # a doubt of several results is stated once, without the motions of which it is true, too
+        if not text.startswith("under ") or text.partition(": ")[2] not in stated:
             doubts.setdefault(result, []).insert(0, text)
-    doubtful = list(dict.fromkeys(result for result, _ in every))
+    doubtful, decisive = [*dict.fromkeys(x for x, _ in every)], list_decisive_doubts(data, every)
     rows = [
-        (name, demand, outcome + " (in doubt)" * (result in doubtful), factor)
+        # what a bound from above fails it fails for certain
+        (name, demand, f"{outcome} (in doubt)" if in_doubt else outcome, factor)
         for result, (name, demand, outcome, factor) in _capacity_rows(data)
+        for in_doubt in [result in (decisive if "fails" in outcome else doubtful)]
     ]
     demand = data.case.report.get("demand", "")
     blocks: list[Any] = [TextBlock(sentence(f"demand, as stated: {demand}"))] if demand else []
-    for lead, texts in _build_paragraphs(data, rows, doubtful).items():
+    for lead, texts in _build_paragraphs(data, rows, decisive).items():
         sentences = [*map(sentence, texts)]
         if data.statements.keys() != {"rating"}:  # of a result that stands alone each is one
             sentences = [" ".join(sentences)] if sentences else []
         blocks += [TextBlock(each, lead=lead * (k == 0)) for k, each in enumerate(sentences)]
     for result in filter(doubts.get, doubtful):
-        ordered = sorted(doubts[result], key=_weigh)
+        ordered = sorted(doubts[result], key=weigh)
         shown = [sentence(text) for text in ordered[:MAX_DOUBTS]]
         if more := len(doubts[result]) - len(shown):
-            shown.append(f"{more} more stand{'s' * (more == 1)} with the result.")
+            shown.append(f"{more} more: see section '{SECTIONS[result]}'.")
         blocks.append(TextBlock(f"In doubt, {result}: {' '.join(shown)}", "doubt"))
     for result, notes in list_notes(data).items():
         blocks.append(TextBlock(f"Note, {result}: {' '.join(map(sentence, notes))}", "missing"))
@@ -223,13 +260,13 @@ def _build_paragraphs(
     data: ReportData, rows: Sequence[Row], doubtful: Sequence[str]
 ) -> dict[str, list[str]]:
     """Return the sentences of the answer by their leads: outcomes, margin, what may change it."""
-    answer = [f"the structure {each}" for each in _describe_outcomes(data)]
+    answer = [*_say_answer(data)]
     if not data.runs:
         # an assessment is stated by the margin; a result that stands alone states all of itself
         stated = [each.sentences for name, each in data.statements.items() if name != "assessment"]
-        answer = [*stated[0]] if len(data.statements) == 1 and stated else [x for x, *_ in stated]
+        answer += [*stated[0]] if len(data.statements) == 1 and stated else [x for x, *_ in stated]
     answer += [*_describe_ends(data), *_describe_ranges(data.verdict_ranges)]
-    changes = [*_say_single_changes(data.verdict_ranges)]
+    changes = [*_say_causes(data.verdict_ranges)]
     if (study := read_study(data)) is not None:
         changes += say_what_changes(study)
     if fill := join_names(list_elastic_fill(data)):
@@ -238,8 +275,11 @@ def _build_paragraphs(
     if doubtful:
         changes.append(f"the doubts below, on {join_names(doubtful)}, may change this")
     if single := list_unvaried(data):
-        none = ", and displacements have no range" * (not data.verdict_ranges)
+        none = ", and displacements have no range" * (bool(data.runs) and not data.verdict_ranges)
         changes.append(f"{join_words(single)} were not varied{none}")
+    given = [key for key in ("suite", "motion") if data.case.settings.get(key)]
+    if given and not data.runs and not {"scale", "risk"} & data.statements.keys():
+        changes.append(f"no motion was run, though [{given[0]}] is in the case")
     return {
         "Does it stand?" if data.runs else "Result:": answer,
         "By which margin?": [*_describe_margin(data, rows), *_say_vertical(data)],
@@ -247,31 +287,34 @@ def _build_paragraphs(
     }
 
 
+def _say_answer(data: ReportData) -> Iterator[str]:
+    """Yield the answer in one sentence: outcomes, displacements, first fall, and checks."""
+    done = [*_describe_outcomes(data)]
+    moved = ", ".join(_say_movement(data)) if done else ""
+    joint = ", " if len(done) == 1 else "; it "
+    text = "; it ".join(done) + f"{joint}{moved}" * bool(moved)
+    clauses = [*([f"the structure {text}"] if done else []), *_say_checks(data)]
+    yield from ["; ".join(clauses)] if clauses else []
+
+
 def _describe_ranges(ranges: Sequence[VerdictRange]) -> Iterator[str]:
     """Yield how often the structure falls in variations, and how far it moves at most."""
-    if len(ranges) == 1:
-        count, _, groups = ranges[0].sentence.partition("; ")
-        yield f"in variations of its properties it {count}"
-        if groups:
-            yield f"it does so in {groups}"
-    elif ranges:
-        counts = [
-            f"{each.count.removeprefix('falls ')} under '{each.dataset.attrs['motion']}'"
-            f"{each.unanswered}"
-            for each in ranges
-        ]
-        yield f"in variations of its properties it falls {join_words(counts)}"
+    for each in ranges:
+        motion, answers = each.dataset.attrs.get("motion"), each.answers["sampled"].values.any()
+        under = f"under '{motion}' it " if motion else "it "
+        groups = f": {each.groups}" if len(ranges) == 1 else ""
+        yield f"{under}{each.count}{groups}{each.unanswered}" if answers else each.sentence
     if moved := [each for each in ranges if each.displacements]:
         far = max(moved, key=lambda x: np.nanmax(x.dataset["displacement"].values[~x.falls]))
         most = f"it moves farthest under '{far.dataset.attrs.get('motion')}': " * (len(ranges) > 1)
         yield most + far.displacements.partition(";")[0].replace("ments", "ments are", 1)
 
 
-def _say_single_changes(ranges: Sequence[VerdictRange]) -> Iterator[str]:
-    """Yield what single changes of the variations do, in one sentence for equal ones."""
+def _say_causes(ranges: Sequence[VerdictRange]) -> Iterator[str]:
+    """Yield what separates falls in variations, and what single changes do, equal ones once."""
     texts: dict[str, list[str]] = {}
     for each in ranges:
-        for text in each.what_changes:
+        for text in [*[each.where] * each.is_mixed, *each.what_changes]:
             texts.setdefault(text, []).append(f"'{each.dataset.attrs.get('motion')}'")
     for text, motions in texts.items():
         yield f"under {join_words(motions)}: {text}" if len(ranges) > 1 else text
@@ -300,9 +343,9 @@ def _describe_margin(data: ReportData, rows: Sequence[Row]) -> Iterator[str]:
             if moves and least >= 1.0:  # shaken it moves before
                 apart.append(f"a push of {size} times {demand}{over}{of} is no margin: {moves}")
             else:
-                words = f"{size}{over}, for a push by {demand} to begin to move it{of}"
+                begins = f"a push begins to move it{of} at {size} times {demand}{over}"
                 then = moves if data.runs else "shaken it may begin to move at less"
-                margins.append((least, [words, *filter(None, [then])]))
+                apart += [f"{begins}, which is no collapse", *filter(None, [then])]
     margins += _describe_scales(data, [row for row in rows if row[0] == RESULTS["scale"]])
     for k, (_, (first, *others)) in enumerate(sorted([*margins, *sorted(checks)[:1]])):
         rank = ("the least margin is", "the next is", "then follows")[min(k, 2)]
@@ -376,8 +419,8 @@ def _say_motion(data: ReportData, factor: float) -> str:
 
     It is empty if it moves in none. Without a spectrum the runs are the demand.
     """
-    push = np.nan_to_num(factor * _peak_of_spectrum(data), nan=np.inf)
-    runs = [run for run in data.runs.values() if _peak_of_ground(run) <= push]
+    push = np.nan_to_num(factor * peak_of_spectrum(data), nan=np.inf)
+    runs = [run for run in data.runs.values() if peak_of_ground(run) <= push]
     verdicts = [run.verdict for run in runs]
     if not any(x.mechanisms.get("verified") or x.outcome in FALLEN_STATES for x in verdicts):
         return ""
@@ -400,19 +443,7 @@ def name_spectrum(data: ReportData) -> str:
     code = read_spectrum(data).get("code")
     if code is None:
         return "the spectrum of the motion"
-    return f"the {code} spectrum of PGA {_peak_of_spectrum(data):.3g} g"
-
-
-def read_spectrum(data: ReportData) -> Mapping[str, Any]:
-    """Return the table of the assessment's spectrum, empty for that of a motion."""
-    own = [data.case.settings.get(key) or {} for key in ("assessment", "suite")]
-    return own[0].get("spectrum") or own[1].get("target") or {}
-
-
-def _peak_of_spectrum(data: ReportData) -> float:
-    """Return the spectral acceleration of the assessment's demand at period zero [g]."""
-    spectrum = data.case.assessment.spectrum or data.case.target
-    return float(spectrum.horizontal(0.0)) if spectrum is not None else np.nan
+    return f"the {code} spectrum of PGA {peak_of_spectrum(data):.3g} g"
 
 
 def _build_signatures(report: Mapping[str, str]) -> Grid:
@@ -437,12 +468,12 @@ def _capacity_rows(data: ReportData) -> Iterator[tuple[str, Row]]:
             steps = ", ".join(_list_ranges_of_steps(data))
             beside = f" (over {over} {steps})" * bool(steps)
             outcome += f"; displaced by up to {largest}{beside}, {residual} at the end"
-        yield _HISTORIES, (_HISTORIES, demand, outcome, "-")
+        yield HISTORIES, (HISTORIES, demand, outcome, "-")
     for computed in data.verdict_ranges:
         motion = computed.dataset.attrs.get("motion")
-        name = f"{_VARIATIONS} under '{motion}'" if motion else _VARIATIONS
+        name = f"{VARIATIONS} under '{motion}'" if motion else VARIATIONS
         outcome = "; ".join(filter(None, [computed.count, computed.displacements]))
-        yield _VARIATIONS, (name, "the same motion", outcome + computed.unanswered, "-")
+        yield VARIATIONS, (name, "the same motion", outcome + computed.unanswered, "-")
     for result, statement in data.statements.items():
         of = f" of {name_spectrum(data)}" if result == "assessment" else ""
         for name, demand, *others in statement.rows:
@@ -470,16 +501,16 @@ def _list_ranges_of_steps(data: ReportData) -> Iterator[str]:
 
 def _describe_outcomes(data: ReportData) -> Iterator[str]:
     """Yield each outcome with the motions that lead to it, and the largest displacement."""
-    by_verb: dict[str, list[str]] = {}
-    for name, run in data.runs.items():
-        by_verb.setdefault(_VERBS[run.verdict.outcome], []).append(name)
-    for verb, names in by_verb.items():
+    for outcome, verb in _VERBS.items():
+        names = [name for name, run in data.runs.items() if run.verdict.outcome == outcome]
+        if not names:
+            continue
         of = f"of {_describe_peaks(data.runs[name] for name in names)}"
         under = f"{len(names)} of {len(data.runs)} motions {of}: {', '.join(names)}"
         if len(names) == len(data.runs):
             under = f"all {len(names)} motions {of}"
             under = under if len(names) > 1 else f"the motion '{names[0]}' {of}"
-        fall = "; whether it falls was not computed" if verb == _VERBS["mechanism"] else ""
+        fall = "; whether it falls was not computed" if outcome == "mechanism" else ""
         yield f"{verb} under {under}{fall}"
 
 
@@ -508,144 +539,6 @@ def describe_lost(fall: CollapseState, max_names: int = 3) -> str:
     """Return the number of lost blocks, the time of the first, and the first names."""
     names = ", ".join([*fall.blocks[:max_names], *(["…"] if fall.blocks[max_names:] else [])])
     return f"{len(fall.blocks)} blocks, the first at {fall.time:.2f} s: {names}"
-
-
-def list_varied(data: ReportData) -> tuple[str, ...]:
-    """Return the properties that the range of the verdict varies; none without a range."""
-    return data.verdict_ranges[0].properties if data.verdict_ranges else ()
-
-
-def list_doubts(data: ReportData) -> list[tuple[str, str]]:
-    """Return each result in doubt with its doubt, once; of runs with the number that have it."""
-    verdicts = [run.verdict for run in data.runs.values()]
-    doubts = [(_HISTORIES, text) for text in _merge_doubts([v.doubts for v in verdicts])]
-    for found in data.verdict_ranges:
-        under = f"under '{found.dataset.attrs.get('motion')}': " * (len(data.verdict_ranges) > 1)
-        doubts += [(_VARIATIONS, text) for text in _doubt_displacement(data, found)]
-        doubts += [(_VARIATIONS, f"{under}{doubt.cause}") for doubt in found.doubts]
-    if data.verdict_ranges and (fill := list_elastic_fill(data)):
-        text = f"variations take {', '.join(fill)} as rigid: as an elastic body it was not varied"
-        doubts.append((_VARIATIONS, text))
-    for name, stated in data.statements.items():
-        doubts += [(RESULTS[name], doubt) for doubt in stated.doubts]
-    return [*_merge_motions(dict.fromkeys(doubts))]
-
-
-def _merge_motions(doubts: Iterable[tuple[str, str]]) -> Iterator[tuple[str, str]]:
-    """Yield each doubt of a result once, with all motions under which it is true."""
-    found: dict[tuple[str, ...], list[tuple[str, str]]] = {}
-    for result, text in doubts:
-        named = re.search(r"under '([^']+)'", text)
-        plain = text.replace(named[0], "\0", 1) if named else text
-        kind = _NUMBER.split(plain)[::2] if named else [text]
-        found.setdefault((result, *kind), []).append((named[1] if named else "", plain))
-    for (result, *_), same in found.items():
-        motions, texts = ([*dict.fromkeys(column)] for column in zip(*same, strict=True))
-        first, *others = (f"'{motion}'" for motion in motions)
-        merged, differing = _merge_numbers(texts)
-        if differing > MAX_RANGES:
-            merged = f"{texts[0]}; likewise under {join_words(others)}".replace(
-                "\0", f"under {first}"
-            )
-        yield result, merged.replace("\0", f"under {join_words([first, *others])}")
-
-
-def _merge_doubts(runs: Sequence[Iterable[Doubt]]) -> Iterator[str]:
-    """Yield each doubt of some runs once, with how many have it; that of a run alone as it is."""
-    found: dict[tuple[str, ...], list[str]] = {}
-    for cause in (cause for doubts in runs for cause in dict.fromkeys(x.cause for x in doubts)):
-        found.setdefault(tuple(_NUMBER.split(cause)[::2]), []).append(cause)
-    for texts in found.values():
-        merged, _ = _merge_numbers(texts)
-        yield f"{len(texts)} of {len(runs)} runs: {merged}" if len(runs) > 1 else merged
-
-
-def _merge_numbers(texts: Sequence[str]) -> tuple[str, int]:
-    """Return texts that differ in numbers alone as one, with their ranges, and how many differ."""
-    parts = [_NUMBER.split(text) for text in texts]
-    columns = [
-        sorted(set(column), key=float) for column in zip(*(x[1::2] for x in parts), strict=True)
-    ]
-    ranges = [" to ".join(dict.fromkeys((column[0], column[-1]))) for column in columns]
-    merged = parts[0]
-    merged[1::2] = ranges
-    return "".join(merged), sum(len(column) > 1 for column in columns)
-
-
-def _weigh(doubt: str) -> int:
-    """Return the place of a doubt among others, by its words."""
-    return next((k for k, words in enumerate(_WEIGHTY) if words in doubt), len(_WEIGHTY))
-
-
-def _doubt_displacement(data: ReportData, found: VerdictRange) -> Iterator[str]:
-    """Yield how the unvaried run of the variations differs from the run under that motion."""
-    motion, base = found.dataset.attrs.get("motion"), found.dataset.isel(run=0)
-    if not motion or base["sampled"] or base["error"].item():
-        return
-    for run in data.runs.values():
-        verdict = run.verdict
-        if run.dataset.attrs.get("motion") != motion or verdict.outcome not in COLLAPSE_STATES:
-            continue
-        sizes = verdict.displacement, float(base["displacement"])
-        fallen = [each in FALLEN_STATES for each in (verdict.outcome, base["outcome"].item())]
-        own, other = (
-            "fallen" if falls else f"displaced by up to {format_mm(size)}"
-            for falls, size in zip(fallen, sizes, strict=True)
-        )
-        if fallen[0] != fallen[1] or (
-            not fallen[0] and max(sizes) > MAX_RATIO_OF_DISPLACEMENTS * min(sizes)
-        ):
-            yield (
-                f"the run under '{motion}' is {own}, the unvaried one of its variations, of "
-                f"other time steps or another fidelity, {other}"
-            )
-
-
-def list_notes(data: ReportData) -> dict[str, list[str]]:
-    """Return the notes of each result, with that on motions of another demand."""
-    notes = {RESULTS[name]: [*each.notes] for name, each in data.statements.items() if each.notes}
-    notes |= {_HISTORIES: missed} if (missed := note_checks(data)) else {}
-    peaks = [_peak_of_ground(run) for run in data.runs.values()]
-    if peaks and "assessment" in data.statements:
-        mean, other = np.mean(peaks), _peak_of_spectrum(data)
-        if abs(np.log(mean / other)) > np.log(MAX_RATIO_OF_PEAKS):
-            notes.setdefault(RESULTS["assessment"], []).append(
-                f"the spectrum has a PGA of {other:.3g} g, and the motions have {mean:.3g} g: the "
-                "margin is not one on the demand of the time histories"
-            )
-    return notes
-
-
-def list_elastic_fill(data: ReportData) -> list[str]:
-    """Return the materials of blocks that yield to others, if they are elastic bodies in a run."""
-    if not data.runs or ("rigid" in data.fidelity and "full" not in data.fidelity):
-        return []
-    structure = data.case.structure
-    bodies = [structure.blocks[number] for number in find_yielding_blocks(structure)]
-    return list(dict.fromkeys(block.material.name for block in bodies))
-
-
-def list_unvaried(data: ReportData) -> list[str]:
-    """Return what was not varied, without which "no doubt" says little; nothing without a run."""
-    if not data.runs:
-        return []
-    single = ["motion"] if len(data.runs) == 1 else []
-    if not data.verdict_ranges:
-        single += ["lengths", "stiffness", "friction", "damping"]
-    else:
-        single.append("lengths")
-        varied = {each.dataset.attrs.get("motion", "") for each in data.verdict_ranges}
-        left = [f"'{name}'" for name in data.runs if name not in varied and len(data.runs) > 1]
-        single += [f"properties under {join_words(left)}"] if left and "" not in varied else []
-    single += ["stiffness and strength of the fill"] if list_elastic_fill(data) else []
-    # the samples of a rate were scaled until they fell
-    single += [] if {"scale", "risk"} & data.statements.keys() else ["size of the motions"]
-    predicted = all("predicted_error" in run.dataset.attrs for run in data.runs.values())
-    if not predicted and "accuracy.txt" not in data.files:
-        single += ["fidelity"] if "dt" in list_varied(data) else ["time step", "fidelity"]
-    study = read_study(data)
-    studied = set() if study is None else list_studied(study)
-    return [each for each in single if each not in studied]
 
 
 def sentence(text: str) -> str:

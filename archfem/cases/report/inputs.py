@@ -50,6 +50,12 @@ _RATING_KEYS = {"live", "impact", "dead", "width", "area_load"}
 # Properties that limit analysis of rigid blocks does not use, beside a strength that is a default
 _UNUSED = {"young", "poisson", "normal_stiffness", "shear_stiffness", "finish"}
 
+# Sources of the defaults of an assessment, which may be of another norm than the report's
+_SOURCES = {
+    "q": "Circolare 7/2019, C8.7.1.2.1.7",
+    "confidence_factor": "of LC1, Circolare 7/2019, C8.5.4.1, from memory",
+}
+
 # Properties that may be left out: name in texts, and unit
 _FURTHER_PROPERTIES = {
     "poisson": ("ν", 1.0, ""),
@@ -221,6 +227,8 @@ def _default_rows(section: str, table: Mapping[str, Any]) -> Iterator[Row]:
         # an empty value stands for none, and is no input
         if key not in table and argument.default not in (Parameter.empty, None, ()):
             value = words.get(key, describe_value(argument.default))
+            if section == "assessment" and key in _SOURCES:
+                value += f" ({_SOURCES[key]})"
             yield f"{section}: {key.replace('_', ' ')}", value, "default"
 
 

@@ -12,12 +12,8 @@ import numpy as np
 import xarray as xr
 
 from archfem._files import read_listed
-from archfem.cases.report.conclusion import (
-    build_conclusion,
-    list_elastic_fill,
-    list_varied,
-    sentence,
-)
+from archfem.cases.report.conclusion import build_conclusion, sentence
+from archfem.cases.report.doubts import list_elastic_fill, list_varied
 from archfem.cases.report.inputs import describe_value, tabulate_inputs
 from archfem.cases.report.report_data import (
     STATIC_RESULTS,
@@ -32,7 +28,7 @@ from archfem.cases.report.response import (
 )
 from archfem.cases.report.study_findings import read_study, tabulate_study
 from archfem.cases.run import DRAWING_FILE
-from archfem.dynamics.collapse_state import FALLEN_STATES
+from archfem.dynamics.collapse_state import DISLOCATION, FALLEN_STATES, shallowest_part
 from archfem.dynamics.history import SIGN_CONVENTION
 from archfem.dynamics.recorder import library_versions
 from archfem.dynamics.verdict_range import UNVARIED, VerdictRange
@@ -45,7 +41,7 @@ from archfem.units import MPa, format_mm, kN
 from archfem.view.pages.document import FigureBlock, Grid, Section, TextBlock
 from archfem.view.structure import draw_names, draw_structure, list_numbers
 from archfem.view.studies import draw_findings
-from archfem.view.style import limit_width
+from archfem.view.style import Colour, limit_width
 
 # Of figure and table, with the file of the figure
 _RISK_CAPTIONS = (
@@ -386,24 +382,26 @@ def _build_study(data: ReportData) -> list[Any]:
 
 
 def _build_range(data: ReportData) -> list[Any]:
-    """Build text and pictures of ranges; without a fall, single changes say more than residuals."""
+    """Build text and pictures of ranges; where all stand, single changes say more than shares."""
     caption = (
         "Residual displacement over the properties that explain most of it, at most six; falls are "
         "above a dashed line, and displacements below the axis at its lower end."
     )
     table = (
-        "Falls by the value of each property: of k_n, k_s and damping ratio factors on the values "
-        "of the case, of friction what is added"
+        "{} by the value of each property: of k_n, k_s and damping ratio factors on the values of "
+        "the case, of friction what is added"
     )
     built, ranges = list[Any](), iter(data.verdict_ranges)
     for pair, place in data.list_parts("verdict_range.txt").items():
         # the picture of a pair is named by it, since there may be several
         named = f"Under '{pair}': {caption[:1].lower()}{caption[1:]}" if pair else caption
-        blocks = data.read_result(place.removesuffix(".txt"), named, table=table)
         # a command without an answer leaves its reason alone
         found = next(ranges) if place.replace(".txt", ".nc") in data.files else None
-        changes = [] if found is None else _build_single_changes(found, pair)
-        if found is not None and not found.falls.any():
+        changes = [] if found is None else _build_single_changes(data, found, pair)
+        counted = "Dislocations" if found and found.is_dislocation_worst else "Falls"
+        titled = table.format(counted)
+        blocks = data.read_result(place.removesuffix(".txt"), named, table=titled)
+        if found is not None and not found.decisive.any():
             told = filter(None, [found.sentence, found.displacements])
             words = f"{'; '.join(told)}; varied: {', '.join(found.properties)}"
             blocks[: 2 if changes else 1] = [TextBlock(sentence(words.replace("_", " ")))]
@@ -411,20 +409,21 @@ def _build_range(data: ReportData) -> list[Any]:
     return built
 
 
-def _build_single_changes(found: VerdictRange, pair: str) -> list[Any]:
+def _build_single_changes(data: ReportData, found: VerdictRange, pair: str) -> list[Any]:
     """Build picture and table of the runs in which one property differs, the worst first."""
     if not found.what_changes:
         return []
     changes, under = found.single_changes, f" under '{pair}'" if pair else ""
-    sizes = [np.nan if x.outcome in FALLEN_STATES else 1e3 * x.displacement for x in changes]
+    sizes = [np.nan if x.outcome in FALLEN_STATES else 1e3 * found.measure(x) for x in changes]
     first = next(k for k, each in enumerate(changes) if each.name == UNVARIED)
     order = [first, *(k for k in range(len(changes)) if k != first)]
+    size = ("residual" if found.is_dislocation_worst else "largest") + " displacement"
     table = xr.Dataset(
-        {"largest displacement": ("case", [sizes[k] for k in order], {"units": "mm"})},
+        {size: ("case", [sizes[k] for k in order], {"units": "mm"})},
         {"case": [changes[k].name for k in order]},
     )
-    falls = "; a fall has none" * any(np.isnan(sizes))
-    caption = f"Largest displacement by each single change{under}{falls}."
+    caption = f"{size.capitalize()} by each single change{under}"
+    caption += "; a fall has none" * any(np.isnan(sizes))
     head = ("single change", "outcome", "largest displacement", "at the end")
     rows = [
         (each.name, each.outcome, *map(format_mm, (each.displacement, each.residual)))
@@ -432,8 +431,14 @@ def _build_single_changes(found: VerdictRange, pair: str) -> list[Any]:
     ]
     drawn = []
     with suppress(InvalidInput):  # all are equal, or fall
-        drawn.append(FigureBlock.of(draw_findings(table), caption))
-    return [*drawn, Grid(head, rows, f"Single changes{under}, the worst first")]
+        figure = draw_findings(table)
+        if found.is_dislocation_worst:
+            limit = DISLOCATION * shallowest_part(data.case.structure)[0]
+            figure.axes[0].axvline(1e3 * limit, color=Colour.HINGE, lw=1.2)
+            caption += f"; beyond the line, {format_mm(limit)}, it counts as dislocated"
+        drawn.append(FigureBlock.of(figure, f"{caption}."))
+    ranked = "by the residual displacement, " * found.is_dislocation_worst
+    return [*drawn, Grid(head, rows, f"Single changes{under}, {ranked}the worst first")]
 
 
 def build_method_section(data: ReportData) -> Section:

@@ -20,8 +20,9 @@ from archfem.view.pages.document import Grid
 # those of a push are shown in g
 OVER_SITE = "over the site's acceleration"
 _FACTORS = ("push", OVER_SITE, "factor", "without_pressure")
-_SIZES = ("residual_displacement", "largest_displacement")
+_SIZES = ("largest_displacement", "residual_displacement")
 MAX_CASES = 24
+MIN_CHANGE = 0.1  # of a finding that is worth a sentence [-]
 MAX_NAMES = 4  # of cases in a sentence
 
 # Coordinates that number points, or are motions of one case
@@ -49,7 +50,7 @@ class StudyFindings:
     table: xr.Dataset
     keys: tuple[str, ...]  # coordinates that tell cases apart
     names: tuple[str, ...]  # findings that are shown, that which decides first
-    worst: Any  # DataFrame, a row for each case in the order of the study; `falls`, of `runs`
+    worst: Any  # DataFrame of the cases in the order of the study; `falls`, of `runs` motions
 
     @property
     def decides(self) -> str:
@@ -89,13 +90,15 @@ def collect_findings(title: str, text: str, table: xr.Dataset) -> StudyFindings:
 
 
 def _find_worst(frame: Any, keys: list[str], names: list[str]) -> Any:
-    """Return the worst point of each case, with the number of its falls and of its motions."""
+    """Return the worst outcome of each case and the worst of each finding over its motions."""
     states = frame["fall"] if "fall" in frame else frame[names[0]].map(lambda _: "")
     rank = states.map(lambda state: COLLAPSE_STATES.index(state) if state else 0)
     size = frame[names[0]] if names[0] in _FACTORS else -frame[names[0]]
     ranked = frame.assign(rank=-rank, size=size, falls=states.isin(FALLEN_STATES), runs=1)
-    counts = ranked.groupby(keys, sort=False, dropna=False)[["falls", "runs"]].transform("sum")
-    ranked = ranked.assign(**{name: counts[name] for name in counts})
+    cases = ranked.groupby(keys, sort=False, dropna=False)
+    ways = {name: "min" if name in _FACTORS else "max" for name in names}
+    ways |= {"falls": "sum", "runs": "sum"}
+    ranked = ranked.assign(**{name: cases[name].transform(way) for name, way in ways.items()})
     return ranked.sort_values(["rank", "size"]).drop_duplicates(keys).sort_index()
 
 
@@ -107,16 +110,14 @@ def tabulate_study(found: StudyFindings) -> Grid:
     several = pair not in ("", *found.keys) and order["runs"].max() > 1
     state = "fall" in order and any(order["fall"])
     head = [_label_finding(found.table, name) for name in (*found.keys, *found.names)]
-    head += ["under"] if several else []
     head += ["outcome"] if state else []
     rows = []
     for _, row in order.head(MAX_CASES).iterrows():
         cells = [_format(row[name]) for name in (*found.keys, *found.names)]
-        cells += [str(row[pair])] if several else []
         count = f", in {row['falls']} of {row['runs']}" if several and row["falls"] else ""
         rows.append([*cells, f"{row['fall']}{count}"] if state else cells)
     caption = f"Study: {found.title}"
-    caption += "; of each case its worst motion" if several else ""
+    caption += "; of each case the worst of each column over its motions" if several else ""
     if left := order.iloc[MAX_CASES:].to_dict("records"):
         falls = sum(row["falls"] > 0 for row in left)
         caption += f"; {len(left)} of {len(order)} cases are left out, of which {falls} fall"
@@ -139,19 +140,22 @@ def say_what_changes(found: StudyFindings) -> Iterator[str]:
     if not len(found.worst):
         return
     rows, name = found.worst.to_dict("records"), found.decides
-    falling = [found.label(row) for row in rows if row["falls"]]
+    falling = [
+        found.label(row) + f", under {row['falls']} of {row['runs']} motions" * (row["runs"] > 1)
+        for row in rows
+        if row["falls"]
+    ]
     more = f" and {len(falling) - MAX_NAMES} more" * (len(falling) > MAX_NAMES)
-    text = f"in the study none of {len(rows)} cases falls, and "
+    text, then = f"in the study none of {len(rows)} cases falls", ", and "
     if falling:
         count = f"{len(falling)} of {len(rows)} cases fall{'s' * (len(falling) == 1)}"
-        text = f"in the study {count}: {', '.join(falling[:MAX_NAMES])}{more}; of the others "
+        text = f"in the study {count}: {'; '.join(falling[:MAX_NAMES])}{more}"
+        then = "; of the others "
     elif "fall" not in found.table:
-        text = "in the study "
+        text, then = "", "in the study "
     others = [row for row in rows if not row["falls"] and np.isfinite(row[name])]
-    if len(others) > 1:
-        yield text + _compare_cases(found, others)
-    elif falling:
-        yield text.removesuffix("; of the others ")
+    compared = _compare_cases(found, others) if len(others) > 1 else ""
+    yield from filter(None, [f"{text}{then}{compared}" if compared else text])
     # undefined without a demand
     below = [row for row in rows if row.get(OVER_SITE, np.nan) < 1.0]
     if below:
@@ -162,7 +166,7 @@ def say_what_changes(found: StudyFindings) -> Iterator[str]:
 
 
 def _compare_cases(found: StudyFindings, rows: list[Any]) -> str:
-    """Say which of some cases changes the finding that decides most."""
+    """Say which of some cases changes the finding that decides most; "" if none does by much."""
     name, first = found.decides, rows[0]
     least, words = name in _FACTORS, name.replace("_", " ")
     extreme = (min if least else max)(rows, key=lambda row: row[name])
@@ -174,6 +178,8 @@ def _compare_cases(found: StudyFindings, rows: list[Any]) -> str:
     verb = "lowers" if least else "raises"
     if extreme is first:
         return f"none {verb} the {words} of {found.label(first)}, {show(first[name])}"
+    if abs(extreme[name] - first[name]) < MIN_CHANGE * abs(first[name]):
+        return ""
     change = f"from {show(first[name])} to {show(extreme[name])}"
     return f"{found.label(extreme)} {verb} the {words} most, {change}"
 
