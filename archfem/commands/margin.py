@@ -1,8 +1,11 @@
 """Commands on the margin under each motion of a case: range of the verdict, scale of a fall."""
 
 import argparse
+import json
+from dataclasses import asdict
 from functools import wraps
 from pathlib import Path
+from typing import Any
 
 from archfem._display import DOUBT_MARK, write_progress_line
 from archfem._files import create_result_folder, intact_file_list, path_inside, read_listed
@@ -17,19 +20,25 @@ from archfem.commands.run import (
     record_doubts,
     write_results,
 )
-from archfem.dynamics.collapse_state import DISLOCATION, shallowest_part
+from archfem.dynamics.collapse_state import DISLOCATION, CollapseState, shallowest_part
+from archfem.dynamics.history import Ending
 from archfem.dynamics.motion_scaling import (
-    INTERRUPTED_SEARCH,
     CollapseScale,
+    KeptRuns,
     MechanismScales,
+    ScaledRun,
     collapse_scale,
     mechanism_scales,
 )
 from archfem.errors import InvalidInput
+from archfem.limit.mechanism_count import Mechanism
 from archfem.motion.motion import Motion
 from archfem.view.style import Files
 
 # Modules of studies are slow to import, and imported where they are needed.
+
+# File with the runs of an interrupted search, from which the same command continues
+KEPT_RUNS = "scale_runs.json"
 
 
 def _for_each_pair(command: Command) -> Command:
@@ -85,14 +94,20 @@ def _choose_motion(case: Case, options: argparse.Namespace) -> Motion:
 def scale(options: argparse.Namespace) -> int:
     """Scale the motion of a case until it falls, or forms a mechanism in small displacements."""
     case = Case.read(options.case, options.changes)
-    if (kept := _read_finished_scale(case, options)) is not None:
+    kept, begun = (_read_kept(case, options, name) for name in ("scale.txt", KEPT_RUNS))
+    if kept and options.pair and begun is None and not kept.startswith("no answer"):
         print(f"{case.title}\n{kept}")
         return doubt_code(kept.splitlines())
     motion = _choose_motion(case, options)
     found: CollapseScale | MechanismScales
     search = collapse_scale if case.analysis.displacements == "large" else mechanism_scales
+    made = _unpack_runs(begun or "[]")
+    if made:
+        write_progress_line("scale", f"{len(made)} runs of the interrupted search are kept")
     with record_doubts(case.structure) as doubts:
-        found = search(case.analysis, motion)
+        found = search(case.analysis, motion, made=made)
+    # of a run that Ctrl-C ended nothing is kept
+    doubts = [line for line in doubts if not line.startswith(f"{DOUBT_MARK}interrupted at ")]
     doubts += [f"{DOUBT_MARK}{doubt}" for doubt in found.doubts]
     text = "\n".join([f"{motion.name}: {found}", *dict.fromkeys(doubts), "", found.table()])
     files: Files = {"scale.txt": text, **result_text.state_scale(found, motion, doubts)}
@@ -101,21 +116,41 @@ def scale(options: argparse.Namespace) -> int:
 
         limit = DISLOCATION * shallowest_part(case.structure)[0]
         files["scale.png"] = draw_scale(found, limit)
+    if found.interrupted:
+        runs = [(dt, asdict(run)) for (dt, _), run in found.kept_runs.items()]
+        files[KEPT_RUNS] = json.dumps(runs)
     write_results("scale", case, options.out, f"{case.title}\n{text}", lambda: files, options.pair)
     if found.interrupted:
         raise KeyboardInterrupt
     return doubt_code(doubts)
 
 
-def _read_finished_scale(case: Case, options: argparse.Namespace) -> str | None:
-    """Return the text of a finished search under the same pair of the same case, or None."""
-    if options.out is None or options.pair is None:
+def _read_kept(case: Case, options: argparse.Namespace, name: str) -> str | None:
+    """Return a file of an earlier search under the same motion of the same case, or None."""
+    if options.out is None:
         return None
     group = intact_file_list(Path(options.out)).get(name_group("scale", options.pair))
-    if group is None or group.inputs != case.hash_inputs():
+    place = (Path(options.pair or "") / name).as_posix()
+    if group is None or group.inputs != case.hash_inputs() or place not in group.files:
         return None
     try:
-        text = read_listed(Path(options.out), f"{options.pair}/scale.txt").decode("utf-8").strip()
+        return read_listed(Path(options.out), place).decode("utf-8").strip()
     except InvalidInput:  # deleted, or changed
         return None
-    return None if text.startswith("no answer") or INTERRUPTED_SEARCH in text else text
+
+
+def _unpack_runs(text: str) -> KeptRuns:
+    """Return the runs of an interrupted search from their file."""
+    made = {}
+    for dt, run in json.loads(text):
+        met = run["mechanisms"].items()
+        run["mechanisms"] = {name: x and Mechanism(**_with_tuples(x)) for name, x in met}
+        run["fall"] = run["fall"] and CollapseState(**_with_tuples(run["fall"]))
+        run["ending"] = Ending(run["ending"])
+        made[dt, run["scale"]] = ScaledRun(**_with_tuples(run))
+    return made
+
+
+def _with_tuples(values: dict[str, Any]) -> dict[str, Any]:
+    """Return values that were written as JSON, with tuples in place of its lists."""
+    return {key: tuple(x) if isinstance(x, list) else x for key, x in values.items()}

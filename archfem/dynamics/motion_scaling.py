@@ -43,8 +43,8 @@ from archfem.units import STANDARD_GRAVITY
 # Limit state of large displacements, in place of a definition of mechanisms
 COLLAPSE_DEFINITION = "collapse"
 
-# Doubt of a search that Ctrl-C has ended
-INTERRUPTED_SEARCH = "the search was interrupted"
+# Words beside the bounds of a search that Ctrl-C has ended
+UNFINISHED = "search unfinished"
 
 # Step of a search that is given none, and the least to which it is shortened for sliding [s]
 OWN_STEP, LEAST_STEP = 0.005, 0.0005
@@ -66,19 +66,9 @@ class ScaledRun:
     doubts: tuple[str, ...] = ()  # reasons why the run may be wrong
     admissible_step: float = inf  # that follows sliding, where that of the run does not [s]
 
-    @property
-    def is_interrupted(self) -> bool:
-        """Whether Ctrl-C ended the run; later mechanisms are then unknown."""
-        return self.ending is Ending.INTERRUPTED
-
     def has_answer(self, definition: str) -> bool:
-        """Return whether the run decides on a limit state.
-
-        Without a state of collapse it does not decide on a fall.
-        """
-        if definition == COLLAPSE_DEFINITION:
-            return self.fall is not None and not self.is_interrupted
-        return self.fails(definition) or not self.is_interrupted
+        """Return whether the run decides on a limit state: on a fall by a state of collapse."""
+        return definition != COLLAPSE_DEFINITION or self.fall is not None
 
     def fails(self, definition: str) -> bool:
         """Return whether the limit state was met."""
@@ -90,6 +80,10 @@ class ScaledRun:
     def survives(self, definition: str) -> bool:
         """Return whether the whole motion passed without the limit state."""
         return self.has_answer(definition) and not self.fails(definition)
+
+
+# Runs by time step, None where it was not given, and scale
+KeptRuns = Mapping[tuple[float | None, float], ScaledRun]
 
 
 @dataclass(frozen=True)
@@ -119,6 +113,7 @@ class MechanismScales:
     runs: tuple[ScaledRun, ...] = ()  # in order of their scales
     interrupted: bool = False  # whether Ctrl-C ended the search
     pga: float | None = None  # peak of the motion [m/s²]
+    dt: float | None = None  # time step that was given [s]
 
     def __repr__(self) -> str:
         """Return the scales around the first mechanism by any definition, in one line."""
@@ -127,6 +122,7 @@ class MechanismScales:
         met = "nor at any scale that was tried"
         if bracket.run:
             met = f"first mechanism at {_say_scale(bracket.upper, self.pga)}, by {first}"
+        met = f"{UNFINISHED}, {met}" if self.interrupted else met
         return _say_bracket("no mechanism", bracket.lower, self.pga, met)
 
     @property
@@ -135,10 +131,14 @@ class MechanismScales:
         first = min(self.definitions, key=lambda definition: self[definition].upper)
         return _doubts_of_searches({"": self}, first)
 
+    @property
+    def kept_runs(self) -> "KeptRuns":
+        """Runs by time step and scale."""
+        return {(self.dt, run.scale): run for run in self.runs}
+
     def with_run(self, run: ScaledRun) -> "MechanismScales":
         """Return the search with one more run."""
-        runs = sorted([*self.runs, run], key=lambda each: each.scale)
-        return replace(self, runs=tuple(runs), interrupted=run.is_interrupted)
+        return replace(self, runs=tuple(sorted([*self.runs, run], key=lambda each: each.scale)))
 
     def __getitem__(self, definition: str) -> Bracket:
         """Bracket of a definition; without bounds if the structure has too few joints for it."""
@@ -194,6 +194,7 @@ def mechanism_scales(  # noqa: PLR0913  (arguments of `time_history`, and of the
     precision: float = 0.05,
     between: tuple[float, float] = (0.05, 5.0),
     method: str | Callable[[Motion], Stepper] = "auto",
+    made: KeptRuns | None = None,
 ) -> MechanismScales:
     """Find the smallest scale of a motion at which each definition of a mechanism is first met.
 
@@ -212,6 +213,7 @@ def mechanism_scales(  # noqa: PLR0913  (arguments of `time_history`, and of the
         precision: relative width of the final brackets [-].
         between: smallest and largest scale [-]; no ground motion may exceed 5 g.
         method: as for `time_history`, or a function from a scaled motion to its solver.
+        made: `kept_runs` of an interrupted search with the same arguments, which continues.
 
     Returns:
         Brackets, mechanisms and runs; at most 40 runs are made.
@@ -227,6 +229,8 @@ def mechanism_scales(  # noqa: PLR0913  (arguments of `time_history`, and of the
     start = start or dead_load(model)
 
     def run_scaled(scale: float) -> ScaledRun:
+        if kept := (made or {}).get((dt, scale)):
+            return kept
         scaled = motion.scaled(scale)
         solver = method if isinstance(method, str) else method(scaled)
         options = {"start": start, "damping": damping, "criteria": criteria, "method": solver}
@@ -238,7 +242,7 @@ def mechanism_scales(  # noqa: PLR0913  (arguments of `time_history`, and of the
     definitions = (*applicable_definitions(start.model.structure, criteria), "verified")
     within = admissible_range(between, motion)
     found = search_scales(run_scaled, definitions, precision, within, name=motion.name)
-    return replace(found, pga=motion.pga)
+    return replace(found, pga=motion.pga, dt=dt)
 
 
 def _run_as_far(model: Model | Analysis, motion: Motion, **options: Any) -> History:
@@ -287,7 +291,8 @@ def _doubts_of_searches(
             broken = next(run for run in scales.runs if run.scale == bracket.unanswered[0])
             doubts[-1] += f": the first {broken.outcome}" if broken.outcome else ""
         if scales.interrupted:
-            doubts.append(f"{INTERRUPTED_SEARCH} after {len(scales.runs)} runs{settings}")
+            made = f"{len(scales.runs)} run{'s' * (len(scales.runs) != 1)}{settings}"
+            doubts.append(f"the search was interrupted after {made}; the same command continues it")
         for run in scales.runs:
             if run.scale in (bracket.lower, bracket.upper):
                 for doubt in run.doubts:
@@ -338,6 +343,8 @@ def search_scales(
                 began = perf_counter()
                 run = run_scaled(scale)
                 seconds = perf_counter() - began
+                if run.ending is Ending.INTERRUPTED:  # says nothing about the scale
+                    raise KeyboardInterrupt
                 scales = scales.with_run(run)
                 result = run.fall.kind if run.fall else run.outcome
                 progress.show(f"{scale:#.3g} × the motion: {result}, in {seconds:.2g} s", 1)
@@ -373,10 +380,10 @@ def _next_scale(
     ratio, max_runs = sqrt(2.0), 40  # ratio of scales before bisection
     first = [min(max(scale, smallest), largest) for scale in begin]
     missing = [scale for scale in first if all(scale != run.scale for run in runs)]
-    if missing and not scales.interrupted:
+    if missing:
         return missing[0]
     # four definitions to five per cent take about fifteen runs
-    if len(runs) >= max_runs or scales.interrupted:
+    if len(runs) >= max_runs:
         return None
     brackets = [scales[definition] for definition in scales.definitions]
     if runs[0].scale > smallest and any(bracket.lower == 0.0 for bracket in brackets):
@@ -402,7 +409,8 @@ class CollapseScale:
     """Scales of a motion between which a structure falls, searched with several time steps.
 
     A structure has fallen once its `CollapseState` is "partly fallen" or "fallen". A run that is
-    broken off counts neither as a fall nor as standing, and no bracket rests on it. The response
+    broken off counts neither as a fall nor as standing, and no bracket rests on it. Of a step whose
+    search was interrupted only falls count, unless no step has a finished search. The response
     need not be monotonic: it may survive a motion stronger than one that brought it down, and fall
     at a scale between two at which it stood.
 
@@ -420,11 +428,11 @@ class CollapseScale:
 
     def __repr__(self) -> str:
         """Return scales around the fall, and from which it is dislocated, which is no fall."""
-        least = min(self.bracket(dt).upper for dt in self.searches)
+        least, (low, *_) = self._least_fall, sorted(run.scale for run in self._runs) or [inf]
         met = "falls at no scale that was tried"
         if least < inf:
             met = f"falls at {_say_scale(least, self.pga)}"
-        elif unanswered := [s for each in self.searches for s in self.bracket(each).unanswered]:
+        elif unanswered := [run.scale for run in self._runs if run.fall is None]:
             none = f"{len(unanswered)} have none, the first at {min(unanswered):#.3g} ×"
             met = f"falls in no run that has an answer ({none})"
         if least < self.upper:
@@ -433,8 +441,8 @@ class CollapseScale:
         if self.dislocated < inf:
             met = f"dislocated from {self.dislocated:#.3g} ×, {met}"
         if self.moves <= self.held:
-            least = min(search.runs[0].scale for search in self.searches.values())
-            met = f"a mechanism from {self.moves:#.3g} ×{' or less' * (self.moves == least)}, {met}"
+            met = f"a mechanism from {self.moves:#.3g} ×{' or less' * (self.moves == low)}, {met}"
+        met = f"{UNFINISHED}, {met}" if self.interrupted else met
         steps = join_names([f"{1e3 * dt:g}" for dt in sorted(self._every, reverse=True)])
         varied = f"; varied were the scale and the time step ({steps} ms), and no property"
         return _say_bracket("stands", self.held, self.pga, met) + self._say_tested() + varied
@@ -447,6 +455,7 @@ class CollapseScale:
             return ""
         ratio = max(high / low for low, high in gaps)
         parted = " or is dislocated" * (self.dislocated < self.lower)
+        parted += " or has no answer" * (min(self.unanswered, default=inf) < self.lower)
         return (
             f"; stands{parted} at every smaller scale that was run: from {gaps[0][0]:#.3g} × on "
             f"they are up to a factor of {ratio:.2f} apart, and none between was run"
@@ -461,8 +470,9 @@ class CollapseScale:
     def doubts(self) -> tuple[str, ...]:
         """Reasons why the scales may be wrong."""
         doubts = [str(doubt) for doubt in self.of_model]
-        brackets = {dt: each[COLLAPSE_DEFINITION] for dt, each in self._every.items()}
-        if _disagreeing(self._every):
+        finished = {dt: each for dt, each in self._every.items() if not each.interrupted}
+        brackets = {dt: each[COLLAPSE_DEFINITION] for dt, each in finished.items()}
+        if len(finished) > 1 and _disagreeing(finished):
             found = (
                 f"between {b.lower:#.3g} and {b.upper:#.3g} × by {1e3 * dt:g} ms"
                 for dt, b in brackets.items()
@@ -478,6 +488,11 @@ class CollapseScale:
         """All runs made, those with longer steps first."""
         return {**self.longer, **self.searches}
 
+    @property
+    def kept_runs(self) -> KeptRuns:
+        """Runs by time step and scale."""
+        return {(dt, run.scale): run for dt, each in self._every.items() for run in each.runs}
+
     def bracket(self, dt: float) -> Bracket:
         """Return the bracket of collapse that was found with one time step.
 
@@ -490,18 +505,36 @@ class CollapseScale:
         return self.searches[dt][COLLAPSE_DEFINITION]
 
     @property
+    def _decisive(self) -> dict[float, MechanismScales]:
+        """Finished searches, those with longer steps if there are no others; all if none is."""
+        made = (self.searches, self.longer)
+        finished = ({dt: x for dt, x in each.items() if not x.interrupted} for each in made)
+        return next(filter(None, finished), self.searches)
+
+    @property
+    def _runs(self) -> list[ScaledRun]:
+        """Runs of these, and of interrupted searches with shorter steps, whose falls count."""
+        made = {**self._decisive, **self.searches}
+        return [run for search in made.values() for run in search.runs]
+
+    @property
+    def _least_fall(self) -> float:
+        """Smallest scale at which it fell with any step [-]; infinite for none."""
+        falls = (run.scale for run in self._runs if run.fails(COLLAPSE_DEFINITION))
+        return min(falls, default=inf)
+
+    @property
     def lower(self) -> float:
-        """Largest scale up to which all runs had an answer, and the structure never fell [-]."""
-        lower, unknown = min(self.bracket(dt).lower for dt in self.searches), self.unanswered
-        made = (run.scale for search in self.searches.values() for run in search.runs)
-        below = [scale for scale in made if scale <= lower and scale < min(unknown, default=inf)]
-        return max(below, default=0.0)
+        """Largest scale below all falls up to which each finished step came without one [-]."""
+        reached = min(each[COLLAPSE_DEFINITION].lower for each in self._decisive.values())
+        held = (run.scale for run in self._runs if run.fall and run.scale < self._least_fall)
+        return max((scale for scale in held if scale <= reached), default=0.0)
 
     @property
     def moves(self) -> float:
         """Smallest scale at which failed joints let blocks move [-]; infinite for none."""
-        runs = (run for search in self.searches.values() for run in search.runs)
-        return min((run.scale for run in runs if run.mechanisms.get("verified")), default=inf)
+        runs = (run.scale for run in self._runs if run.mechanisms.get("verified"))
+        return min(runs, default=inf)
 
     @property
     def dislocated(self) -> float:
@@ -516,13 +549,13 @@ class CollapseScale:
 
     def _list_held(self) -> list[tuple[float, str]]:
         """List the scales up to `lower`, each with the state of collapse."""
-        made = [pair for dt in self.searches for pair in self.falls(dt)]
-        return [(at, fall.kind) for at, fall in made if fall and at <= self.lower]
+        lower = self.lower
+        return [(run.scale, run.fall.kind) for run in self._runs if run.fall and run.scale <= lower]
 
     @property
     def upper(self) -> float:
-        """Scale by which it fell with all time steps [-]; infinite if it always stood with one."""
-        return max(self.bracket(dt).upper for dt in self.searches)
+        """Scale by which it fell with all finished steps [-]; infinite if it stood with one."""
+        return max(each[COLLAPSE_DEFINITION].upper for each in self._decisive.values())
 
     @property
     def above(self) -> tuple[float, ...]:
@@ -532,7 +565,7 @@ class CollapseScale:
     @property
     def unanswered(self) -> tuple[float, ...]:
         """Scales of runs that were broken off before a state of collapse was known [-]."""
-        return tuple(sorted({s for dt in self.searches for s in self.bracket(dt).unanswered}))
+        return tuple(sorted({run.scale for run in self._runs if run.fall is None}))
 
     def falls(self, dt: float) -> tuple[tuple[float, CollapseState | None], ...]:
         """Return the scale and the state of collapse of each run with one time step.
@@ -610,12 +643,13 @@ def _search_steps(search: SearchStep, steps: Sequence[float]) -> dict[float, Mec
 
 def _admissible_step(searches: Mapping[float, MechanismScales]) -> float:
     """Return the step that follows sliding in all runs that bound a fall [s]; infinite if any."""
+    if any(search.interrupted for search in searches.values()):
+        return inf  # it ends here
     bounds = [
         run
         for search in searches.values()
         for run in search.runs
         if run.scale in (search[COLLAPSE_DEFINITION].lower, search[COLLAPSE_DEFINITION].upper)
-        and not search.interrupted
     ]
     return max(LEAST_STEP, min((run.admissible_step for run in bounds), default=inf))
 
@@ -639,6 +673,7 @@ def collapse_scale(
     dt: float | Sequence[float] | None = None,
     precision: float = 0.05,
     between: tuple[float, float] = (0.1, 10.0),
+    made: KeptRuns | None = None,
 ) -> CollapseScale:
     """Search the smallest scale of a motion at which a structure falls, among those it runs.
 
@@ -661,6 +696,7 @@ def collapse_scale(
             to 0.5 ms where the runs that bound the fall slide farther than such steps follow.
         precision: relative width of the final brackets [-].
         between: smallest and largest scale [-]; no ground motion may exceed 5 g.
+        made: `kept_runs` of an interrupted search with the same arguments, which continues.
 
     Returns:
         All runs, with the scales between which the structure falls by each step.
@@ -682,6 +718,8 @@ def collapse_scale(
         raise InvalidInput("dt = () has no step: give one or two")
 
     def run_scaled(step: float, scale: float) -> ScaledRun:
+        if kept := (made or {}).get((step, scale)):
+            return kept
         run = _run_as_far(model, motion.scaled(scale), start=begin, damping=damping, dt=step)
         doubts, follows = tuple(map(str, run.doubts)), run.dataset.attrs.get("admissible_step", inf)
         met = run.mechanisms
@@ -689,9 +727,9 @@ def collapse_scale(
 
     limits, limit = admissible_range(between, motion), (COLLAPSE_DEFINITION,)
 
-    def search(step: float, at: Sequence[float], made: MechanismScales | None) -> MechanismScales:
+    def search(step: float, at: Sequence[float], found: MechanismScales | None) -> MechanismScales:
         run = partial(run_scaled, step)
-        return search_scales(run, limit, precision, limits, at, made, motion.name)
+        return search_scales(run, limit, precision, limits, at, found, motion.name)
 
     searches, longer = _search_steps(search, steps), dict[float, MechanismScales]()
     while shortens and (shorter := _admissible_step(searches)) < steps[0]:

@@ -197,6 +197,21 @@ def test_the_margin_of_scales_ends_where_it_is_dislocated(case):
     other = "stands at 0.3 g (1.5 × the motion), falls at no scale that was tried"
     rows = [("scale of the motion", "'a', PGA 0.2 g", other, "1.5")]
     assert [*conclusion._describe_margin(data, rows)][1] == "it falls in no run"
+    begun = (
+        "stands at 0.3 g (0.7 × the motion), search unfinished, a mechanism from 0.5 ×, falls at"
+    )
+    for end, fails in (("1.3", ""), ("0.9", ", which it fails")):
+        rows = [
+            (
+                "scale of the motion",
+                "'a', PGA 0.2 g",
+                f"{begun}, falls at {end} × the motion",
+                "0.7",
+            )
+        ]
+        assert next(conclusion._describe_margin(data, rows)) == (
+            f"the least margin is 0.7 (search unfinished) on 'a', PGA 0.2 g{fails}"
+        )
 
 
 def test_the_answer_has_displacements_the_first_fall_and_the_checks(case):

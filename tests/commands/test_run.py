@@ -18,6 +18,7 @@ import archfem as af
 from archfem.cases.run import carry_out
 from archfem.commands import margin
 from archfem.commands.run import print_results
+from archfem.dynamics import motion_scaling
 from archfem.studies import study, variations
 
 RING = Path(__file__).parents[2] / "meshes" / "ring_paper.toml"
@@ -309,14 +310,14 @@ def searched(tmp_path, undrawn, monkeypatch):
     pulse = 2.5 * np.sin(np.pi * np.linspace(0.0, 1.0, 41))
     np.savetxt(tmp_path / "tap.txt", [*pulse, *np.zeros(60)])
     (tmp_path / "block.toml").write_text(PAIRS, encoding="utf-8")
-    made, compute = [], margin.collapse_scale
+    names, compute = [], margin.collapse_scale
 
-    def search(analysis, motion):
-        made.append(motion.name)
-        return compute(analysis, motion, precision=0.5)
+    def search(analysis, motion, made=None):
+        names.append(motion.name)
+        return compute(analysis, motion, precision=0.5, made=made)
 
     monkeypatch.setattr(margin, "collapse_scale", search)
-    return ["scale", str(tmp_path / "block.toml"), "--out", str(tmp_path / "out")], made
+    return ["scale", str(tmp_path / "block.toml"), "--out", str(tmp_path / "out")], names
 
 
 def test_scales_of_the_pairs_of_a_suite_stand_side_by_side(searched, tmp_path, capsys):
@@ -357,24 +358,41 @@ def test_scales_of_the_pairs_of_a_suite_stand_side_by_side(searched, tmp_path, c
     assert made[3:] == ["weak", "strong", "middle"]
 
 
-def test_an_interrupted_search_of_a_pair_is_made_again(searched, tmp_path, monkeypatch):
-    given, made = searched
-    compute = margin.collapse_scale
+def test_an_interrupted_search_of_a_pair_continues(searched, tmp_path, monkeypatch, capsys):
+    """The second search ends at its third run; that of the first, which is finished, is kept."""
+    given, searches = searched
+    runs, compute, out = [], motion_scaling.time_history, tmp_path / "out"
 
-    def stopped(analysis, motion):
-        found = compute(analysis, motion)
-        if motion.name == "weak":
-            return found
-        searches = {dt: replace(each, interrupted=True) for dt, each in found.searches.items()}
-        return replace(found, searches=searches)
+    def shake(*args, **options):
+        runs.append(searches[-1])
+        history = compute(*args, **options)
+        if searches == ["weak", "strong"] and runs.count("strong") == 3:  # as Ctrl-C does
+            history.dataset.attrs["ended"] = "interrupted"
+            af.errors.logger.warning("interrupted at 0.5 s: what was computed is kept")
+        return history
 
-    with monkeypatch.context() as patch:
-        patch.setattr(margin, "collapse_scale", stopped)
-        assert af.commands.main(given) == 130
-    assert made == ["weak", "strong"]
-    (tmp_path / "out" / "weak" / "scale.txt").unlink()
+    monkeypatch.setattr(motion_scaling, "time_history", shake)
+    assert af.commands.main(given) == 130
+    assert searches == ["weak", "strong"]
+    text = (out / "strong" / "scale.txt").read_text(encoding="utf-8")
+    assert " (0.707 × the motion), search unfinished, " in text
+    assert text.count("in doubt: ") == 1
+    (row,) = json.loads((out / "strong" / "scale.json").read_text(encoding="utf-8"))["rows"]
+    assert ", search unfinished, " in row[2]
+    assert len(json.loads((out / "strong" / "scale_runs.json").read_text())) == 2
+    (out / "weak" / "scale.txt").unlink()
+    del runs[:]
+    capsys.readouterr()
     assert af.commands.main(given) in (0, 3)
-    assert made[2:] == ["weak", "strong", "middle"]
+    assert "scale: 2 runs of the interrupted search are kept\n" in capsys.readouterr().err
+    assert searches[2:] == ["weak", "strong", "middle"]
+    text = (out / "strong" / "scale.txt").read_text(encoding="utf-8")
+    assert text.count(" as given ") == runs.count("strong") + 2
+    assert not (out / "strong" / "scale_runs.json").exists()
+    # from the beginning it finds the same
+    (out / "strong" / "scale.txt").unlink()
+    assert af.commands.main([*given, "--pair", "strong"]) in (0, 3)
+    assert (out / "strong" / "scale.txt").read_text(encoding="utf-8") == text
 
 
 @pytest.mark.slow

@@ -32,6 +32,7 @@ from archfem.cases.report.study_findings import read_study, say_what_changes
 from archfem.cases.result_text import RESULTS, Row
 from archfem.dynamics.collapse_state import COLLAPSE_STATES, FALLEN_STATES, CollapseState
 from archfem.dynamics.history import History
+from archfem.dynamics.motion_scaling import UNFINISHED
 from archfem.dynamics.verdict import NO_RANGE
 from archfem.dynamics.verdict_range import (
     HALF_STEP,
@@ -397,9 +398,12 @@ def _describe_scales(data: ReportData, rows: Sequence[Row]) -> Iterator[tuple[fl
     if not made:
         return
     least, first, row = made[0]
-    words = f"{row[3]} on {row[1]}{', which it fails' * (least < 1.0)}"
-    words += f", of {len(made)} motions" * (len(made) > 1)
     found = {name: _list_scaled(row[2]) for _, name, row in made}
+    # between the scales that were run nothing is known
+    met = [float(at.split()[0]) for state, at in found[first].items() if state != "a mechanism"]
+    unfinished = f" ({UNFINISHED})" * (UNFINISHED in row[2])
+    words = f"{row[3]}{unfinished} on {row[1]}{', which it fails' * (min(met, default=2.0) <= 1.0)}"
+    words += f", of {len(made)} motions" * (len(made) > 1)
     ends = [f"{_SCALED[state]} from {scale} on" for state, scale in found[first].items()]
     ends += [] if {"falls", "first mechanism"} & found[first].keys() else ["falls in no run"]
     texts = [words, f"it {join_words(ends)}"]
