@@ -122,12 +122,29 @@ def select_assessed_parts(roles: Mapping[str, str]) -> tuple[str, ...]:
 
 
 def find_misplaced(
-    blocks: Sequence[Block], pairs: Numbers, normals: Array, depths: Array
+    blocks: Sequence[Block], owners: Sequence[Member], pairs: Numbers, normals: Array, depths: Array
 ) -> dict[int, str]:
     """Find stones that may be on a wrong layer of a drawing, and describe each.
 
-    A few stones apart from the others of their ring or pier carry a pier, lie on one as piers do,
-    or stand between voussoirs. The last stone of a ring is as broad as its pier at one end alone.
+    `owners` are the joints, which have the part across which they lie.
+    """
+    found = _find_strays(blocks, pairs, normals, depths)
+    found |= _find_voussoirs(blocks, owners, pairs, normals, depths)
+    found |= _find_courses(blocks, pairs, normals, depths)
+    return {
+        number: f"'{blocks[number].name}' at {say_place(as_point(blocks[number].centroid))} m is a "
+        f"stone of '{blocks[number].part}', {why}: it may be one of {part}"
+        for number, (why, part) in found.items()
+    }
+
+
+def _find_strays(
+    blocks: Sequence[Block], pairs: Numbers, normals: Array, depths: Array
+) -> dict[int, tuple[str, str]]:
+    """Find stones apart from others of their ring or pier: why, and other parts.
+
+    A few stones apart carry a pier, lie on one as piers do, or stand between voussoirs. The last
+    stone of a ring is as broad as its pier at one end alone.
     """
     parts = np.array(["" if b.fixed or b.role == "other" else b.part for b in blocks])
     sides = parts[pairs]
@@ -161,10 +178,59 @@ def find_misplaced(
         if bed if blocks[b].role == "pier" else (away @ others.T).min() < -0.7:
             beside = " or ".join(f"'{part}'" for other, part in touched if other == piece)
             found[a] = "apart from most others of it", beside
+    return found
+
+
+def _find_voussoirs(
+    blocks: Sequence[Block], owners: Sequence[Member], pairs: Numbers, normals: Array, depths: Array
+) -> dict[int, tuple[str, str]]:
+    """Find stones of piers, or of neither, with joints as deep as those of a ring beside them."""
+    sides = np.array(["" if b.fixed else b.part for b in blocks])[pairs]
+    of = np.array([owner.part for owner in owners])
+    found = {}
+    for ring in dict.fromkeys(owner.part for owner in owners if owner.role == "ring"):
+        inner = (sides == ring).all(axis=1)
+        usual = float(np.median(depths[inner])) if inner.any() else np.inf
+        # faces of stones of neither: the part beside them, and away from the stone
+        faces: dict[int, list[tuple[str, Array]]] = {}
+        for number in np.flatnonzero((np.abs(depths / usual - 1.0) < 0.05) & ~inner):
+            pair, normal = pairs[number].tolist(), normals[number]
+            for (a, b), away in ((pair, normal), (pair[::-1], -normal)):
+                stone, near = blocks[a], blocks[b]
+                if stone.fixed or near.fixed or near.role == "other":
+                    continue
+                broad = bool(np.median(depths[of == near.part].tolist() or [0.0]) > 1.3 * usual)
+                if stone.role == "other" and (of[number] == ring or broad):
+                    faces.setdefault(a, []).append((near.part, away))
+                elif stone.part == near.part and stone.role == "pier" and broad and away[1] < 0.0:
+                    found[a] = f"whose joint is as deep as those of '{ring}'", f"'{ring}'"
+        for a, touched in faces.items():
+            towards = np.array([away for _, away in touched])
+            if ring in dict(touched) and (towards @ towards.T).min() < -0.7:
+                between = " and ".join(dict.fromkeys(f"'{part}'" for part, _ in touched))
+                why = f"between {between} by joints as deep as those of '{ring}'"
+                found[a] = why, f"'{ring}'"
+    return found
+
+
+def _find_courses(
+    blocks: Sequence[Block], pairs: Numbers, normals: Array, depths: Array
+) -> dict[int, tuple[str, str]]:
+    """Find stones as broad as the pier on them, of a part whose other stones project."""
+    piers, projecting = dict[int, str](), set[str]()
+    for pair, normal, depth in zip(pairs.tolist(), normals, depths, strict=True):
+        below, above = pair if normal[1] > 0.0 else pair[::-1]
+        low, high = blocks[below], blocks[above]
+        if abs(normal[1]) < 0.5 or low.role != "other" or low.fixed or high.fixed:
+            continue
+        if np.ptp(low.points[:, 0]) > 1.05 * depth:
+            projecting.add(low.part)
+        elif high.role == "pier":
+            piers[below] = high.part
     return {
-        number: f"'{blocks[number].name}' at {say_place(as_point(blocks[number].centroid))} m is a "
-        f"stone of '{parts[number]}', {why}: it may be one of {part}"
-        for number, (why, part) in found.items()
+        number: (f"as broad as '{pier}' on it, where others of it project", f"'{pier}'")
+        for number, pier in piers.items()
+        if blocks[number].part in projecting
     }
 
 

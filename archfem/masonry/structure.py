@@ -425,7 +425,7 @@ class Structure(ResultDisplay):
     @cached_property
     def misplaced(self) -> dict[int, str]:
         """Stones that may be of another part than theirs, and why in words, by number."""
-        return find_misplaced(self.blocks, self.pairs, self.normals, self.depths)
+        return find_misplaced(self.blocks, self.joints, self.pairs, self.normals, self.depths)
 
     @cached_property
     def assessment(self) -> str:

@@ -564,11 +564,13 @@ def _doubt_inner_supports(structure: Structure) -> list[Doubt]:
     # faces of each body that touch a part: block, middle of the joint, normal away from the block
     faces: dict[tuple[int, str], list[tuple[int, Array, Array]]] = {}
     below: dict[int, list[str]] = {}  # names of what moves below each fixed block
+    fill = find_yielding_blocks(structure)
     for joint, block, free, outward in _free_faces(structure):
-        if joint.role == "other":  # as of a sidewall, which may lie on pieces of fill
-            continue
-        if outward[1] < -0.5:  # a bed, to 60° steep
+        # a bed, to 60° steep; a sidewall may lie on pieces of fill
+        if outward[1] < -0.5 and free not in fill:
             below.setdefault(block, []).append(f"'{blocks[free].name}'")
+        if joint.role == "other":
+            continue
         of_part = faces.setdefault((int(body[block]), joint.part), [])
         of_part.append((block, joint.middle, outward))
     doubts = dict[tuple[int, str], Doubt]()

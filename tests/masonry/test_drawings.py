@@ -543,3 +543,19 @@ def test_a_misspelt_layer_is_the_one_it_is_like(tmp_path, layer):
     words = rf"of layer '{layer}' \(closed outlines: 1, .*\) nothing is said: did you mean 'RING'\?"
     with pytest.raises(af.InvalidInput, match=words):
         af.Case.read(case)
+
+
+def test_a_unit_of_the_case_that_contradicts_the_drawing_is_said(tmp_path, caplog):
+    """Before a gap, which it may have made; and where the drawing is read nevertheless."""
+    contradiction = "contradicts the drawing, in mm by its \\$INSUNITS. "
+    case = draw_portal(tmp_path)
+    for unit, warnings in (("mm", 0), ("cm", 1)):
+        caplog.clear()
+        af.Case.read(case, [f"structure.unit={unit}", "structure.snap=40 mm"][: 1 + warnings])
+        found = [record.getMessage() for record in caplog.records]
+        assert len(found) == warnings
+    assert re.search(f"unit = 'cm' {contradiction}By it that is 50 × ", found[0])
+    with pytest.raises(
+        af.InvalidStructure, match=f"dxf: unit = 'cm' {contradiction}By unit = .* or else"
+    ):
+        af.Case.read(case, ["structure.unit=cm"])

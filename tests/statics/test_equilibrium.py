@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from drawn import draw_portal
+from drawn import draw_portal, square
 
 import archfem as af
 from archfem.masonry.block import say_place
@@ -311,6 +311,38 @@ def turn(stones, angle):
         stones[name] = stones[name] @ [[c, s], [-s, c]]
 
 
+def draw_on_footings(folder, moved=()):
+    """Draw the portal on footings that move."""
+    free = {"SLAB 2": "FOOT", "SLAB 3": "FOOT"}
+    case = draw_portal(folder, free | dict(moved), change=lay_footings)
+    footings = 'FOOT = { part = "footings", role = "other" }\n[model]'
+    case.write_text(case.read_text().replace("[model]", footings))
+    return case
+
+
+@pytest.mark.parametrize(
+    ("moved", "whys"),
+    [
+        ({}, []),
+        ({"WEST 1": "SLAB"}, ["'SLAB 1' .* cannot move, but lies on 'FOOT 1'"]),
+        ({"WEST 1": "SLAB", "EAST 3": "SLAB"}, ["'SLAB 1' .* on 'FOOT 1'", "'SLAB 2' .*'FOOT 2'"]),
+        ({"WEST 1": "FOOT"}, ["'FOOT 1' .* as broad as 'west pier' on it, where others of it pro"]),
+        ({"EAST 3": "FOOT"}, ["'FOOT 1' .* as broad as 'east pier' on it, .* of 'east pier'"]),
+        ({"RING 1": "WEST"}, ["'WEST 4' .* joint is as deep as those of 'arch': .* of 'arch'"]),
+        ({"RING 1": "WEST", "RING 2": "WEST"}, ["'WEST 4' .*: .* of 'arch'", "'WEST 5' .* 'arch'"]),
+        ({"RING 11": "FOOT"}, ["'FOOT 1' .* between 'arch' and 'east pier' by joints as deep as"]),
+        ({"RING 5": "FOOT"}, ["'FOOT 1' .* between 'arch' by joints as deep as those of 'arch'"]),
+    ],
+)
+def test_a_stone_on_a_wrong_layer_above_footings_that_move_is_a_doubt(tmp_path, moved, whys):
+    case = draw_on_footings(tmp_path, moved)
+    doubts = sorted(doubt.cause for doubt in structure_doubts(af.Case.read(case).structure))
+    assert len(doubts) == len(whys)
+    for cause, why in zip(doubts, whys, strict=True):
+        assert re.match(why, cause)
+    assert af.commands.main(["check", str(case)]) == (3 if whys else 0)
+
+
 @pytest.mark.parametrize("change", [None, lay_footings, lambda stones: turn(stones, 0.5)])
 @pytest.mark.parametrize("on_piers", [False, True])
 def test_a_sound_drawing_has_no_doubts(tmp_path, change, on_piers):
@@ -380,19 +412,18 @@ def test_a_drawing_that_is_turned_is_a_doubt(tmp_path, angle):
     assert doubt.cause.startswith(f"all beds of the piers slope by about {angle:.2g}°")
 
 
-def test_a_fixed_wall_on_pieces_of_fill_is_none():
+@pytest.mark.parametrize(
+    ("material", "role", "count"),
+    [(af.masonry.BACKFILL, "other", 0), (af.STONE, "other", 1), (af.STONE, "pier", 1)],
+)
+def test_a_fixed_block_on_a_stone_is_a_doubt_and_on_fill_none(material, role, count):
     """Sidewalls lean against what they hold."""
     stones = [
-        af.Block(
-            ((0.0, -1.0), (2.0, -1.0), (2.0, 0.0), (0.0, 0.0)), af.STONE, "ground", fixed=True
-        ),
-        af.Block(((0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (0.0, 1.0)), af.STONE, "fill"),
-        af.Block(((0.0, 1.0), (2.0, 1.0), (2.0, 2.0), (0.0, 2.0)), af.STONE, "wall", fixed=True),
+        af.Block(tuple(map(tuple, square(0.0, y))), material, name, fixed=name != "free", role=role)
+        for y, name in enumerate(("ground", "free", "wall"))
     ]
-    for role, count in (("other", 0), ("pier", 1)):
-        own = [replace(block, role=role) for block in stones]
-        assembled = af.masonry.assembled(own, af.masonry.STONE_TO_STONE)
-        assert len(structure_doubts(assembled)) == count
+    assembled = af.masonry.assembled(stones, af.masonry.STONE_TO_STONE)
+    assert len(structure_doubts(assembled)) == count
 
 
 def test_a_fixed_pier_between_arches_of_one_part_is_none():

@@ -16,7 +16,7 @@ from functools import partial
 from importlib import import_module
 from importlib.util import find_spec
 from itertools import islice, pairwise
-from math import acos, atan, ceil, dist, radians, tau
+from math import acos, atan, ceil, dist, isclose, radians, tau
 from pathlib import Path
 from typing import Any
 
@@ -52,6 +52,14 @@ class Frame:
     factor: float = 1.0  # unit of the coordinates [m]
     unit: str = "m"  # name of the unit
     upwards: float = 1.0  # 1 or -1
+    stated: str = ""  # another unit that the file states
+
+    @property
+    def question(self) -> str:
+        """Question whether the unit is wrong, which may contradict that of the file."""
+        if not self.stated:
+            return "is the unit wrong?"
+        return f"unit = '{self.unit}' contradicts the drawing, in {self.stated} by its $INSUNITS."
 
     def place(self, point: Sequence[float]) -> str:
         """Return a place [m] in words, in coordinates of the drawing."""
@@ -306,7 +314,10 @@ def _read_dxf(
         )
     points = (complex(*point[:2]) for each in polylines for point in each.points)
     corners = np.array([point for point in points if abs(point) < 1e12])  # others are refused
-    frame = frame if unit is None else _read_unit(unit)
+    if unit is not None:
+        given = _read_unit(unit)
+        other = frame is not None and not isclose(frame.factor, given.factor)
+        frame = replace(given, stated=frame.unit) if frame and other else given
     if frame is None:
         problem = "the drawing does not say its unit ($INSUNITS)"
         raise _refuse_unit(problem, np.column_stack([corners.real, corners.imag]))

@@ -204,6 +204,9 @@ def surveyed(  # noqa: PLR0913  (the drawing, and what its blocks are and how th
     survey = read_outlines(
         path, unit=unit, snap=snap, layers=layers, material=material, materials=materials
     )
+    if survey.frame.stated:
+        question = f"{survey.frame.question} By it that is {_say_size(survey.size)}"
+        logger.warning("%s: %s; leave unit out, or correct the drawing", path, question)
     law, name = by_materials(contact, contacts), Path(path).stem
     structure = assembled(survey.blocks, law, width=width, gravity=gravity, name=name)
     return _name_joints(structure, Path(path), unit) if Path(path).suffix == ".msh" else structure
@@ -334,7 +337,8 @@ def _close_or_advise(outlines: list[Outline], snap: float) -> Closed:
     higher = [value for value in values if snap < value <= largest]
     # a lower tolerance would leave a gap open
     lower = [value for value in values[::-1] if 0.05 * snap <= value < snap and not is_gap]
-    frame, asks_unit = outlines[0].frame, is_gap
+    frame = outlines[0].frame
+    asks_unit = is_gap or frame.stated != ""
     for verb, values in (("raise", higher), ("lower", lower)):
         if value := next((each for each in values if _closes_all(outlines, each)), None):
             advice += f", or {verb} snap from {snap / frame.factor:.3g} to {frame.length(value)}"
@@ -344,11 +348,11 @@ def _close_or_advise(outlines: list[Outline], snap: float) -> Closed:
             break
     if asks_unit:
         size = _say_size(_measure(outlines))
-        question = f"is the unit wrong? By unit = '{frame.unit}' the drawing is {size}"
+        question = f"{frame.question} By unit = '{frame.unit}' the drawing is {size}"
         breadths = [np.hypot(*np.ptp(outline.points, axis=0)) for outline in outlines]
         # no stone is that large: what is said first is what a reader tries first
-        is_huge = np.median(breadths) > LARGE_STONE
-        advice = f"{question}; or else {advice}" if is_huge else f"{advice}; or {question}"
+        is_first = np.median(breadths) > LARGE_STONE or frame.stated
+        advice = f"{question}; or else {advice}" if is_first else f"{advice}; or {question}"
     raise InvalidStructure(advice)
 
 
