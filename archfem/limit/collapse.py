@@ -60,6 +60,10 @@ class Outcome(ExplainedWord):
     BRACKETED = "bracketed", "no state without dilatancy was found"
 
 
+# Said of a mechanism in whose place any stones above a bed joint may slide
+ONE_OF_MANY = " (one of many: all bed joints reach μ)"
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Collapse(ResultDisplay):
     """Result of a limit analysis: factor, joint forces and mechanism.
@@ -163,19 +167,9 @@ class Collapse(ResultDisplay):
         """Plain name of the mechanism, as "four-hinge mechanism"; "" where nothing moves."""
         if self.structure is None or not self.motion.any():
             return ""
-        many = " (one of many: all bed joints reach μ)" if self._slides_anywhere else ""
-        return name_mechanism(self.structure, self.motion) + many
-
-    @property
-    def _slides_anywhere(self) -> bool:
-        """Whether stones slide at the friction of all bed joints, pushed by their weight."""
-        structure = self.structure
-        if structure is None or self.hinges or not self.sliding or not self.push:
-            return False
-        push = abs(self.factor * self.push)
-        level = abs(structure.normals[~structure.heads, 1]) > 1.0 - 1e-9
-        alike = np.allclose(structure.friction, push, rtol=1e-3)
-        return bool(len(level) > 1 and level.all() and alike)
+        slides = self.push and self.sliding and not self.hinges
+        many = slides and slides_anywhere(self.structure, abs(self.factor * self.push))
+        return name_mechanism(self.structure, self.motion) + ONE_OF_MANY * bool(many)
 
     @property
     def _headline(self) -> str:
@@ -223,6 +217,13 @@ class Collapse(ResultDisplay):
         if self.structure is not None:
             crushing = f"; {describe_crushing(self.strength, self.structure)}"
         return f"{text}sliding: {sliding}{solutions}{over}{crushing}"
+
+
+def slides_anywhere(structure: Structure, push: float) -> bool:
+    """Return whether a push in multiples of the weight is the friction of all bed joints."""
+    level = abs(structure.normals[~structure.heads, 1]) > 1.0 - 1e-9
+    alike = np.allclose(structure.friction, push, rtol=1e-3)
+    return bool(len(level) > 1 and level.all() and alike)
 
 
 def collapse_factor(

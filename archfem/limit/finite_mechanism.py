@@ -53,6 +53,7 @@ class PathEnd(ExplainedWord):
     COLLIDES = "collides", "at the end it runs into blocks that it has no joint with"
     ENDURES = "endures", "it still needs a force where the path is cut off"
     UNRESOLVED = "unresolved", "at the end no mechanism was found whose faces slide flat"
+    SLIDES = "slides", "it slides without turning, up to the ends of the faces as drawn"
 
 
 @dataclass(frozen=True, eq=False)

@@ -62,7 +62,7 @@ class Material:
         _check_range(self, "unit_weight", 1e-3, heaviest, heavy)
         # no building material weighs as little in N/m³ as soils and stones do in these units
         for low, high, unit, factor in ((1e3, 4e3, "kg/m³", G), (5.0, 50.0, "kN/m³", kN)):
-            if low <= self.unit_weight <= high:
+            if self.stands_for is None and low <= self.unit_weight <= high:
                 number = f"{self.unit_weight:.4g}"
                 raise InvalidInput(
                     f"unit_weight {number} N/m³ of '{self.name}' looks like {unit}: give it in "

@@ -32,8 +32,9 @@ from archfem._typing import Array
 from archfem._validation import check_between, check_choice, validate_arguments
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.limit.backfill import attach_fill
-from archfem.limit.collapse import collapse_factor
+from archfem.limit.collapse import ONE_OF_MANY, collapse_factor, slides_anywhere
 from archfem.limit.displaced_blocks import (
+    STILL,
     TOUCHING,
     KinematicChain,
     PlacedBlocks,
@@ -89,7 +90,7 @@ class KinematicAssessment(ResultDisplay):
         a_0_star: spectral acceleration a₀* that sets it in motion, without the confidence factor
             [m/s²].
         d_0_star: spectral displacement d₀* at which α vanishes [m]; infinite where the path ends
-            before.
+            before, as that of a body that slides without turning.
         T_s: secant period 2π √(d_s* / a*(d_s*)) at d_s* = 0.16 d₀* [s]: 0.4 of the 0.4 d₀* of
             NTC-2008; undefined (NaN) where d₀* is infinite.
         curve: capacity curve over place: `d` [m], `a` [m/s²], `alpha` [-], and `d_control`, the
@@ -174,9 +175,10 @@ class KinematicAssessment(ResultDisplay):
 
     def table(self) -> str:
         """Return the quantities and both checks, a line each."""
-        units = {"alpha_0": "-", "e_star": "-", "M_star": "kg", "a_0_star": "", "d_0_star": "m"}
+        units = {"alpha_0": "-", "e_star": "-", "M_star": "kg"}
         units["a_0_star"] = f"m/s² ({self.a_0_star / STANDARD_GRAVITY:.3f} g)"
-        rows = [(name, getattr(self, name), unit) for name, unit in {**units, "T_s": "s"}.items()]
+        units |= {"d_0_star": "m", "T_s": "s"} if np.isfinite(self.d_0_star) else {}
+        rows = [(name, getattr(self, name), unit) for name, unit in units.items()]
         for check in self.checks:
             rows.append((f"{check.name}: capacity", check.capacity, check.unit))
             rows.append((f"{check.name}: demand", check.demand, check.unit))
@@ -189,10 +191,10 @@ class KinematicAssessment(ResultDisplay):
 
     def _summary(self) -> str:
         """Describe the result in one line."""
+        vanishes = f"d_0* {self.d_0_star:.4g} m, " if np.isfinite(self.d_0_star) else ""
         return (
             f"KinematicAssessment of '{self.structure.name}': alpha_0 {self.alpha_0:.4g}, a_0* "
-            f"{self.a_0_star:.4g} m/s², d_0* {self.d_0_star:.4g} m, "
-            f"{self.checks[-1].outcome}"
+            f"{self.a_0_star:.4g} m/s², {vanishes}{self.checks[-1].outcome}"
         )
 
     def __str__(self) -> str:
@@ -205,12 +207,15 @@ class KinematicAssessment(ResultDisplay):
             names = [joint.name for joint in self.structure.joints]
             hinges = list_or_count([f"{names[k]} at the {end}" for k, end in self.hinges])
             sliding = list_or_count([names[k] for k in self.sliding])
+            many = not hinges and sliding and slides_anywhere(self.structure, self.alpha_0)
+            vanishes = f", d_0* = {self.d_0_star:.4g} m, T_s = {self.T_s:.3f} s"
             lines += [
-                f"{name_mechanism(self.structure, self.path.velocity)}; hinges: "
-                f"{hinges or 'none'}; sliding: {sliding or 'none'}",
-                f"alpha_0 = {self.alpha_0:.4g}, e* = {self.e_star:.3f}, M* = {self.M_star:.4g} kg, "
-                f"a_0* = {self.a_0_star:.4g} m/s² ({self.a_0_star / STANDARD_GRAVITY:.3f} g), "
-                f"d_0* = {self.d_0_star:.4g} m, T_s = {self.T_s:.3f} s",
+                f"{name_mechanism(self.structure, self.path.velocity)}{ONE_OF_MANY * bool(many)}; "
+                f"hinges: {hinges or 'none'}; sliding: {sliding or 'none'}",
+                f"alpha_0 = {self.alpha_0:.4g}, e* = {self.e_star:.3f}, M* = {self.M_star:.4g} kg"
+                f"{' of this body' * bool(many)}, "
+                f"a_0* = {self.a_0_star:.4g} m/s² ({self.a_0_star / STANDARD_GRAVITY:.3f} g)"
+                f"{vanishes if np.isfinite(self.d_0_star) else ''}",
             ]
             changes = [event.text for event in self.path.events if event.text != self.path.end]
             lines += [f"along the path: {join_names(changes, '; ')}"] if changes else []
@@ -262,7 +267,8 @@ def kinematic_assessment(  # noqa: PLR0913  (the factors of the codes are argume
     - *displacement*: d_u* as a share of d₀* against the displacement spectrum at the period of the
       limit state, with the accelerations of the curve divided by FC. A mechanism that the ground
       acceleration does not set in motion, a₀* / FC above it, passes as well. There is none for a
-      mechanism without a finite motion, such as most wedges of walls in bond.
+      mechanism without a finite motion, such as most wedges of walls in bond, nor for one that
+      slides without turning, whose factor does not fall as it moves.
 
     A fill, bodies softer than their joints, counts by its weight and mass on the stones below,
     column by column; with its strength, `fill`, it presses on them as in `collapse_factor`. Along
@@ -390,6 +396,7 @@ class _Search:
             with suppress(DidNotConverge):  # no mechanism was found whose faces slide flat
                 path = follower.follow(mechanism)
                 if follower.travel > TOUCHING * self.structure.size:
+                    path = _end_sliding(path)
                     moved = path, follower.last_equilibrium(path)
                     # in walls in bond flat motions are many, and the search may find a weaker one
                     if searched or not (slides and self.structure.heads.any()):
@@ -443,6 +450,14 @@ class _Search:
                 except DoesNotStand:
                     others[assumption] = None
         return others
+
+
+def _end_sliding(path: MechanismPath) -> MechanismPath:
+    """Return a path that ends at rest where nothing turns, so that alpha does not fall on it."""
+    if np.abs(path.velocity[:, 2]).max() * path.blocks.structure.size > STILL:
+        return path
+    rest = path.factors[:1], path.displacements[:1], path.velocity
+    return MechanismPath(path.blocks, *rest, path.mechanisms[:1], (), PathEnd.SLIDES)
 
 
 @validate_arguments
@@ -551,10 +566,15 @@ class _Oscillator:
                 "and faces slide flat here"
             )
         if len(self.path.factors) == 1:
+            why = "this mechanism begins, and its contacts permit no finite motion"
+            if self.path.end is PathEnd.SLIDES:
+                why = (
+                    "this mechanism slides without turning, alpha does not fall as it moves, and "
+                    "where the faces or the ground end in the drawing is no capacity"
+                )
             found.append(
-                "this mechanism begins, and its contacts permit no finite motion: there is no "
-                "displacement check, and what it withstands beyond its start, 1/q of the linear "
-                "ratio, rests on q alone"
+                f"{why}: there is no displacement check, and what it withstands beyond its start, "
+                "1/q of the linear ratio, rests on q alone; a time history computes it"
             )
         elif self.path.end is not PathEnd.FALLS:
             found.append(

@@ -307,6 +307,31 @@ def test_sliding_with_and_without_dilatancy():
     assert both[None].alpha_0 > both["coulomb"].alpha_0
 
 
+@pytest.mark.parametrize("friction", ["coulomb", "nonassociated"])
+def test_sliding_has_no_capacity_of_displacement(friction):
+    """Nor do the edges of a drawn ground count: alpha stays at μ = 0.6 as the stones slide."""
+    for ledge in (0.3, 1.0):
+        edge = 2.0 + ledge
+        ground = box(-edge, edge, -0.5, 0.0, "ground", fixed=True)
+        slabs = box(-2.0, 2.0, 0.0, 0.5, "lower"), box(-2.0, 2.0, 0.5, 1.0, "upper")
+        squat = af.masonry.assembled([ground, *slabs], af.Contact(1e9, 1e9, friction=0.6))
+        found = af.kinematic_assessment(squat, SPECTRUM, friction=friction)
+        assert found.alpha_0 == pytest.approx(0.6)
+        assert found.checks == [found.linear]
+        assert (found.path.end.name, len(found.path.factors)) == ("SLIDES", 1)
+        (note,) = found.notes
+        assert note.startswith("this mechanism slides without turning")
+        for text in (str(found), found.table(), repr(found)):
+            assert "d_0" not in text
+            assert "nan" not in text
+        assert "(one of many: all bed joints reach μ)" in str(found)
+        assert "kg of this body, " in str(found)
+        assert found.plot() is not None
+    turning = af.kinematic_assessment(squat, SPECTRUM, friction=None)
+    assert "d_0* = " in str(turning)
+    assert "one of many" not in str(turning)
+
+
 @pytest.fixture(scope="module")
 def wedge():
     """A wall in bond whose wedge no finite motion follows, and the weakest mechanism found."""
@@ -350,7 +375,7 @@ def test_a_wedge_of_a_wall_in_bond_has_the_linear_check_alone(wedge, verified):
     (doubt,) = found.doubts
     assert doubt.startswith("alpha_0 is an upper bound, the least that a search")
     assert f"its linear ratio is e* = {share:.3g} times that of this one" in doubt
-    assert "T_s" in str(found)
+    assert "nan" not in str(found) + found.table()
     assert "NTC-2018 SLV" not in str(found)
 
 
