@@ -183,7 +183,11 @@ class VerdictRange(ResultDisplay):
         return sorted(changes, key=lambda each: (-each.rank, -self.measure(each)))
 
     def measure(self, change: "SingleChange") -> float:
-        """Return the displacement of a change that governs: the residual for a dislocation [m]."""
+        """Return the displacement of a run that governs: the residual for dislocations [m].
+
+        Args:
+            change: run of `single_changes`.
+        """
         return change.residual if self.is_dislocation_worst else change.displacement
 
     @property

@@ -266,6 +266,10 @@ def test_the_answer_has_displacements_the_first_fall_and_the_checks(case):
     facts = dict(conclusion.list_facts(data))
     rested = "the displacement check of damage, right is met at rest (0.842 by displacements)"
     assert facts["verdict"].endswith(rested)
+    vars(data)["case"] = af.Case.of({**case.settings, "assessment": SPECTRUM})
+    data.runs["a"].verdict.mechanisms["verified"] = "rocks"
+    moves = rested.replace("at rest", "at rest alone, and it moves")
+    assert dict(conclusion.list_facts(data))["verdict"].endswith(moves)
     assert facts["in doubt"] == "kinematic assessment, scale of the motion"
 
 
@@ -420,3 +424,11 @@ def test_motions_matched_to_shorter_periods_than_that_of_a_check_are_noted(perio
         for note in notes
     )
     assert result_text.note_band(SimpleNamespace(suite=None), [found]) == []
+
+
+def test_the_head_of_a_push_says_when_it_begins_to_move(case):
+    row = ("limit analysis", "the site's 0.2 g", "four-hinge mechanism, at 0.1 g", "0.5")
+    data = data_of(case)
+    vars(data)["statements"] = {"limit": result_text.Statement(["limit analysis"], [row])}
+    begins = "a push begins to move it at 0.5 times the site's 0.2 g"
+    assert dict(conclusion.list_facts(data))["verdict"] == begins

@@ -114,21 +114,27 @@ def list_facts(data: ReportData) -> list[tuple[str, str]]:
     doubtful = list_decisive_doubts(data, list_doubts(data))
     doubts = [("in doubt", ", ".join(doubtful))] if doubtful else []
     if not runs:
-        # the place of a vehicle is in the conclusion
-        factors = [
-            f"{demand}: {outcome.partition(', with')[0]}, factor {factor}".removesuffix(
-                ", factor -"
-            )
-            for name, (_, demand, outcome, factor) in _capacity_rows(data)
-            if name != RESULTS["assessment"] and (factor != "-" or demand == "no demand given")
-        ]
-        verdict = "; ".join([*_say_checks(data), *factors])
+        verdict = "; ".join([*_say_checks(data), *_say_factors(data)])
         return [*signed, *([("verdict", verdict)] if verdict else []), *doubts, *blocks]
     peak = [("motions" if len(runs) > 1 else "motion", _describe_peaks(runs))]
     did = ", ".join([summarise_outcomes(data, runs), *_say_movement(data)])
-    varied = [each.count for each in data.verdict_ranges if each.decisive.any()] * (len(runs) > 1)
-    verdict = "; ".join([did, *varied[:1], *_say_checks(data)])
+    ranges = [x for x in data.verdict_ranges if x.decisive.any()] if len(runs) > 1 else []
+    ranges.sort(key=lambda x: (x.falls.sum(), x.dislocated.sum()))
+    verdict = "; ".join([did, *(x.count for x in ranges[-1:]), *_say_checks(data)])
     return [*signed, ("verdict", verdict), *doubts, *blocks, *peak]
+
+
+def _say_factors(data: ReportData) -> Iterator[str]:
+    """Yield the factors of results without runs; those of checks are said apart."""
+    for result, (_, demand, outcome, factor) in _capacity_rows(data):
+        if result == RESULTS["assessment"] or (factor == "-" and demand != "no demand given"):
+            continue
+        # the place of a vehicle is in the conclusion
+        text = f"{demand}: {outcome.partition(', with')[0]}" + f", factor {factor}" * (
+            factor != "-"
+        )
+        begins = result in PUSHES and demand.startswith("the site")
+        yield f"a push begins to move it at {factor} times {demand}" if begins else text
 
 
 def _say_movement(data: ReportData) -> Iterator[str]:
@@ -161,7 +167,8 @@ def _say_checks(data: ReportData) -> Iterator[str]:
         elif "passes" not in outcome:
             met = "is not met"
         elif moved := re.search(r"[\d.]+ by displacements", factor):
-            met, by = "is met at rest", moved[0]
+            moves = _say_motion(data, float(factor.partition(" ")[0]))
+            met, by = "is met at rest" + " alone, and it moves" * bool(moves), moved[0]
         of = name.partition(": ")[2].removesuffix(", right and left")
         yield f"the {kind} of {of} {met} ({by})"
 

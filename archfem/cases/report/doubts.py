@@ -63,16 +63,13 @@ def _shorten_scales(doubts: Sequence[str]) -> Iterator[str]:
     """Yield doubts of searches without scales and steps; those of first falls as one range."""
     ends, motions = list[str](), list[str]()
     for doubt in doubts:
-        motion, of = (
-            re.match(r"under ('[^']+'): ", doubt),
-            "its time steps find the first fall from ",
-        )
-        found = re.search(rf"{of}([\d.]+)(?: to ([\d.]+))? ×( on, or nowhere)?", doubt)
-        if found is None or found[3]:
+        motion = re.match(r"under ('[^']+'): ", doubt)
+        found = re.search(r"time steps find the first fall from ([\d.]+) to ([\d.]+) ×", doubt)
+        if found is None:
             # at which scales stands with the result
             yield re.sub(r"at [\d.]+ × by [\d.]+ ms(?: \(likewise [^)]*\))?: ", "", doubt, count=1)
             continue
-        ends += filter(None, found.groups())
+        ends += found.groups()
         motions += [motion[1]] if motion else []
     if ends:
         under = f"under {join_words(motions)} " * bool(motions)
