@@ -181,6 +181,7 @@ def test_the_friction_from_which_it_stands_is_said(friction, tmp_path, capsys):
         ">least thickness<",
         "stands from a coefficient of friction of 0.44",
         "without sliding 159 mm",
+        "fixed to it: &#39;left abutment&#39;, &#39;right abutment&#39;<",
         *["Friction decides"][: friction is None],
     ):
         assert words in page

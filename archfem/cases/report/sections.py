@@ -122,6 +122,7 @@ def build_input_section(data: ReportData) -> Section:
         "full": "elastic finite elements, all nodes kept",
         "monolithic": "elastic finite elements, all nodes kept, weak forms of joints",
     }
+    fixed = dict.fromkeys(f"'{b.part or b.name}'" for b in data.case.structure.blocks if b.fixed)
     large = data.case.analysis.discretisation.displacements == "large"
     moved = "of any size" if large else "small: equilibrium where blocks stood"
     follows = "; an assessment follows its mechanism" * ("assessment" in data.statements)
@@ -134,7 +135,7 @@ def build_input_section(data: ReportData) -> Section:
         ("blocks", "rigid" if data.is_static else blocks.get(fidelity, f"by part: {fidelity}")),
         ("joints", _describe_joints(data)),
         ("displacements", moved),
-        ("ground", "rigid, moves as one; abutments and foundations are fixed to it"),
+        ("ground", f"rigid, moves as one; fixed to it: {join_names(fixed)}"),
         ("units", "SI: m, kg, s, N, Pa, where no other unit stands beside a number"),
         ("signs", SIGN_CONVENTION),
         ("e", "eccentricity M / (N h), h the depth of the joint: ±0.5 at its edges"),
