@@ -15,11 +15,16 @@ from archfem.units import GPa, MPa, kN, kPa, mm
 
 HINGE_REASON = "8 % short of the edge, as in Demirel and Aldemir (2021)"
 
+# Coefficients of friction of dry joints of stone [-]
+DRY_FRICTION = 0.4, 0.8
+
 _PAPER = "table 2 of Demirel and Aldemir (2021)"
 
 _OF_STRESS = (
     "of stress alone, as only a strength that is given counts in limit analyses and ratings"
 )
+
+_OF_FRICTION = "dry stone has {:g} to {:g}; 0.6 is customary".format(*DRY_FRICTION)
 
 # Values of materials and contacts that decide: name in texts, unit as number and text, and source
 DECIDING_VALUES = {
@@ -31,7 +36,7 @@ DECIDING_VALUES = {
     "contacts": {
         "normal_stiffness": ("k_n", 1e9, " MPa/mm", f"{_PAPER}; measured ones differ tenfold"),
         "shear_stiffness": ("k_s", 1e9, " MPa/mm", f"{_PAPER}; measured ones differ tenfold"),
-        "friction": ("μ", 1.0, "", "dry stone has 0.4 to 0.8; 0.6 is customary"),
+        "friction": ("μ", 1.0, "", _OF_FRICTION),
     },
 }
 

@@ -24,6 +24,7 @@ from archfem.cases.run import (
     link_file,
 )
 from archfem.cases.toml_file import read_tables
+from archfem.dynamics.collapse_state import FALLEN_STATES
 from archfem.dynamics.history import History
 from archfem.errors import ArchfemError, InvalidInput, logger
 from archfem.limit.collapse import Collapse, Outcome
@@ -243,7 +244,7 @@ def run_files(run: Run, at_rest: DeadLoadResult, text: str) -> Files:
         # The joints of the case, or else those of the largest |e| and of the longest sliding.
         "joints.png": history.plot(joints=case.joints or None),
     }
-    if "fall_pose" in history.dataset:
+    if history.verdict.outcome in FALLEN_STATES and "fall_pose" in history.dataset:
         files["fall.png"] = draw_fall(history)
     if case.output.get("animation", False) and can_film():
         from archfem.view.films.film import film  # pyvista and the encoder are slow to import

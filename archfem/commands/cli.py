@@ -181,7 +181,8 @@ def _add_case_commands(commands: Any) -> None:
     about = "collapse factor and mechanism by limit analysis of the case alone"
     add("limit", about, "folder for text, table and picture (none)", required=False)
     about = "least thickness of a ring at rest, scaled about its middle line"
-    add("thickness", about, "", module="tools")("--part", help="the ring, one of several")
+    add_to = add("thickness", about, "folder for the text (none)", required=False)
+    add_to("--part", help="the ring, one of several")
     about = "kinematic assessment of the collapse mechanism against a design spectrum"
     add_to = add("assess", about, "folder for text and pictures (none)", required=False)
     add_to("--parts", action="store_true", help="each part by itself")

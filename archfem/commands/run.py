@@ -1,4 +1,4 @@
-"""Commands on cases: run, modes, limit, assess, rate, mesh, accuracy, report; others."""
+"""Commands on cases: run, modes, limit, thickness, assess, rate, mesh, accuracy, report; others."""
 
 import argparse
 import io
@@ -45,6 +45,7 @@ from archfem.dynamics.history import Ending, History
 from archfem.errors import ArchfemError, DidNotConverge, InvalidInput
 from archfem.limit.collapse import Collapse, describe_fill
 from archfem.limit.rating import Rating
+from archfem.masonry.ring_thickness import find_ring
 from archfem.masonry.structure import Structure
 from archfem.motion.suite import Suite
 from archfem.statics.equilibrium import structure_doubts
@@ -242,6 +243,21 @@ def limit(options: argparse.Namespace) -> int:
 
     with record_doubts(case.structure) as doubts:
         show_both_senses(case, case.limit.solve(case.structure), show)
+    return doubt_code(doubts)
+
+
+def thickness(options: argparse.Namespace) -> int:
+    """Find the least thickness of a ring at rest, scaled about its middle line."""
+    case = Case.read(options.case, options.changes)
+    ring = find_ring(case.structure, options.part)
+    with record_doubts(case.structure) as doubts:
+        words, factor, lines = result_text.describe_thickness(case, ring)
+    text = "\n".join([*lines, *doubts])
+    notes = [line for line in lines if line.startswith(NOTE_MARK)]
+    given = words, [*doubts, *notes], "at rest", factor
+    stated = result_text.state_outcome(RESULTS["thickness"], *given)
+    files: Files = {"thickness.txt": text, **stated.as_file("thickness")}
+    write_results("thickness", case, options.out, f"{case.title}\n{text}", lambda: files)
     return doubt_code(doubts)
 
 

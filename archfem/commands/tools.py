@@ -1,4 +1,4 @@
-"""Commands without result folders: check, thickness, animate, examples, new, schema, doctor.
+"""Commands without result folders: check, animate, examples, new, schema, doctor.
 
 The module imports drawing within functions, so that `archfem check` starts at once.
 """
@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from archfem import _numba, _optional
-from archfem._display import DOUBT_MARK, write_progress_line
+from archfem._display import write_progress_line
 from archfem._files import path_inside, read_listed
 from archfem.cases import result_text
 from archfem.cases.case import Case, read_settings
@@ -27,12 +27,8 @@ from archfem.cases.toml_file import parse_tables
 from archfem.commands.cli import ExitCode
 from archfem.dynamics.history import History
 from archfem.errors import ArchfemError, InvalidInput, NotInstalled
-from archfem.limit.collapse import Collapse, Outcome, describe_crushing
-from archfem.limit.thickness import minimum_thickness
-from archfem.masonry.ring_thickness import find_ring
+from archfem.limit.collapse import Collapse, Outcome
 from archfem.motion.suite import Suite
-from archfem.statics.equilibrium import structure_doubts
-from archfem.units import format_mm
 
 PIP_INSTALL = f"{sys.executable} -m pip install"
 
@@ -87,26 +83,6 @@ def _check_case(options: argparse.Namespace) -> int:
     ready = f"in doubt, {len(at_rest.doubts)} times, as above" if at_rest.doubts else "ready"
     print(f"{options.case}: {ready}; dead load in {at_rest.dead.iterations} iterations")
     return ExitCode.DOUBTFUL if at_rest.doubts else 0
-
-
-def thickness(options: argparse.Namespace) -> int:
-    """Find the least thickness of a ring at rest, scaled about its middle line."""
-    case = Case.read(options.case, options.changes)
-    ring, limit = find_ring(case.structure, options.part), case.limit
-    least = minimum_thickness(
-        ring.with_thickness, friction=limit.friction, strength=limit.strength, tolerance=1e-5
-    )
-    print(case.title)
-    print(
-        f"least thickness at rest: {format_mm(least)} of {format_mm(ring.thickness)}, the "
-        "mean depth of its joints as drawn, all stones scaled alike about the middle line; "
-        "the ring alone on fixed springings\n"
-        f"geometric factor of safety: {ring.thickness / least:.3g}; "
-        f"{describe_crushing(limit.strength, case.structure)}"
-    )
-    doubts = structure_doubts(case.structure)
-    print(*(f"{DOUBT_MARK}{doubt}\n" for doubt in doubts), sep="", end="")
-    return ExitCode.DOUBTFUL if doubts else 0
 
 
 def animate(options: argparse.Namespace) -> None:

@@ -6,11 +6,13 @@ lets the structure stand is the cause, and the least change of it the remedy.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from scipy import sparse
 
 from archfem._typing import Array
+from archfem.errors import DidNotConverge, InvalidInput
 from archfem.limit.backfill import is_balanced, refuse_bonds, self_weight_programme
 from archfem.limit.linear_programme import Programme, RigidBlocks
 from archfem.masonry.block import as_point, say_place
@@ -76,6 +78,37 @@ def explain_instability(structure: Structure) -> str | None:
     )
 
 
+# Coefficient of friction below which a least one is not sought, as no stone has it
+_LITTLE_FRICTION = 0.05
+
+
+@lru_cache(maxsize=8)
+def least_friction(structure: Structure) -> float | None:
+    """Return the coefficient of friction from which it stands, where no joint has more.
+
+    None where it does not stand with its own, or limit analysis does not apply.
+    """
+    try:
+        refuse_bonds(structure)
+        _, dead = self_weight_programme(structure, "coulomb", np.inf, None)
+        if _stands(dead, cap=_LITTLE_FRICTION):
+            return _LITTLE_FRICTION
+        if not _stands(dead):
+            return None
+        most = min(float(dead.friction.max()), 1e3)
+        return _least_value(dead, "cap", _LITTLE_FRICTION, most, precision=5e-3)
+    except (InvalidInput, DidNotConverge):  # soft bodies, bonds
+        return None
+
+
+def describe_friction(structure: Structure) -> str:
+    """Describe the friction from which a structure stands; empty where it is not known."""
+    if (least := least_friction(structure)) is None:
+        return ""
+    less = " or less" if least == _LITTLE_FRICTION else ""
+    return f"it stands from a coefficient of friction of {least:.2g}{less}"
+
+
 def _name_interruption(structure: Structure, moving: Sequence[int]) -> str:
     """Return where a chain of moving blocks ends: at a gap, or at nothing; empty if nowhere."""
     near: dict[int, set[int]] = {number: set() for number in range(len(structure.blocks))}
@@ -123,12 +156,15 @@ def _connected_supports(
     return sorted(number for number in found if structure.blocks[number].fixed)
 
 
-def _stands(dead: Programme, friction: float | None = None, depth: float = 1.0) -> bool:
-    """Return whether blocks stand with at least this friction, and joints deepened by a factor."""
+def _stands(
+    dead: Programme, friction: float | None = None, depth: float = 1.0, cap: float = np.inf
+) -> bool:
+    """Return whether blocks stand with friction in a range, and joints deepened by a factor."""
     blocks: RigidBlocks = dead.blocks
     coefficient: Array = blocks.structure.friction
     if friction is not None:
         coefficient = np.maximum(coefficient, friction)
+    coefficient = np.minimum(coefficient, cap)
     relaxed = replace(dead, blocks=DeepenedBlocks(blocks.structure, depth), friction=coefficient)
     return is_balanced(relaxed.minimise_residual(), relaxed)
 

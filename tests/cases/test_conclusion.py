@@ -277,14 +277,15 @@ def test_of_unequal_outcomes_the_worst_is_the_first(case):
     every = {"a": verdict_of(), "b": verdict_of("dislocated", 0.2), "c": verdict_of("fallen")}
     data = data_of(case, range_of(0.1, 0.1), **every)
     text = (
-        "falls under 1, stands dislocated under 1, stands under 1 of 3 motions, moves by 100 to 200"
+        "falls under 1, is dislocated but stands under 1, stands under 1 of 3 motions, "
+        "moves by 100 to 200"
     )
     assert dict(conclusion.list_facts(data))["verdict"] == f"{text} mm"
     data.verdict_ranges[0].dataset["outcome"] = "run", np.array(["stands", "dislocated"])
     varied = "falls in none of 2 variations and is dislocated in 1"
     assert dict(conclusion.list_facts(data))["verdict"] == f"{text} mm; {varied}"
     text = conclusion.build_conclusion(data).pieces[0].text
-    assert text.startswith("The structure falls under 1 of 3 motions of PGA 0.20 g: c; it stands d")
+    assert text.startswith("The structure falls under 1 of 3 motions of PGA 0.20 g: c; it is disl")
     assert "0.20 g: a; it moves by 100 to 200 mm. Under 'first' it falls in none of 2 var" in text
 
 

@@ -2,6 +2,7 @@
 
 import json
 import tomllib
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from archfem.cases.report.response import _build_mechanism
 from archfem.cases.result_text import tabulate_runs
 from archfem.commands.run import run as run_command
 from archfem.dynamics.history import with_fall
+from archfem.view.pages.document import FigureBlock
 
 CASE = """
 title = "a column that falls"
@@ -88,6 +90,14 @@ def test_a_run_writes_all_its_files_and_begins_with_the_verdict(path, tmp_path, 
     )
     history = af.dynamics.History.read(Given.out / "history.nc", af.Case.read(path).structure)
     assert history.fall.kind == "fallen"
+    # blocks that came loose and stand are on no way to the ground
+    stood = replace(history, dataset=history.dataset.assign_attrs(fall="dislocated"))
+    data = ReportData(af.Case.read(path), {"shake": history})
+    drawn = [
+        any(isinstance(piece, FigureBlock) for piece in _build_mechanism(data, run))
+        for run in (history, stood)
+    ]
+    assert drawn == [True, False]
     assert tabulate_runs({"pair": history}).rows[0][1] == "fallen"
 
 

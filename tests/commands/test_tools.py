@@ -150,6 +150,43 @@ def test_the_least_thickness_of_a_ring_is_printed(tmp_path, capsys):
     assert "'dome' is no ring" in capsys.readouterr().err
 
 
+HORSESHOE = """[structure]
+shape = "circular_arch"
+radius = 1.0
+thickness = 0.24
+embrace = 200.0
+voussoirs = 15
+[model]
+fidelity = "rigid"
+"""
+
+
+@pytest.mark.parametrize("friction", [None, 0.45])
+def test_the_friction_from_which_it_stands_is_said(friction, tmp_path, capsys):
+    """By checks, thicknesses and reports, with a note where the case leaves it open."""
+    given = "" if friction is None else f'[contacts."stone to stone"]\nfriction = {friction}\n'
+    (path := tmp_path / "arch.toml").write_text(HORSESHOE + given)
+    out = tmp_path / "out"
+    for command in (["check"], ["thickness", "--out", str(out)]):
+        assert af.commands.main([command[0], str(path), *command[1:]]) in (0, 3)
+        said = capsys.readouterr().out
+        assert "it stands from a coefficient of friction of 0.44\n" in said
+        note = "note: friction decides whether it stands: dry stone has 0.4 to 0.8"
+        assert (note in said) == (friction is None)
+    moving = "hinge (joints 0, 3, 7, 12 and 15)" if friction is None else "slide (joints 0 and 15)"
+    assert f"if thinner, joints {moving}; without sliding 159 mm are enough" in said
+    assert af.commands.main(["report", str(out)]) == 0
+    page = (out / "report.html").read_text()
+    for words in (
+        ">least thickness<",
+        "stands from a coefficient of friction of 0.44",
+        "without sliding 159 mm",
+        "fixed to it: &#39;left abutment&#39;, &#39;right abutment&#39;<",
+        *["Friction decides"][: friction is None],
+    ):
+        assert words in page
+
+
 def test_a_thickness_names_a_stone_on_a_wrong_layer(tmp_path, capsys):
     """A course that prolongs the ring is in doubt, and one apart from it is an error."""
     for moved, code in (("WEST 3", 3), ("WEST 1", 1)):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.limit.instability import explain_instability
+from archfem.limit.instability import describe_friction, explain_instability, least_friction
 
 STONE = af.STONE
 
@@ -34,6 +34,22 @@ def test_a_block_on_a_slope_needs_the_friction_of_its_angle():
     assert value(r"coefficient of friction of ([\d.]+)", text) == pytest.approx(0.35, rel=0.02)
     assert "no thickness helps" in text
     assert explain_instability(on_a_bed(cube, friction=0.36, tilt=np.arctan(0.35))) is None
+
+
+@pytest.mark.parametrize(
+    ("slope", "friction", "least"),
+    [(0.35, 0.6, 0.35), (0.35, np.inf, 0.35), (0.35, 0.3, None), (0.0, 0.6, 0.05)],
+)
+def test_the_least_friction_of_a_block_on_a_slope(slope, friction, least):
+    cube = [[0.0, 0.0], [1.0, 0.0], [1.0, 0.5], [0.0, 0.5]]
+    stone = on_a_bed(cube, friction=friction, tilt=np.arctan(slope))
+    found, words = least_friction(stone), describe_friction(stone)
+    if least is None:
+        assert (found, words) == (None, "")
+    else:
+        assert found == pytest.approx(least, rel=0.01)
+        assert f"it stands from a coefficient of friction of {least:g}" in words
+        assert words.endswith(" or less") == (least == 0.05)
 
 
 def test_a_block_that_leans_out_needs_a_bed_up_to_its_centroid():

@@ -48,7 +48,7 @@ _VERBS = {
     "fallen": "falls",
     "partly fallen": "falls in part",
     "mechanism": "becomes a mechanism",
-    "dislocated": "stands dislocated",
+    "dislocated": "is dislocated but stands",
     "stands": "stands",
     "no mechanism": "forms no mechanism",
     "unknown": "has no known outcome",

@@ -184,7 +184,7 @@ def _command_rows(data: ReportData) -> Iterator[Row]:
     for section in (*STATIC_RESULTS, "pushover", "risk"):
         table = data.read_table(section)
         # a rating has joints and fill of [limit]
-        users = ("limit", "rating") if section == "limit" else (section,)
+        users = ("limit", "thickness", "rating") if section == "limit" else (section,)
         if not any(f"{name}.txt" in data.files for name in users):
             continue
         for key, value in table.items():

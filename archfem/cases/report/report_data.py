@@ -33,7 +33,7 @@ from archfem.view.pages.player_data import MAX_PACKED_BYTES, Scene
 SHOWN_RESULTS = ("modes", "accuracy", "verdict_range")
 
 # Results of limit analysis, for which blocks are rigid
-STATIC_RESULTS = ("limit", "rating", "assessment")
+STATIC_RESULTS = ("limit", "thickness", "rating", "assessment")
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,6 +17,7 @@ from archfem.cases.report.conclusion import (
 )
 from archfem.cases.report.motion_rules import tabulate_checks
 from archfem.cases.report.report_data import ReportData, build_player
+from archfem.dynamics.collapse_state import FALLEN_STATES
 from archfem.dynamics.history import History
 from archfem.masonry.joint_closing import describe_closing
 from archfem.masonry.structure import Structure, join_names
@@ -207,7 +208,7 @@ def _build_mechanism(data: ReportData, run: History) -> list[Any]:
         without = [name for name, found in verdict.mechanisms.items() if found is None]
         caption += f"; none by: {', '.join(without)}" if without else ""
         blocks.append(Grid((), rows, caption))
-    if run.fall is not None and "fall_pose" in run.dataset:
+    if verdict.outcome in FALLEN_STATES and "fall_pose" in run.dataset:
         caption = "Blocks on their way to the ground, (a) to (d), over where they stood."
         blocks.append(FigureBlock.of(draw_fall(run), caption))
     return blocks

@@ -27,6 +27,7 @@ from archfem.cases.report.response import (
     build_run_sections,
 )
 from archfem.cases.report.study_findings import read_study, tabulate_study
+from archfem.cases.result_text import describe_friction_margin
 from archfem.cases.run import DRAWING_FILE
 from archfem.dynamics.collapse_state import DISLOCATION, FALLEN_STATES, shallowest_part
 from archfem.dynamics.history import SIGN_CONVENTION
@@ -121,6 +122,7 @@ def build_input_section(data: ReportData) -> Section:
         "full": "elastic finite elements, all nodes kept",
         "monolithic": "elastic finite elements, all nodes kept, weak forms of joints",
     }
+    fixed = dict.fromkeys(f"'{b.part or b.name}'" for b in data.case.structure.blocks if b.fixed)
     large = data.case.analysis.discretisation.displacements == "large"
     moved = "of any size" if large else "small: equilibrium where blocks stood"
     follows = "; an assessment follows its mechanism" * ("assessment" in data.statements)
@@ -133,7 +135,7 @@ def build_input_section(data: ReportData) -> Section:
         ("blocks", "rigid" if data.is_static else blocks.get(fidelity, f"by part: {fidelity}")),
         ("joints", _describe_joints(data)),
         ("displacements", moved),
-        ("ground", "rigid, moves as one; abutments and foundations are fixed to it"),
+        ("ground", f"rigid, moves as one; fixed to it: {join_names(fixed)}"),
         ("units", "SI: m, kg, s, N, Pa, where no other unit stands beside a number"),
         ("signs", SIGN_CONVENTION),
         ("e", "eccentricity M / (N h), h the depth of the joint: ±0.5 at its edges"),
@@ -153,7 +155,7 @@ def _describe_joints(data: ReportData) -> str:
         varied = {"joint_rule", "k_n", "finish"}.intersection(list_varied(data))
         law += f"; {closing}, which was {'varied' if varied else 'not varied'}"
     strength = data.case.limit.strength
-    computed = {"limit", "rating"} & data.statements.keys()
+    computed = {"limit", "thickness", "rating"} & data.statements.keys()
     if strength is None or strength == np.inf or not computed:  # infinite is "none"
         return f"{law}; no crushing"
     return f"{law}; crushing in limit analysis alone, at {strength / MPa:.3g} MPa"
@@ -179,6 +181,7 @@ def build_structure_section(data: ReportData) -> Section:
         _tabulate_parts(structure),
         # tables stand before figures, which leave room where they move to the next page
         *([] if data.dead is None else [_tabulate_dead_load(data.dead)]),
+        *map(TextBlock, map(sentence, describe_friction_margin(case, structure))),
     ]
     beside = data.dead is not None and drawn[0] < MAX_SLENDERNESS * drawn[1]
     with limit_width(HALF_WIDTH) if beside else nullcontext():
@@ -245,6 +248,7 @@ def build_static_sections(data: ReportData) -> list[Section]:
     modes = data.read_result("modes", table="Modes about dead load: effective masses along x and y")
     return [
         Section("Limit analysis", data.read_result("limit", collapse, "collapse.png")),
+        Section("Least thickness", data.read_result("thickness")),
         Section("Pushover", data.read_result("pushover", curve)),
         Section("Rating for a vehicle", _build_rating(data)),
         Section("Kinematic assessment", _build_assessment(data)),
