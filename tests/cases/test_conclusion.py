@@ -256,6 +256,9 @@ def test_the_answer_has_displacements_the_first_fall_and_the_checks(case):
         "falls. Under 'a' and 'b' it first falls between 1.30 and 1.51 × over its time steps."
     ) in texts
     assert any("The doubts below, on scale of the motion, may change this." in x for x in texts)
+    rows[0] = (*rows[0][:2], f"search unfinished, {rows[0][2]}", "1.1")
+    facts = dict(conclusion.list_facts(data))
+    assert "over motions and time steps, search unfinished); " in facts["verdict"]
     passed = (
         "assessment: damage, right",
         "0.09 m",

@@ -151,8 +151,9 @@ def _say_movement(data: ReportData) -> Iterator[str]:
         found = sorted((x for row in rows for x in re.findall(pattern, row[2])), key=float)
         if found:
             over = " and ".join(["motions"] * (len(rows) > 1) + ["time steps"])
-            ends = f" ({found[0]} to {found[-1]} over {over})" * (found[0] != found[-1])
-            yield f"{words} at {found[0]} × the motion{ends}"
+            notes = [f"{found[0]} to {found[-1]} over {over}"] * (found[0] != found[-1])
+            notes += [UNFINISHED] * any(UNFINISHED in row[2] for row in rows)
+            yield f"{words} at {found[0]} × the motion" + f" ({', '.join(notes)})" * bool(notes)
 
 
 def _say_checks(data: ReportData) -> Iterator[str]:
