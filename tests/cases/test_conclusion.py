@@ -256,6 +256,13 @@ def test_the_answer_has_displacements_the_first_fall_and_the_checks(case):
         "falls. Under 'a' and 'b' it first falls between 1.30 and 1.51 × over its time steps."
     ) in texts
     assert any("The doubts below, on scale of the motion, may change this." in x for x in texts)
+    for at, said in ("1.20", True), ("1.35", False):
+        parted = rows[0][2].replace(", falls", f", dislocated from {at} ×, falls")
+        changed = [(*rows[0][:2], parted, "1.1"), rows[1]]
+        data.statements["scale"] = result_text.Statement([], changed, scaled)
+        words = f", is first dislocated at {at} × the motion; "
+        assert (words in dict(conclusion.list_facts(data))["verdict"]) == said
+    data.statements["scale"] = result_text.Statement([], rows, scaled)
     rows[0] = (*rows[0][:2], f"search unfinished, {rows[0][2]}", "1.1")
     facts = dict(conclusion.list_facts(data))
     assert "over motions and time steps, search unfinished); " in facts["verdict"]

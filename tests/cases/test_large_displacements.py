@@ -9,7 +9,11 @@ import pytest
 import xarray as xr
 
 import archfem as af
-from archfem.cases.report.conclusion import build_conclusion, summarise_outcomes
+from archfem.cases.report.conclusion import (
+    build_conclusion,
+    list_facts,
+    summarise_outcomes,
+)
 from archfem.cases.report.report_data import ReportData
 from archfem.cases.report.response import _build_mechanism
 from archfem.cases.result_text import tabulate_runs
@@ -139,6 +143,8 @@ def test_a_range_in_the_folder_stands_in_place_of_what_a_run_cannot_know(held):
     data = ReportData(data.case, data.runs)
     vars(data)["verdict_ranges"] = (af.dynamics.VerdictRange(xr.Dataset(rows, attrs=attrs)),)
     assert summarise_outcomes(data, [held]) == "stands; falls in 1 of 4 variations"
+    head = dict(list_facts(data))["verdict"]
+    assert head == "stands, moves by 0.102 mm; falls in 1 of 4 variations"
     lead, changes = sentences_of(data)
     # the share alone would be surer than four runs are: beta.ppf(0.975, 2, 3)
     assert " It falls in 1 of 4 variations: 1 of the 4 that vary all (1% to 81% at 95%). " in lead

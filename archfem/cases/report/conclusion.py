@@ -76,8 +76,8 @@ SECTIONS = {
 
 # States that a search of scales finds first, in the words of the answer
 _FIRST_STATES = {
-    "dislocated": "is first dislocated",
     "falls": "first falls",
+    "dislocated": "is first dislocated",
     "first mechanism": "first forms a mechanism",
 }
 
@@ -117,10 +117,12 @@ def list_facts(data: ReportData) -> list[tuple[str, str]]:
         verdict = "; ".join([*_say_checks(data), *_say_factors(data)])
         return [*signed, *([("verdict", verdict)] if verdict else []), *doubts, *blocks]
     peak = [("motions" if len(runs) > 1 else "motion", _describe_peaks(runs))]
-    did = ", ".join([summarise_outcomes(data, runs), *_say_movement(data)])
+    did, *others = summarise_outcomes(data, runs).split("; ")
+    did = ", ".join([did, *_say_movement(data)])
     ranges = [x for x in data.verdict_ranges if x.decisive.any()] if len(runs) > 1 else []
     ranges.sort(key=lambda x: (x.falls.sum(), x.dislocated.sum()))
-    verdict = "; ".join([did, *(x.count for x in ranges[-1:]), *_say_checks(data)])
+    others += [x.count for x in ranges[-1:]]
+    verdict = "; ".join([did, *others, *_say_checks(data)])
     return [*signed, ("verdict", verdict), *doubts, *blocks, *peak]
 
 
@@ -145,11 +147,13 @@ def _say_movement(data: ReportData) -> Iterator[str]:
         low, high = (format_mm(end(sizes)) for end in (min, max))
         yield f"moves by {low.removesuffix(' mm')} to {high}" if low != high else f"moves by {low}"
     rows = data.statements["scale"].rows if "scale" in data.statements else []
+    least = np.inf
     for state, words in _FIRST_STATES.items():
         # those of other time steps stand in the same words
         pattern = rf"{state} (?:from|at) (?:[\d.]+ g \()?([\d.]+) ×"
         found = sorted((x for row in rows for x in re.findall(pattern, row[2])), key=float)
-        if found:
+        if found and float(found[0]) < least:  # a dislocation beyond a fall says nothing
+            least = float(found[0])
             over = " and ".join(["motions"] * (len(rows) > 1) + ["time steps"])
             notes = [f"{found[0]} to {found[-1]} over {over}"] * (found[0] != found[-1])
             notes += [UNFINISHED] * any(UNFINISHED in row[2] for row in rows)
