@@ -25,6 +25,7 @@ from archfem.cases.defaults import (
 )
 from archfem.cases.run import DeadLoadResult
 from archfem.dynamics.accuracy import Accuracy
+from archfem.dynamics.collapse_state import FALLEN_STATES
 from archfem.dynamics.history import Ending, History
 from archfem.dynamics.motion_scaling import CollapseScale, MechanismScales
 from archfem.dynamics.verdict import ALL_DEFINITIONS, Verdict
@@ -142,7 +143,8 @@ def tabulate_runs(runs: Mapping[str, History]) -> ResultTable:
         row.append(str(joints["name"].values[int(largest.values.argmax())]))
         row.append(format_ratio(float(joints["friction"].max())))
         row.append(f"{int(apart.sum())} joints" if apart.any() else "-")
-        row += [format_mm(value) for value in (verdict.displacement, verdict.residual)]
+        sizes = map(format_mm, (verdict.displacement, verdict.residual))
+        row += ["-", "-"] if verdict.outcome in FALLEN_STATES else sizes  # the way to the ground
         row += [_mechanism_cell(verdict.mechanisms, definition) for definition in ALL_DEFINITIONS]
         rows.append([*row, f"{endings.get(run.ending, run.ending)} {run.time[-1]:.2f} s"])
     verdicts = [run.verdict for run in runs.values()]

@@ -81,7 +81,12 @@ class ConvergencePaths(Protocol):
 
 
 @validate_arguments
-def draw_findings(table: xr.Dataset, max_panels: int = 12, max_keys: int = 3) -> Figure:
+def draw_findings(
+    table: xr.Dataset,
+    max_panels: int = 12,
+    max_keys: int = 3,
+    limits: Mapping[str, float] | None = None,
+) -> Figure:
     """Draw the findings of a study over each key that varies.
 
     Points that differ in one number alone are joined by a line. Colours are the values of a key in
@@ -93,6 +98,7 @@ def draw_findings(table: xr.Dataset, max_panels: int = 12, max_keys: int = 3) ->
         table: table of a study, as by `Study.run`.
         max_panels: number of panels: the first findings that differ are drawn.
         max_keys: number of keys that they are drawn over.
+        limits: values of findings at which a dashed line is drawn, by their names.
 
     Returns:
         The figure, with a row for each finding and a column for each key; a panel for each finding
@@ -113,7 +119,7 @@ def draw_findings(table: xr.Dataset, max_panels: int = 12, max_keys: int = 3) ->
     named = all(frame[key].dtype.kind not in "fi" for key in keys)
     if named and (len(keys) == 1 or keys == ["case", "pair"]):
         rated = [name for name in names if name in REQUIRED_FACTORS]
-        return _draw_named_cases(flat, frame, keys, (rated or names)[:max_panels])
+        return _draw_named_cases(flat, frame, keys, (rated or names)[:max_panels], limits or {})
     names = names[: max(max_panels // len(keys), 1)]
     columns = len(keys) if len(keys) > 1 else min(len(names), 3)
     rows = -(-len(names) * len(keys) // columns)
@@ -131,6 +137,8 @@ def draw_findings(table: xr.Dataset, max_panels: int = 12, max_keys: int = 3) ->
         coloured = next((each for each in few if frame[each].dtype.kind not in "fi"), None)
         coloured = coloured or next(iter(few), None)
         _draw_over_key(axes, frame.rename(columns={name: "value"}), key, others, coloured)
+        if limits and name in limits:
+            axes.axhline(limits[str(name)], color=Colour.GREY, lw=0.9, ls="--")
         if number < columns and coloured is not None:
             labels = axes.get_legend_handles_labels()[1]
             fitting = legend_columns(labels, figure.get_figwidth() / columns)
@@ -143,7 +151,11 @@ def draw_findings(table: xr.Dataset, max_panels: int = 12, max_keys: int = 3) ->
 
 
 def _draw_named_cases(
-    table: xr.Dataset, frame: Any, keys: Sequence[str], names: Sequence[Any]
+    table: xr.Dataset,
+    frame: Any,
+    keys: Sequence[str],
+    names: Sequence[Any],
+    limits: Mapping[str, float],
 ) -> Figure:
     """Draw a panel for each finding, beside a row for each case: a bar, or dots of its motions."""
     key, *pairs = keys
@@ -169,6 +181,8 @@ def _draw_named_cases(
         style = {"color": Colour.GREY, "lw": 0.9}
         if not pairs:
             axes.axvline(frame[name].iloc[0], ls="--", label=f"{labels[0]}, the first", **style)
+        if name in limits:
+            axes.axvline(limits[name], ls="--", **style)
         # those of a push are accelerations, which pass at that of the site
         if name in REQUIRED_FACTORS and "without_pressure" in table:
             axes.axvline(1.0, label="a factor of 1", **style)
@@ -589,23 +603,27 @@ def draw_scale(found: CollapseScale, limit: float) -> Figure:
     labels = "scale of the motion [-]", "residual displacement [mm]"
     figure, axes = new_axes(Size.COLUMN, 3.0, *labels)
     axes.set(xscale="log", yscale="log")
-    made = {dt: [(scale, fall) for scale, fall in found.falls(dt) if fall] for dt in found.searches}
-    held = [x.residual for runs in made.values() for _, x in runs if x.kind not in FALLEN_STATES]
+    made = {**found.longer, **found.searches}
+    runs = [(dt, run.scale, run.fall) for dt in made for run in made[dt].runs if run.fall]
+    steps = list(dict.fromkeys(dt for dt, *_ in runs))
+    held = [fall.residual for *_, fall in runs if fall.kind not in FALLEN_STATES]
     top = 3.0 * max([limit, *held])
-    for k, (dt, runs) in enumerate(made.items()):
-        for state, marker in zip(COLLAPSE_STATES, "oD^^", strict=True):
-            own = [(scale, fall.residual) for scale, fall in runs if fall.kind == state]
-            x, y = np.array(own).reshape(-1, 2).T
-            heights = np.full(len(x), top) if state in FALLEN_STATES else np.maximum(y, 1e-6)
-            style = {"color": Colour.LINES[k % len(Colour.LINES)], "ms": 4, "alpha": 0.8}
-            label = f"{state}, {1e3 * dt:g} ms" if own else None
-            axes.plot(x, 1e3 * heights, marker, label=label, **style)
+    marks = dict(zip(COLLAPSE_STATES, "oD^^", strict=True))
+    for dt, scale, fall in runs:
+        height = top if fall.kind in FALLEN_STATES else max(fall.residual, 1e-6)
+        colour = Colour.LINES[steps.index(dt) % len(Colour.LINES)]
+        axes.plot(scale, 1e3 * height, marks[fall.kind], color=colour, ms=4, alpha=0.8)
+    for k, dt in enumerate(steps):
+        style = {"color": Colour.LINES[k % len(Colour.LINES)], "label": f"{1e3 * dt:g} ms"}
+        axes.plot([], [], "s", ms=4, **style)
+    for state in [state for state in marks if any(fall.kind == state for *_, fall in runs)]:
+        axes.plot([], [], marks[state], color=Colour.GREY, ms=4, label=state)
     axes.axhline(1e3 * limit, color=Colour.GREY, lw=0.9, ls="--", label="limit of dislocation")
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_minor_formatter(NullFormatter())
         axis.set_major_formatter(lambda value, _: f"{value:g}")
     axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 1.5, 2.0, 3.0, 5.0, 7.0)))
-    add_legend_below(figure, 2)
+    add_legend_below(figure, 4)
     return figure
 
 

@@ -354,10 +354,10 @@ def test_single_changes_are_drawn_and_tabulated_the_worst_first(case):
     found.dataset.attrs["properties"] = ["dt", "sign"]
     found.dataset["outcome"] = "run", np.array(["stands", "stands", "fallen"])
     figure, table = sections._build_single_changes(data_of(case), found, "a")
-    assert [row[:2] for row in table.rows] == [
-        ("motion reversed", "fallen"),
-        ("half the time step", "stands"),
-        ("unvaried", "stands"),
+    assert [row[:3] for row in table.rows] == [
+        ("motion reversed", "fallen", "-"),
+        ("half the time step", "stands", "120 mm"),
+        ("unvaried", "stands", "20 mm"),
     ]
     assert table.caption == "Single changes under 'a', the worst first"
     (axes,) = figure.figure.axes

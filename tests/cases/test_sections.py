@@ -1,5 +1,6 @@
 """Numbers of a report and of its tables: those of structure, dead load and runs."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -47,6 +48,7 @@ def test_parts_are_listed_with_the_weight_that_moves(piers):
             2.0 * 20.0 * sum(block.area for block in free), rel=1e-3
         )
         assert row["role"] == blocks[0].role
+    assert grid.caption == "Parts that can move"  # of a part that moves a block may be fixed
     pier = next(row for part, row in rows.items() if "pier" in part)
     assert pier["weight [kN]"] == f"{2.0 * 20.0 * 1.2 * 1.2:.4g}"
     assert pier["of them fixed"] == "1"
@@ -166,16 +168,38 @@ def test_a_report_of_several_runs_has_a_section_for_each(runs, piers, monkeypatc
 
 
 def test_tables_and_figures_of_all_pairs_say_what_they_show(runs, piers, monkeypatch):
-    """Definitions that no run meets are one line, and each of two figures has its part named."""
+    """Each of two figures has its part named."""
     monkeypatch.setattr(response.FigureBlock, "of", lambda figure, caption: caption)
     monkeypatch.setattr(response, "draw_envelopes", lambda *_: [Figure(), Figure()])
     data = report_data.ReportData(SimpleNamespace(structure=piers), runs)
-    _, ends, *captions = response._build_suite_response(data)
-    assert ends.text == ("No run forms a mechanism by any definition; end: reached 0.10 s in all.")
+    _, *captions = response._build_suite_response(data)
     assert [text.rpartition("; ")[2] for text in captions] == [
         "part 1 of 2 of the motions",
         "part 2 of 2 of the motions",
     ]
+
+
+def test_a_mechanism_is_stated_once(runs, piers):
+    """That which moves with its run, those by count in a table at the end; a fall has no size."""
+    hit = af.limit.Mechanism("local", "arch", (1,), 1.0, names=("joint 1",), duration=0.1)
+    found = {}
+    for name, mechanisms in (
+        ("first", {"any joints at once": hit, "verified": replace(hit, time=2.0)}),
+        ("second", {"any joints at once": None, "verified": None}),
+    ):
+        verdict = replace(runs[name].verdict, mechanisms=mechanisms, outcome="fallen")
+        dataset, joints = runs[name].dataset, runs[name].joints
+        found[name] = SimpleNamespace(verdict=verdict, dataset=dataset, joints=joints, fall=None)
+    data = report_data.ReportData(SimpleNamespace(structure=piers, suite=None), found)
+    (text,) = response._build_mechanism(data, found["first"])
+    assert "Mechanism: verified, local mechanism of arch at 2.000 s by joint 1" in text.text
+    (grid,) = response.build_joint_section(data).pieces
+    ((name, needed, said),) = grid.rows
+    assert (name, needed) == ("any joints at once", "of any rings and piers together")
+    assert said.startswith("first: local mechanism of arch at 1.000 s by joint 1;")
+    assert said.endswith("; second: none")
+    (row, *_) = (row for _, row in conclusion._capacity_rows(data))
+    assert row[2] == "fallen in 2 of 2 runs"
 
 
 def test_a_run_that_was_broken_off_is_reported_as_such(runs, piers, monkeypatch):

@@ -6,6 +6,7 @@ import xarray as xr
 
 import archfem as af
 from archfem.cases.report import study_findings
+from archfem.view import draw_findings
 
 
 def study(falls=(), cases=30, **attrs):
@@ -29,14 +30,29 @@ def study(falls=(), cases=30, **attrs):
 
 def test_each_case_has_a_row_and_those_that_fall_are_the_first():
     grid = study_findings.tabulate_study(study(falls=[29]))
-    assert grid.head == ["case", "residual displacement [m]", "outcome"]
+    assert grid.head == ["case", "residual displacement", "outcome"]
     assert len(grid.rows) == study_findings.MAX_CASES
-    assert grid.rows[0] == ["case 29", "1.7", "fallen, in 1 of 2"]
-    assert grid.rows[1][0] == "case 0"
+    assert grid.rows[0] == ["case 29", "-", "fallen, in 1 of 2"]
+    assert grid.rows[1][:2] == ["case 0", "1 mm"]
     assert grid.caption.endswith("over its motions; 6 of 30 cases are left out, of which 0 fall")
     many = study_findings.tabulate_study(study(falls=range(27)))
     assert many.caption.endswith("6 of 30 cases are left out, of which 3 fall")
     assert "left out" not in study_findings.tabulate_study(study(cases=24)).caption
+
+
+def test_findings_are_drawn_in_words_and_mm_and_a_fall_has_none():
+    found = study(falls=[1], cases=2)
+    drawn = found.numbers["residual displacement"]
+    assert drawn.attrs["units"] == "mm"
+    np.testing.assert_allclose(drawn, [1.0, 1.0, 2.0, np.nan])
+    # the line is that of the limit, in a panel of its own
+    (axes,) = draw_findings(found.numbers, limits={"residual displacement": 40.0}).axes
+    assert axes.get_xlabel() == "residual displacement [mm]"
+    assert axes.lines[-1].get_xdata()[0] == 40.0
+    swept = found.numbers.isel(point=[0, 2]).drop_vars(["pair", "case"])
+    swept = swept.assign_coords(width=("point", [1.0, 2.0]))
+    (axes,) = draw_findings(swept, limits={"residual displacement": 40.0}).axes
+    assert axes.lines[-1].get_ydata()[0] == 40.0
 
 
 def test_cases_with_doubts_stand_before_others():

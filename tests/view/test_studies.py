@@ -7,7 +7,11 @@ import pytest
 import xarray as xr
 
 import archfem as af
+from archfem.dynamics.collapse_state import CollapseState
+from archfem.dynamics.history import Ending
+from archfem.dynamics.motion_scaling import CollapseScale, MechanismScales, ScaledRun
 from archfem.view import draw_findings, draw_study
+from archfem.view.studies import draw_scale
 
 FOUND = {
     "weak": {"four joints": np.array([0.3, 0.5, 0.9]), "moves": np.array([0.8, 1.2, np.inf])},
@@ -140,3 +144,21 @@ def test_names_of_many_ratings_do_not_overlap():
     boxes = [text.get_window_extent() for text in figure.axes[0].get_yticklabels()]
     assert not any(first.overlaps(second) for first, second in pairwise(boxes))
     assert min(box.x0 for box in boxes) >= 0.0
+
+
+def test_a_figure_of_scales_has_the_runs_of_all_steps():
+    """Colours are steps, marks outcomes; those of steps that were too long are among them."""
+    made = {}
+    for dt, scale in ((0.01, 2.0), (0.005, 2.1)):
+        runs = [
+            ScaledRun(at, {}, Ending.FINISHED, "", CollapseState(kind, None, (), 0.1, size, True))
+            for at, kind, size in ((1.0, "stands", 0.01), (scale, "fallen", 7.0))
+        ]
+        made[dt] = MechanismScales(("collapse",), tuple(runs))
+    found = CollapseScale({0.005: made[0.005]}, longer={0.01: made[0.01]})
+    figure = draw_scale(found, 0.04)
+    places = [(*line.get_xdata(), *line.get_ydata()) for line in figure.axes[0].lines]
+    assert places[:4] == [(1.0, 10.0), (2.0, 120.0), (1.0, 10.0), (2.1, 120.0)]
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == [
+        *("10 ms", "5 ms", "stands", "fallen", "limit of dislocation")
+    ]

@@ -477,8 +477,9 @@ def _capacity_rows(data: ReportData) -> Iterator[tuple[str, Row]]:
         verdicts = [run.verdict for run in data.runs.values()]
         demand, outcome = _describe_peaks(data.runs.values()), verdicts[0].outcome
         outcome = result_text.count_outcomes(verdicts) if len(verdicts) > 1 else outcome
-        sizes = np.array([[each.displacement, each.residual] for each in verdicts])
-        if np.isfinite(sizes).all():
+        # of a fall it is the way to the ground
+        held = [(x.displacement, x.residual) for x in verdicts if x.outcome not in FALLEN_STATES]
+        if (sizes := np.array(held)).size and np.isfinite(sizes).all():
             largest, residual = map(format_mm, sizes.max(axis=0))
             over = "time steps" if data.fidelity == VARIED_FIDELITY else "time steps and fidelity"
             steps = ", ".join(_list_ranges_of_steps(data))

@@ -137,10 +137,26 @@ def _build_response(data: ReportData, name: str, players: int) -> list[Any]:
 
 
 def build_joint_section(data: ReportData) -> Section:
-    """Build the section of long tables: the joints of each run of a suite."""
+    """Build the section of long tables: other mechanisms, and the joints of each run of a suite."""
     runs = {} if data.case.suite is None else data.runs
     tables = [_tabulate_joints(data, run, f" under '{name}'") for name, run in runs.items()]
-    return Section("Joints of each run", tables)
+    return Section("Mechanisms and joints of each run", [*_tabulate_mechanisms(data), *tables])
+
+
+def _tabulate_mechanisms(data: ReportData) -> Iterator[Grid]:
+    """Yield the table of mechanisms by other definitions than that of the response, if any."""
+    rows = []
+    for name, needed in _DEFINITIONS.items():
+        found = {run: x.verdict.mechanisms.get(name) for run, x in data.runs.items()}
+        if name != "verified" and any(found.values()):
+            texts = [
+                f"{run}: {x or 'none'}" if len(found) > 1 else f"{x}" for run, x in found.items()
+            ]
+            rows.append((name, needed, "; ".join(texts)))
+    if rows:
+        yield Grid(
+            (), rows, "First mechanisms by other definitions, with the failed joints of each"
+        )
 
 
 def _build_envelopes(data: ReportData) -> list[FigureBlock]:
@@ -185,7 +201,7 @@ def _tabulate_joints(data: ReportData, run: History, label: str = "") -> Grid:
 
 
 def _build_mechanism(data: ReportData, run: History) -> list[Any]:
-    """Build verdict and mechanism in a line each, the definitions, and the fall of a run."""
+    """Build verdict and mechanism in a line each, and the fall of a run."""
     verdict, fall = run.verdict, run.verdict.fall
     lines = [
         f"Outcome: {summarise_outcomes(data, [run])}",
@@ -193,21 +209,12 @@ def _build_mechanism(data: ReportData, run: History) -> list[Any]:
     ]
     if fall is not None and fall.blocks:
         lines.append(f"lost: {describe_lost(fall, len(fall.blocks))}")
-    lines.append(f"Mechanism: {describe_mechanism(verdict)}")
+    found = verdict.mechanisms.get("verified")
+    lines.append(f"Mechanism: {f'verified, {found}' if found else describe_mechanism(verdict)}")
     # the assumptions name the law of closing, and whether it was varied
     law = describe_closing(data.case.structure)
     lines += [line for line in verdict.remarks if not law or not line.startswith(law)]
     blocks: list[Any] = [TextBlock(" ".join(map(sentence, lines)))]
-    if any(verdict.mechanisms.values()):
-        caption = "Definitions of a mechanism: failed joints that it needs, and the first one"
-        rows = [
-            [name, _DEFINITIONS[name], str(found)]
-            for name, found in verdict.mechanisms.items()
-            if found is not None
-        ]
-        without = [name for name, found in verdict.mechanisms.items() if found is None]
-        caption += f"; none by: {', '.join(without)}" if without else ""
-        blocks.append(Grid((), rows, caption))
     if verdict.outcome in FALLEN_STATES and "fall_pose" in run.dataset:
         caption = "Blocks on their way to the ground, (a) to (d), over where they stood."
         blocks.append(FigureBlock.of(draw_fall(run), caption))
@@ -215,26 +222,12 @@ def _build_mechanism(data: ReportData, run: History) -> list[Any]:
 
 
 def _build_suite_response(data: ReportData) -> list[Any]:
-    """Build the tables of all runs, and their envelopes."""
+    """Build the table of all runs, and their envelopes."""
     (head, rows), columns = result_text.tabulate_runs(data.runs), len(result_text.RUN_COLUMNS)
-    # The mechanisms have too many columns for a page: a line for each definition instead.
-    mechanisms = []
-    for title, *cells in zip(head[columns:], *(row[columns:] for row in rows[:-1]), strict=True):
-        named = [f"{row[0]}: {cell}" for row, cell in zip(rows, cells, strict=False)]
-        if not {*cells} <= {"none", "-"}:
-            text = "; ".join(named) if len({*cells}) > 1 else f"{cells[0]} in all"
-            mechanisms.append((title, _DEFINITIONS.get(title, ""), text))
+    # mechanisms are stated with each run
     caption = "Outcome, PGA, and the critical joint of each run"
-    by_definition = "Mechanisms by definition, the failed joints that it needs, and end"
-    table: Any = Grid([], mechanisms, by_definition)
-    if len(mechanisms) == 1:  # the end alone
-        text = f"No run forms a mechanism by any definition; end: {mechanisms[0][-1]}"
-        table = TextBlock(sentence(text))
-    return [
-        Grid(head[:columns], [row[:columns] for row in rows[:-1]], caption),
-        table,
-        *_build_envelopes(data),
-    ]
+    table = Grid(head[:columns], [row[:columns] for row in rows[:-1]], caption)
+    return [table, *_build_envelopes(data)]
 
 
 def build_check_section(data: ReportData) -> Section:

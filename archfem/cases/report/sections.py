@@ -135,7 +135,7 @@ def build_input_section(data: ReportData) -> Section:
         ("blocks", "rigid" if data.is_static else blocks.get(fidelity, f"by part: {fidelity}")),
         ("joints", _describe_joints(data)),
         ("displacements", moved),
-        ("ground", f"rigid, moves as one; fixed to it: {join_names(fixed)}"),
+        ("ground", f"rigid, moves as one; fixed to it: {join_names([*fixed])}"),
         ("units", "SI: m, kg, s, N, Pa, where no other unit stands beside a number"),
         ("signs", SIGN_CONVENTION),
         ("e", "eccentricity M / (N h), h the depth of the joint: ±0.5 at its edges"),
@@ -236,7 +236,8 @@ def _tabulate_parts(structure: Structure) -> Grid:
         "weight [kN]",
         "depth of joints [m]",
     ]
-    return Grid(head, rows, f"Parts that can move ({join_names(fixed) or 'none'} fixed)")
+    apart = f"; fixed as a whole: {join_names(fixed)}" if fixed else ""
+    return Grid(head, rows, f"Parts that can move{apart}")
 
 
 def build_static_sections(data: ReportData) -> list[Section]:
@@ -355,7 +356,7 @@ def _build_search(data: ReportData, name: str, pair: str) -> list[Any]:
     if (runs := data.read_text(f"{name}.csv")) is None:
         return blocks
     scales: dict[tuple[str, str], list[str]] = {}
-    for step, scale, outcome, *_ in [*reader(runs.splitlines())][1:]:
+    for step, scale, _, outcome, *_ in [*reader(runs.splitlines())][1:]:
         scales.setdefault((step, outcome), []).append(scale)
     rows = [(*key, ", ".join(found)) for key, found in scales.items()]
     head = ("time step", "the structure", "at the scales [× the motion]")
@@ -378,10 +379,12 @@ def _build_study(data: ReportData) -> list[Any]:
             FigureBlock.read(place / "study.png", caption),
         ]
     blocks: list[Any] = [tabulate_study(found)]
+    limit, key = DISLOCATION * shallowest_part(data.case.structure)[0], "residual displacement"
     with suppress(InvalidInput), limit_width(MAX_WIDTH):  # no number differs
-        numbers = [name for name in found.names if found.table[name].dtype.kind == "f"]
-        figure = draw_findings(found.table[numbers], max_panels=4)
-        blocks.append(FigureBlock.of(figure, sentence(f"{caption}; all points")))
+        figure = draw_findings(found.numbers, max_panels=4, limits={key: 1e3 * limit})
+        dashed = f", dashed the limit of dislocation of the case, {format_mm(limit)}"
+        caption += f"; all points{dashed * (key in found.numbers)}"
+        blocks.append(FigureBlock.of(figure, sentence(caption)))
     return blocks
 
 
@@ -430,8 +433,10 @@ def _build_single_changes(data: ReportData, found: VerdictRange, pair: str) -> l
     caption += "; a fall has none" * any(np.isnan(sizes))
     head = ("single change", "outcome", "largest displacement", "at the end")
     rows = [
-        (each.name, each.outcome, *map(format_mm, (each.displacement, each.residual)))
+        # of a fall it is the way to the ground
+        (each.name, each.outcome, *["-" if each.outcome in FALLEN_STATES else x for x in ends])
         for each in changes
+        for ends in [map(format_mm, (each.displacement, each.residual))]
     ]
     drawn = []
     with suppress(InvalidInput):  # all are equal, or fall

@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -51,6 +52,16 @@ class StudyFindings:
     keys: tuple[str, ...]  # coordinates that tell cases apart
     names: tuple[str, ...]  # findings that are shown, that which decides first
     worst: Any  # DataFrame of the cases in the order of the study; `falls`, of `runs` motions
+
+    @cached_property
+    def numbers(self) -> xr.Dataset:
+        """Findings that are numbers, in words; lengths in mm, and none of a fall."""
+        numbers = [name for name in self.names if self.table[name].dtype.kind == "f"]
+        table = self.table[numbers].copy()
+        for name in [name for name in _SIZES if name in table]:
+            held = self.table[name].where(~self.table["fall"].isin(FALLEN_STATES))
+            table[name] = (1e3 * held).assign_attrs(units="mm")
+        return table.rename({name: name.replace("_", " ") for name in numbers})
 
     @property
     def decides(self) -> str:
@@ -113,7 +124,8 @@ def tabulate_study(found: StudyFindings) -> Grid:
     head += ["outcome"] if state else []
     rows = []
     for _, row in order.head(MAX_CASES).iterrows():
-        cells = [_format(row[name]) for name in (*found.keys, *found.names)]
+        cells = [_format(row[name]) for name in found.keys]
+        cells += [_format_finding(row, name) for name in found.names]
         count = f", in {row['falls']} of {row['runs']}" if several and row["falls"] else ""
         rows.append([*cells, f"{row['fall']}{count}"] if state else cells)
     caption = f"Study: {found.title}"
@@ -126,8 +138,15 @@ def tabulate_study(found: StudyFindings) -> Grid:
 
 def _label_finding(table: xr.Dataset, name: str) -> str:
     """Return the name of a key or finding, with its unit."""
-    unit = table[name].attrs.get("units")
+    unit = None if name in _SIZES else table[name].attrs.get("units")
     return f"{name.replace('_', ' ')} [{unit}]" if unit else name.replace("_", " ")
+
+
+def _format_finding(row: Any, name: str) -> str:
+    """Return a finding of a row; a fall has no displacement but that to the ground."""
+    if name not in _SIZES:
+        return _format(row[name])
+    return "-" if row["fall"] in FALLEN_STATES else format_mm(row[name])
 
 
 def _format(value: Any) -> str:

@@ -102,15 +102,14 @@
         const last = time + apart > this.end * 1.0001;
         element("text", { x: this.x(time), y: this.bottom + 6, "dominant-baseline": "hanging", "text-anchor": last && this.x(time) > this.right - 20 ? "end" : "middle" }, this.svg).textContent = words(time) + (last ? " s" : "");
       }
-      let end = this.right + 4; // of the room for a name: later ones push earlier ones aside
-      for (const [time, name] of [...instants].reverse()) {
-        element("path", { class: "instant", d: `M${this.x(time)} ${this.top}V${this.bottom}` }, this.svg);
-        if (!name) continue;
-        const text = element("text", { class: "name", y: this.top - 5, "text-anchor": "middle" }, this.svg);
-        text.textContent = name;
-        const half = text.getComputedTextLength() / 2, x = Math.min(this.x(time), end - half);
-        text.setAttribute("x", x);
-        end = x - half - 6;
+      for (const [time] of instants) element("path", { class: "instant", d: `M${this.x(time)} ${this.top}V${this.bottom}` }, this.svg);
+      // paper has larger type: near names are one text, and those at an edge grow away from it
+      const named = instants.filter(([, name]) => name).sort(([one], [other]) => one - other);
+      const [first, last] = [named.at(0), named.at(-1)].map((each) => (each ? each[0] : 0));
+      const near = named.length > 1 && last - first < 0.4 * this.end;
+      for (const [time, name] of near ? [[(first + last) / 2, named.map(([, each]) => each).join(", ")]] : named) {
+        const anchor = time < 0.3 * this.end ? "start" : time > 0.7 * this.end ? "end" : "middle";
+        element("text", { class: "name", x: this.x(time), y: this.top - 5, "text-anchor": anchor }, this.svg).textContent = name;
       }
       for (const line of lines) element("path", { class: "limit", d: `M${this.left} ${this.y(line)}H${this.right}` }, this.svg);
       for (const { times, values, name } of curves) element("path", { class: `curve ${name}`, d: this.curve(times, values) }, this.svg);
