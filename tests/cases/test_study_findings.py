@@ -103,8 +103,8 @@ def test_a_row_has_the_largest_of_each_column_and_noise_is_no_finding():
     )
     found = study_findings.collect_findings("", "", table)
     assert study_findings.tabulate_study(found).rows == [
-        ["as is", "0.08", "0.0118", "stands"],
-        ["thin", "0.087", "0.0119", "stands"],
+        ["as is", "80 mm", "11.8 mm", "stands"],
+        ["thin", "87 mm", "11.9 mm", "stands"],
     ]
     assert [*study_findings.say_what_changes(found)] == ["in the study none of 2 cases falls"]
     table["largest_displacement"][3] = 0.109

@@ -236,9 +236,8 @@ def test_a_range_is_of_each_motion_of_a_suite_and_replaces_none_of_another(
     assert not (out / "verdict_range.nc").exists()
     assert af.commands.main(["report", str(out)]) == 0
     words = " ".join(read_page((out / "report.html").read_text(encoding="utf-8")).words)
-    count = r"in 0 of \d+ under"
-    assert re.search(rf"variations of its properties it falls {count} 'first' and {count} ", words)
     for pair in ("first", "second"):
+        assert re.search(rf"nder '{pair}' it falls in none of \d+ variations", words)
         assert f"variations under '{pair}'" in words
         assert f"Single changes under '{pair}', the worst first" in words
 
