@@ -5,6 +5,7 @@ import shlex
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 from chromium import BROWSER
 
@@ -69,3 +70,46 @@ def test_a_task_runs_and_prints_the_output_that_it_shows(task, tmp_path, monkeyp
         else:
             exec(compile(code, task, "exec"), space)
         check_printed(shown, capsys.readouterr().out)
+
+
+@pytest.mark.parametrize(
+    ("opening", "eaves"),
+    [
+        (None, 2.5),
+        ((-0.75, 0.25, 0.0, 2.0), 2.5),
+        ((0.2, 1.0, 1.0, 2.0), 2.4),
+        ((0.2, 1.0, 0.75, 2.0), 2.4),
+        ((-0.5, 0.5, 1.0, 1.75), 2.5),
+    ],
+)
+def test_walls_of_the_page_are_in_running_bond(opening, eaves, tmp_path, monkeypatch):
+    """No head joint is above another, also where a lintel ends; a mirrored wall is the same."""
+    monkeypatch.chdir(tmp_path)
+    (code,) = (code for _, code, _ in BLOCK.findall(PAGE) if "def write_wall" in code)
+    exec(code.partition('\nwrite_wall("gable.toml"')[0], space := {})
+    ridge, walls = eaves + 1.8, []
+    mirrored = opening and (-opening[1], -opening[0], *opening[2:])
+    for each in (opening, mirrored):
+        roof = (lambda y: min(2.6, 2.6 * (ridge - y) / 1.8), [eaves, ridge])
+        space["write_wall"]("wall.toml", *roof, each)
+        walls.append(af.Case.read("wall.toml").structure)
+    found = [
+        np.array([j.ends for j, head in zip(w.joints, w.heads, strict=True) if head]) for w in walls
+    ]
+    places, low, high = (found[0][:, :, 0].mean(axis=1), *np.sort(found[0][:, :, 1], axis=1).T)
+    above = np.isclose(high[:, None], low)
+    assert above.any()
+    assert np.abs(places[:, None] - places)[above].min() > 0.15
+    other = np.sort((found[1].mean(axis=1) * [-1.0, 1.0]).round(6).view(complex), axis=0)
+    assert np.allclose(np.sort(found[0].mean(axis=1).round(6).view(complex), axis=0), other)
+    lintels = [block.points for block in walls[0].blocks if block.name == "lintel"]
+    assert len(lintels) == (opening is not None)
+    for points in lintels:
+        assert points[:, 0].min() < opening[0] - 0.2
+        assert points[:, 0].max() > opening[1] + 0.2
+        assert points[:, 1].min() == opening[3]
+        inside = np.array([(opening[0] + opening[1]) / 2.0, (opening[2] + opening[3]) / 2.0])
+        assert not any(
+            (b.points.min(0) < inside).all() and (b.points.max(0) > inside).all()
+            for b in walls[0].blocks
+        )

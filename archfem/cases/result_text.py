@@ -240,8 +240,7 @@ def describe_dead_load(result: DeadLoadResult, *, explain: bool = False) -> str:
         lines[-1] += f", as nothing is carried by {join_joint_names(idle.values.tolist())}"
     used = result.dead.joints["friction"].values >= (1.0 - 1e-3) * structure.friction
     if spent := np.count_nonzero(used & structure.judged):
-        joint, its = ("joint", "its") if spent == 1 else ("joints", "their")
-        lines[-1] += f"; friction is used up at {spent} {joint}, and {its} neighbours hold"
+        lines[-1] += f"; V/N is μ at {spent} joint{'s' * (spent > 1)}, which makes no mechanism"
     if structure.heads.any():
         heads = result.dead.joints.isel(joint=structure.heads)
         lines[-1] += f"; of head joints, which do not count, {_describe_largest(heads)}"

@@ -494,6 +494,8 @@ def print_results(case: Case, found: Iterable[Result], folder: Path) -> tuple[st
         print(survey)
     with record_doubts(case.structure) as doubts:
         supports = len(doubts)
+        # results are printed at the end, and those before the first run may take minutes
+        write_progress_line(case.title, f"dead load of {len(case.structure.free)} blocks")
         for result in found:
             if isinstance(result, Collapse):
                 of_limit = _print_limit(case, result, doubts, folder)
@@ -502,6 +504,7 @@ def print_results(case: Case, found: Iterable[Result], folder: Path) -> tuple[st
                 print(result_text.describe_dead_load(at_rest))
                 write(results.dead_load_files(at_rest), folder)
                 if case.has_motion:
+                    write_progress_line(case.title, "modes and motions")
                     _print_first_modes(at_rest, folder)
             elif isinstance(result, Pushover):
                 text = result_text.describe_pushover(result)

@@ -205,6 +205,12 @@ def _doubt_steps_of_sliding(history: History, slip_error: SlipError, dt: float) 
     limit = max(limit, 0.3 * largest)
     if error <= limit:
         return history
+    said = f"{format_mm(error)}, where the largest slip is {format_mm(largest)}"
+    remedy = "or leave dt out"
+    if error > max(largest, limit / 0.3):  # a sum of bounds, which says nothing of the step
+        said = f"as much as it is, {format_mm(largest)} at most"
+        remedy = "and compare, or leave dt out"
+        error = max(largest, limit / 0.3)
     # the error varies with the square of the step, and faster where steps miss peaks
     shorter = dt * (limit / error) ** 0.5
     unit = 10.0 ** floor(log10(shorter))
@@ -212,8 +218,8 @@ def _doubt_steps_of_sliding(history: History, slip_error: SlipError, dt: float) 
     history.dataset.attrs["admissible_step"] = shorter
     doubt = Doubt(
         f"steps of {1e3 * dt:g} ms are long for sliding: of '{dataset['name'].values[worst]}' the "
-        f"slip may be wrong by {format_mm(error)}, where the largest slip is {format_mm(largest)}",
-        f"take {1e3 * shorter:g} ms or less, `--set analysis.dt={shorter:g}`, or leave dt out",
+        f"slip may be wrong by {said}",
+        f"take {1e3 * shorter:g} ms or less, `--set analysis.dt={shorter:g}`, {remedy}",
     )
     return history.with_doubts((*history.doubts, doubt))
 
@@ -299,7 +305,10 @@ def _run_steps(
                 recorder.add(batch.cut(size), last=reason is not None)
             bar.update(round(recorder.state.time - start.time - bar.n, 4))
             if reason is not None:
-                return ending, f"ended at {recorder.state.time:.4g} s by {reason}"
+                when = f"at {recorder.state.time:.4g} s"
+                if ending in (Ending.PARTED, Ending.MET):
+                    when = f"with joints {when}, and went on with loose blocks,"
+                return ending, f"ended {when} by {reason}"
             if not begun:
                 begun, since = monotonic(), recorder.state.time
             spent, done = monotonic() - begun, recorder.state.time - since

@@ -250,7 +250,7 @@ class VerdictRange(ResultDisplay):
         """Decisive runs of those that vary one property, and of the sample, with its interval."""
         sampled, (low, high) = self.dataset["sampled"].values, self.interval()
         words = []
-        for name, group in ("one property", ~sampled), ("all", sampled):
+        for name, group in ("one property or none", ~sampled), ("all", sampled):
             if own := int((self.answered & group).sum()):
                 count = int(self.decisive[self.answered & group].sum())
                 words.append(f"{count} of the {own} that vary {name}")

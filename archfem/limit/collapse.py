@@ -713,11 +713,14 @@ def warn_lost_solution(solutions: NonassociatedBounds) -> None:
     """Warn where the weakest was found by chance, or the factor rises suddenly with friction."""
     least, tried = solutions.between[0], solutions.starts[0]
     if solutions.may_be_less and solutions.agreeing < 2:
-        found = "only one" if solutions.agreeing else "none"
+        found = f"only one of {tried} starting states led to the least found, {least:.4g}"
+        if not solutions.agreeing:
+            found = (
+                f"the least found, {least:.4g}, is below what all {tried} starting states led to: "
+                "a descent from the least of these found it"
+            )
         logger.warning(
-            "a weaker solution without dilatancy may exist: %s of %d starting states led to the "
-            "least found, %.4g; hold a motion a tenth below",
-            *(found, tried, least),
+            "a weaker solution without dilatancy may exist: %s; hold a motion a tenth below", found
         )
     if solutions.jumps:
         share, factor = solutions.path[-1]

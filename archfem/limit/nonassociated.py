@@ -239,9 +239,10 @@ class NonassociatedBounds:
             limits = f"proved: none is above {upper:.4g}; no lower bound is known"
         if np.isclose(weakest, upper, rtol=1e-6):
             limits += "; the least found is the factor of 'coulomb' too"
+        least = str(self.agreeing or "a descent below them")
         return (
             f"solutions without dilatancy {text} (by {successful} of {tried} starting states, the "
-            f"least by {self.agreeing}); {limits}"
+            f"least by {least}); {limits}"
         )
 
     @property

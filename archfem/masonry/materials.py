@@ -38,7 +38,8 @@ class Material:
         strength: compressive strength [Pa], or None where unknown.
         name: in tables and files.
         stands_for: what a block of it stands for besides itself, such as "press" for a beam with
-            the weight of its load, or "floor"; then it may weigh more than any material.
+            the weight of its load, or "floor"; then it may weigh more than any material, or, as of
+            a course less broad than the width, less.
     """
 
     young: Pascals

@@ -429,9 +429,18 @@ class Structure(ResultDisplay):
 
     @cached_property
     def assessment(self) -> str:
-        """Which joints are assessed and which are not, in words; empty where all are."""
+        """Which joints are assessed, and what is not, in words; empty where all are."""
         names, parts = zip(*((joint.name, joint.part) for joint in self.joints), strict=True)
-        return describe_assessment(names, parts, self.judged, self.heads)
+        text = describe_assessment(names, parts, self.judged, self.heads)
+        walls = {parts[number] for number in np.flatnonzero(self.heads)}
+        levels = [y for block in self.blocks if block.part in walls for _, y in block.points]
+        height = max(levels, default=0.0) - min(levels, default=0.0)
+        if self.width >= height:  # no wall in bond, or one that is no slab
+            return text
+        return (
+            f"{text}; across its plane, where a wall is usually weaker: it overturns from "
+            f"thickness / height, {self.width / height:.3g} g, on"
+        )
 
     @cached_property
     def weight(self) -> float:

@@ -218,7 +218,11 @@ class KinematicAssessment(ResultDisplay):
                 f"{vanishes if np.isfinite(self.d_0_star) else ''}",
             ]
             changes = [event.text for event in self.path.events if event.text != self.path.end]
-            lines += [f"along the path: {join_names(changes, '; ')}"] if changes else []
+            lines += (
+                [f"along the path the mechanism changes: {join_names(changes, '; ')}"]
+                if changes
+                else []
+            )
             lines += [self.path.end.sentence] if self.displacement else []
             lines += map(str, self.checks)
             if (over_fill := self.checks[-1].over_fill) is not None:

@@ -141,7 +141,11 @@ def test_one_command_runs_all_and_again_keeps_finished_runs(small, undrawn, requ
     # 1 m/s² by R = 2
     assert re.search(r"^first .* 0\.50 m/s² +0\.33 m/s² ", table, re.MULTILINE)
     assert re.search(r"^second +no mechanism +none .* none +reached 1\.00 s$", table, re.MULTILINE)
-    assert "finished before" not in capsys.readouterr().out
+    said = capsys.readouterr()
+    assert "finished before" not in said.out
+    # before anything else is printed
+    blocks = len(af.Case.read(small).structure.free)
+    assert re.match(rf".*: dead load of {blocks} blocks\n.*: modes and motions\n", said.err)
 
     for name in ("unplotted", "undoubted"):  # the first command has drawn and compared
         request.getfixturevalue(name)

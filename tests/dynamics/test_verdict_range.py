@@ -45,7 +45,8 @@ def test_runs_beside_the_sample_count_for_the_sentence_alone():
     found = made_up([True, False, False, True], [False, False, True, True], sign=list("aabb"))
     assert found.share == 0.5
     assert found.sentence.startswith("falls in 2 of 4 variations: ")
-    shares = "; 1 of the 2 that vary one property, 1 of the 2 that vary all (1% to 99% at 95%)"
+    shares = "; 1 of the 2 that vary one property or none, 1 of the 2 that vary all "
+    shares += "(1% to 99% at 95%)"
     assert shares in found.sentence
 
 
@@ -126,7 +127,7 @@ def test_dislocations_are_explained_where_none_falls():
     for name, ends in ("displacement", [0.09, 0.05]), ("residual", [0.01, 0.04]):
         found.dataset[name] = "run", np.append(ends, np.zeros(46))
     where = "all dislocations are with damping kind 'mass', where 11 of 24 are dislocated"
-    groups = "0 of the 2 that vary one property, 11 of the 46 that vary all"
+    groups = "0 of the 2 that vary one property or none, 11 of the 46 that vary all"
     counted = f"falls in none of 48 variations and is dislocated in 11: {where}; {groups}; share of"
     assert found.sentence.startswith(f"{counted} falls 0% to ")
     assert found.table().splitlines()[0].split()[-1] == "dislocated"

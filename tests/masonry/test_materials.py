@@ -89,3 +89,10 @@ def test_values_are_accepted_up_to_their_documented_bounds(make, least, most):
             make(bound - outward * step)
             with pytest.raises(af.InvalidInput):
                 make(bound + outward * step)
+
+
+def test_a_material_that_stands_for_less_may_weigh_less_than_soil():
+    """As a course that is less broad than the structure is wide: 1429 N/m³, which kg/m³ have."""
+    with pytest.raises(af.errors.InvalidInput, match="looks like kg/m³"):
+        af.Material(30e9, 0.2, 1429.0)
+    assert af.Material(30e9, 0.2, 1429.0, stands_for="its breadth").unit_weight == 1429.0
