@@ -162,6 +162,12 @@ class Rating(ResultDisplay):
         return words if np.isnan(self.by_rule) else f"{words}; {self._rule_text()}"
 
     @property
+    def label(self) -> str:
+        """Name of the vehicle, and which factors of a code it has not."""
+        words = "partial factors" if "live" in self.missing else "impact"
+        return f"{self.vehicle.name}, without {words}" if self.missing else self.vehicle.name
+
+    @property
     def headline(self) -> str:
         """Factor, place and outcome; no factor where the bridge does not stand."""
         if np.isnan(self.factor):
@@ -296,7 +302,8 @@ class Rating(ResultDisplay):
             *self._describe_hinges(),
             f"every x is that of the case and the picture; {describe_spans(self.structure)}",
             f"geometric factor of safety at that place{self._as_given}: {self._geometric_text()}",
-            "it is Heyman's criterion, often 2 or more (from memory), which no code has",
+            "the geometric factor is Heyman's criterion, often 2 or more (from memory), which no "
+            "code has",
             f"{vehicle.name}: axles {len(vehicle.axles)}, {sum(vehicle.axles) / 1e3:.4g} kN"
             f"{beside}; {source}",
             vehicle.describe_width(self.structure, self.width),
@@ -353,22 +360,33 @@ class Rating(ResultDisplay):
         """Factor and outcome of a vehicle of one's own with the factors of codes, by their names.
 
         They are from memory. With a distributed load or an impact on one axle they are of CS 454
-        alone.
+        alone. Of a train of a code the dynamic factor is that of the span.
         """
-        if self.vehicle.grade != "given" or np.isnan(self.factor):
+        if np.isnan(self.factor):
             return {}
         found, code = dict[str, Mapping[str, float]](), VEHICLES["CS454-single"]
         # the dynamic factor is not on a distributed load, and may be on one axle alone
-        for name, (live, impact) in CODE_FACTORS.items() if self._is_multiple else ():
-            share = self.live * self.impact / (live * impact)
-            of = {each: share * getattr(self, each) for each in ("factor", "by_rule", *_STATES)}
-            found[f"{name} ({live:g} × {impact:g}, from memory)"] = of
+        for name, product in self._list_products() if self._is_multiple else ():
+            share = self.live * self.impact / product
+            found[name] = {x: share * getattr(self, x) for x in ("factor", "by_rule", *_STATES)}
         if self.by_cs454:
             live, impact = code.factors
             words = f"by CS 454 ({live:g}, and {impact:g} on the worst axle, from memory)"
             found[words] = self.by_cs454
         codes = {name: self._with_factors(of) for name, of in found.items()}
         return {name: (other.factor, other.outcome) for name, other in codes.items()}
+
+    def _list_products(self) -> Iterator[tuple[str, float]]:
+        """Yield partial times dynamic factor of codes on one's own vehicle, or by the span."""
+        spans = find_clear_spans(self.structure).values()
+        if self.vehicle.grade == "given":
+            for name, (live, impact) in CODE_FACTORS.items():
+                yield f"{name} ({live:g} × {impact:g}, from memory)", live * impact
+        elif "impact" in self.missing and spans:
+            half = 0.5 * min(high - low for low, high in spans)
+            impact = float(np.clip(1.44 / (np.sqrt(half) - 0.2) + 0.82, 1.0, 1.67))
+            words = f"with impact {impact:.3g} (by half the span, {half:.3g} m; from memory)"
+            yield words, self.live * impact
 
     @property
     def _is_multiple(self) -> bool:
@@ -385,7 +403,7 @@ class Rating(ResultDisplay):
     def describe_codes(self) -> list[str]:
         """Return the lines on a vehicle of one's own with the factors of codes, if it is one."""
         codes, product, lines = self.by_codes, self.live * self.impact, list[str]()
-        if codes and self._is_multiple and len(self.missing) < 2:
+        if codes and self._is_multiple and len(self.missing) < 2 and self.vehicle.grade == "given":
             given = f"live × impact {product:.4g} given"
             lines = [f"bare axles {product * self.factor:.4g}, {given}"]
         name = self.vehicle.name
