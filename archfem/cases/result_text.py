@@ -1,7 +1,6 @@
 """Results as text: sentences, and tables which the command line prints and the report shows."""
 
 import json
-import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
@@ -361,7 +360,7 @@ def describe_ratings(
         summary = tabulate_ratings([found for found, _ in rated])
         files["vehicles.csv"] = summary.csv
         pairs = zip(summary.rows, rated, strict=True)
-        short = [[*row[:-1], _shorten_outcome(x)] for row, (x, _) in pairs]
+        short = [[*row[:-1], x.short_outcome] for row, (x, _) in pairs]
         tables = [ResultTable([*summary.head[:-1], "outcome"], short).text]
         common = [line for line in lines[0] if all(line in other for other in lines)]
         lines = [[line for line in own if line not in common] for own in lines]
@@ -372,12 +371,6 @@ def describe_ratings(
         return files["rating.txt"], files
     files["rating_variations.csv"] = varied.csv
     return f"{files['rating.txt']}\n\n{varied.text}", files
-
-
-def _shorten_outcome(found: Rating) -> str:
-    """Return the outcome of a rating without range and conditions on factors."""
-    words = re.split(r" if the| even| \(|;", found.outcome)[0]
-    return words + found.label.removeprefix(found.vehicle.name)
 
 
 def doubt_rating(found: Rating, limit: LimitAnalysis) -> list[str]:

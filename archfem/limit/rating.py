@@ -1,5 +1,6 @@
 """Rating of bridges for vehicles of codes: partial factors, widths, geometric factor of safety."""
 
+import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import islice
@@ -37,6 +38,7 @@ from archfem.limit.vehicles import (
     find_vehicle,
     find_worst_rows,
     moving_load,
+    name_missing,
     parse_axles,
     places_at_ends,
     vehicle_positions,
@@ -56,14 +58,6 @@ from archfem.units import MPa
 # Strength of masonry where none is given [Pa]: squared stones in lime mortar have 3 to 10 MPa (from
 # memory)
 ASSUMED_STRENGTH = 5e6
-
-# Partial and dynamic factor on a lorry of one's own [-] by EN 1990 and EN 1991-2, annex B, and by
-# CS 458 (from memory)
-CODE_FACTORS: Mapping[str, tuple[float, float]] = {
-    "by Eurocodes on a good road": (1.35, 1.2),
-    "by Eurocodes on a fair road": (1.35, 1.4),
-    "alone at walking pace": (1.1, 1.0),
-}
 
 # Factors of a rating that its outcome is made of, in other states of fill and stones
 _PRESSURES = ("without_pressure", "full_pressure", "without_backing", "without_either")
@@ -164,8 +158,12 @@ class Rating(ResultDisplay):
     @property
     def label(self) -> str:
         """Name of the vehicle, and which factors of a code it has not."""
-        words = "partial factors" if "live" in self.missing else "impact"
-        return f"{self.vehicle.name}, without {words}" if self.missing else self.vehicle.name
+        return self.vehicle.name + name_missing(self.missing)
+
+    @property
+    def short_outcome(self) -> str:
+        """The outcome without range and conditions on factors, and which of these are missing."""
+        return re.split(r" if the| even| \(|;", self.outcome)[0] + name_missing(self.missing)
 
     @property
     def headline(self) -> str:
@@ -366,7 +364,8 @@ class Rating(ResultDisplay):
             return {}
         found, code = dict[str, Mapping[str, float]](), VEHICLES["CS454-single"]
         # the dynamic factor is not on a distributed load, and may be on one axle alone
-        for name, product in self._list_products() if self._is_multiple else ():
+        products = self.vehicle.list_products(self.structure, self.live, self.missing)
+        for name, product in products.items() if self._is_multiple else ():
             share = self.live * self.impact / product
             found[name] = {x: share * getattr(self, x) for x in ("factor", "by_rule", *_STATES)}
         if self.by_cs454:
@@ -375,18 +374,6 @@ class Rating(ResultDisplay):
             found[words] = self.by_cs454
         codes = {name: self._with_factors(of) for name, of in found.items()}
         return {name: (other.factor, other.outcome) for name, other in codes.items()}
-
-    def _list_products(self) -> Iterator[tuple[str, float]]:
-        """Yield partial times dynamic factor of codes on one's own vehicle, or by the span."""
-        spans = find_clear_spans(self.structure).values()
-        if self.vehicle.grade == "given":
-            for name, (live, impact) in CODE_FACTORS.items():
-                yield f"{name} ({live:g} × {impact:g}, from memory)", live * impact
-        elif "impact" in self.missing and spans:
-            half = 0.5 * min(high - low for low, high in spans)
-            impact = float(np.clip(1.44 / (np.sqrt(half) - 0.2) + 0.82, 1.0, 1.67))
-            words = f"with impact {impact:.3g} (by half the span, {half:.3g} m; from memory)"
-            yield words, self.live * impact
 
     @property
     def _is_multiple(self) -> bool:

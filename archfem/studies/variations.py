@@ -21,7 +21,7 @@ from archfem._validation import check_integer, check_number, validate_arguments
 from archfem.cases.case import Case
 from archfem.cases.defaults import list_default_keys
 from archfem.cases.result_text import ResultTable
-from archfem.cases.toml_file import format_key
+from archfem.cases.toml_file import Table, format_key
 from archfem.dynamics.analysis import Analysis, with_one_facet
 from archfem.dynamics.collapse_state import CollapseState, classify_collapse, doubt_soft_blocks
 from archfem.dynamics.damping import damping_kind, resolve_effective_damping, vary_damping
@@ -61,9 +61,11 @@ DEFAULT_RANGES: dict[str, tuple[Any, ...]] = {
 # What is varied on request: finish of the faces, whose usual law of closing replaces that given
 FINISH_RANGE = {"finish": ("as given", *FINISHES)}
 
-# Row of a rating with the worst value of each property, and keys of the pressure of a fill
+# Row of a rating with the worst value of each property
 ALL_AT_ONCE = "all unfavourable at once"
-_PRESSURE = ("mobilisation", "active")
+
+# A property that is varied beside a rating, its value in words, and keys of the case with it
+Change = tuple[str, str, dict[str, Any]]
 
 # Values at which a run is as given
 NEUTRAL: dict[str, Any] = {
@@ -483,29 +485,26 @@ def vary_rating(
     case = Case.of({**case.settings, "rating": dict(rating)}, case.folder)
     listed = [*_list_rating_changes(case, found)]
     changes = {name: change for _, name, change in listed}
-    known, late = {"the values of the case": found.factor}, [*changes, ALL_AT_ONCE]
+    known = {"the values of the case": found.factor}
     if found.fill is not None:
         known |= {"no pressure of the fill": np.nan_to_num(found.without_pressure)}
         known |= {"all of its passive pressure": found.full_pressure}
-        none = "pressure", "no pressure of the fill", {f"limit.fill.{k}": 0.0 for k in _PRESSURE}
-        listed.append(none)
+        none = {"limit.fill.mobilisation": 0.0, "limit.fill.active": 0.0}
+        listed.append(("pressure", "no pressure of the fill", none))
     crushing = {f"stones of {ASSUMED_STRENGTH / MPa:g} MPa that crush": found.crushing}
     known |= crushing if np.isfinite(found.crushing) else {}
     known |= _rate_changed(case, found, changes, folder)
     if known.keys() >= changes.keys():
-        worst = {ALL_AT_ONCE: _merge_worst(listed, known)}
-        known |= _rate_changed(case, found, worst, folder)
-    late = [name for name in late if name not in known]
+        known |= _rate_changed(case, found, {ALL_AT_ONCE: _merge_worst(listed, known)}, folder)
+    late = [name for name in (*changes, ALL_AT_ONCE) if name not in known]
     order = sorted(known, key=lambda name: np.nan_to_num(known[name], nan=inf))
     rows = [[name, f"{known[name]:.4g}".replace("nan", "-")] for name in order]
     rows += [[name, "not computed"] for name in late]
     rows = [[name, "does not stand" if cell == "0" else cell] for name, cell in rows]
-    return ResultTable(["with", "factor"], rows), _say_spreads(listed, known, late), len(late)
+    return ResultTable(["with", "factor"], rows), _say_spreads(listed, known, len(late)), len(late)
 
 
-def _merge_worst(
-    listed: Sequence[tuple[str, str, dict[str, Any]]], known: Mapping[str, float]
-) -> dict[str, Any]:
+def _merge_worst(listed: Sequence[Change], known: Mapping[str, float]) -> dict[str, Any]:
     """Return the changed keys of a case with the worst value of each property."""
     worst = dict[str, tuple[float, dict[str, Any]]]()
     for subject, name, change in listed:
@@ -514,14 +513,12 @@ def _merge_worst(
     return {key: value for _, change in worst.values() for key, value in change.items()}
 
 
-def _say_spreads(
-    listed: Sequence[tuple[str, str, dict[str, Any]]], known: Mapping[str, float], late: list[str]
-) -> list[str]:
+def _say_spreads(listed: Sequence[Change], known: Mapping[str, float], late: int) -> list[str]:
     """Return the range of single changes, all at once, and what to measure first, in words."""
     given = known["the values of the case"]
     single = {k: x for k, x in known.items() if k != ALL_AT_ONCE and np.isfinite(x)}
     least, most = min(single, key=single.__getitem__), max(single, key=single.__getitem__)
-    missing = f"; {len(late)} variations were not computed" if late else ""
+    missing = f"; {late} variations were not computed" if late else ""
     at_once = f"; {ALL_AT_ONCE} {known[ALL_AT_ONCE]:.4g}" if ALL_AT_ONCE in known else ""
     range_text = (
         f"one property at a time changes the factor of {given:.4g} to {single[least]:.4g} "
@@ -556,7 +553,7 @@ def _rate_changed(
     return factors
 
 
-def _list_rating_changes(case: Case, found: Rating) -> Iterator[tuple[str, str, dict[str, Any]]]:
+def _list_rating_changes(case: Case, found: Rating) -> Iterator[Change]:
     """Yield what is varied beside a rating, its value in words, and keys of the case with it."""
     yield from _list_changed_lengths(case, found)
     fixed = _list_keys(case.settings["structure"], ("state",))
@@ -564,8 +561,11 @@ def _list_rating_changes(case: Case, found: Rating) -> Iterator[tuple[str, str, 
         yield "abutments", "abutments free", free
     yield from _list_changed_weights(case, found)
     if np.isfinite(found.strength):
-        half = {"limit.strength": 0.5 * found.strength}
-        yield "strength of the stones", "half the strength of the stones", half
+        yield (
+            "strength",
+            "half the strength of the stones",
+            {"limit.strength": 0.5 * found.strength},
+        )
     if found.fill is not None:
         for sign in (-1.0, 1.0):
             angle = found.fill.friction_angle + 5.0 * sign
@@ -576,7 +576,7 @@ def _list_rating_changes(case: Case, found: Rating) -> Iterator[tuple[str, str, 
         yield "width", f"a vehicle on {width:.3g} m", {"rating.width": width}
 
 
-def _list_changed_lengths(case: Case, found: Rating) -> Iterator[tuple[str, str, dict[str, Any]]]:
+def _list_changed_lengths(case: Case, found: Rating) -> Iterator[Change]:
     """Yield rings, piers and cover likewise."""
     every = _list_keys(case.settings["structure"], ("thickness", "breadth", "gap", "cover"))
     lengths = {path: in_unit(value, "m", path) for path, value in every}
@@ -594,19 +594,16 @@ def _list_changed_lengths(case: Case, found: Rating) -> Iterator[tuple[str, str,
             yield subject, name, {path: change(x, by) for path, x in paths.items()}
 
 
-def _list_changed_weights(case: Case, found: Rating) -> Iterator[tuple[str, str, dict[str, Any]]]:
+def _list_changed_weights(case: Case, found: Rating) -> Iterator[Change]:
     """Yield weights that the case does not give likewise."""
     for material in dict.fromkeys(block.material for block in found.structure.blocks):
         if "unit_weight" in list_default_keys(case, material):
             key, name = f"materials.{format_key(material.name)}.unit_weight", material.name
-            for by, words in ((0.9, "lighter"), (1.1, "heavier")):
-                weight = {key: by * material.unit_weight}
-                yield f"weight of {name}", f"{name} a tenth {words}", weight
+            for by, words in ((0.9, "a tenth lighter"), (1.1, "a tenth heavier")):
+                yield f"weight of {name}", f"{name} {words}", {key: by * material.unit_weight}
 
 
-def _list_keys(
-    table: Mapping[str, Any], keys: Sequence[str], path: str = "structure"
-) -> Iterator[tuple[str, Any]]:
+def _list_keys(table: Table, keys: Sequence[str], path: str = "structure") -> Iterator[Any]:
     """Yield path and value of some keys in the tables of a structure."""
     for key, value in table.items():
         place = f"{path}.{format_key(key)}"

@@ -108,7 +108,7 @@ def test_the_keys_of_a_case_are_changed_one_property_at_a_time(tmp_path, key):
     listed = [*_list_rating_changes(case, found)]
     changes = {name: change for _, name, change in listed}
     subjects = {"rings", "piers", "cover", "abutments", "weight of backfill"}
-    subjects |= {"strength of the stones", "friction angle of the fill", "width"}
+    subjects |= {"strength", "friction angle of the fill", "width"}
     assert {subject for subject, *_ in listed} == subjects
     by = {"breadth": 0.08, "gap": 0.05}[key]
     rings = ["structure.arches.thickness", "structure.arches.right.thickness"]
