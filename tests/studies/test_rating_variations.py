@@ -81,7 +81,7 @@ def test_each_row_is_the_rating_of_a_changed_case(tmp_path):
     first = f"one property at a time changes the factor of {found.factor:.4g} {ends}; {at_once}"
     assert words[0] == first
     # against a rating with the worst of each property
-    worst = [*thin, "structure.backfill.cover=0.2", "limit.strength=2e6", "rating.width=1.53"]
+    worst = [*thin, "structure.backfill.cover=0.2", "limit.strength=2e6", "rating.width=1.62"]
     worst += ["limit.fill.mobilisation=0", "limit.fill.active=0"]
     weight = case.structure.blocks[-1].material.unit_weight
     worst += [f"materials.backfill.unit_weight={0.9 * weight}"]
