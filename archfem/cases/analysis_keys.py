@@ -11,7 +11,7 @@ from archfem.cases.motion_keys import build_spectrum
 from archfem.cases.toml_file import Table, check_table, read_object
 from archfem.errors import InvalidInput
 from archfem.joints.criteria import Criteria
-from archfem.limit.backfill import self_weight_programme
+from archfem.limit.backfill import check_options, self_weight_programme
 from archfem.limit.collapse import Collapse, collapse_factor, describe_crushing, solve_least
 from archfem.limit.fill_strength import Fill, PlasticFill
 from archfem.limit.rating import ASSUMED_STRENGTH, Rating, rate
@@ -29,7 +29,11 @@ from archfem.statics.mechanism_assessment import (
     kinematic_assessment,
 )
 from archfem.statics.pushover import Pushover, Stop, pushover
-from archfem.units import MPa
+from archfem.units import MPa, kN
+
+# Least weight of the heaviest axle of a vehicle that a case may give without its unit [N]: those of
+# lorries in kg are less
+LIGHT_AXLE = 20e3
 
 # Words of [limit] and [assessment]: laws of the joints, and of the fill
 FRICTION_LAWS = ("coulomb", "nonassociated", "none")
@@ -63,14 +67,16 @@ class LimitAnalysis:
         return {"friction": self.friction, "strength": self.strength, "fill": self.fill}
 
     def check(self, structure: Structure) -> None:
-        """Refuse what `solve` refuses of loads and soft blocks, before other results are computed.
+        """Refuse what `solve` refuses, or a rating, before other results are computed.
 
         Args:
             structure: structure of the case.
 
         Raises:
-            InvalidInput: a load misses the structure, or blocks are too soft to be rigid.
+            InvalidInput: a load misses the structure, blocks are too soft to be rigid, or the
+                strength is in another unit.
         """
+        check_options(structure, self.friction, self.strength)
         if self.live and not isinstance(self.fill, PlasticFill):
             given = self.friction, self.strength, self.fill, self.dead
             self_weight_programme(structure, *given)[0].load(self.live)
@@ -288,8 +294,16 @@ def parse_rating(table: Any) -> Table:
     """Return the rating of a case: the arguments of `rate` that it gives, of its first vehicle."""
     options = check_table(table, rating_keys(), "rating")
     for each in reversed(list_vehicles(options)):
-        table = isinstance(each, dict)
-        options["vehicle"] = read_object(Vehicle, each, "rating.vehicle") if table else each
+        options["vehicle"] = each
+        if isinstance(each, dict):
+            options["vehicle"] = vehicle = read_object(Vehicle, each, "rating.vehicle")
+            has_unit = all(isinstance(weight, str) for weight in each["axles"])
+            if not has_unit and 1.0 < max(vehicle.axles) < LIGHT_AXLE:  # 1 N is a load of studies
+                raise InvalidInput(
+                    f"rating.vehicle '{vehicle.name}': axles = {each['axles']} are in N, and the "
+                    f"heaviest, {max(vehicle.axles) / kN:g} kN, is that of a cart: give units, as "
+                    'in "88.29 kN" for a mass of 9000 kg'
+                )
     return options
 
 

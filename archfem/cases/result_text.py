@@ -343,8 +343,11 @@ def tabulate_ratings(ratings: Iterable[Rating]) -> ResultTable:
     for found in rated:
         numbers = [getattr(found, column) for column in columns]
         cells = ["-" if np.isnan(value) else f"{value:.4g}" for value in numbers]
-        rows.append([found.vehicle.name, *cells, f"{found.outcome}, {found.place}"])
-    head = ["vehicle", *(column.replace("_", " ") for column in columns)]
+        values = {"live": found.live, "impact": found.impact}
+        by = ("none" if key in found.missing else f"{x:g}" for key, x in values.items())
+        outcome = f"{found.outcome}, {found.place}"
+        rows.append([found.vehicle.name, " × ".join(by), *cells, outcome])
+    head = ["vehicle", "live × impact", *(column.replace("_", " ") for column in columns)]
     return ResultTable([*head, "outcome, and axles at the worst place"], rows)
 
 
@@ -356,7 +359,10 @@ def describe_ratings(
     files, tables = {"rating.csv": rated[0][0].table()}, list[str]()
     if len(rated) > 1:
         summary = tabulate_ratings([found for found, _ in rated])
-        tables, files["vehicles.csv"] = [summary.text], summary.csv
+        files["vehicles.csv"] = summary.csv
+        pairs = zip(summary.rows, rated, strict=True)
+        short = [[*row[:-1], x.short_outcome] for row, (x, _) in pairs]
+        tables = [ResultTable([*summary.head[:-1], "outcome"], short).text]
         common = [line for line in lines[0] if all(line in other for other in lines)]
         lines = [[line for line in own if line not in common] for own in lines]
         lines.append(["of all vehicles:", *common])
@@ -386,6 +392,11 @@ def doubt_rating(found: Rating, limit: LimitAnalysis) -> list[str]:
         if fill.mobilisation < least:
             words = f"mobilisation {fill.mobilisation:.2g} counts as {least:.2g}, the active"
             lines.append(f"{NOTE_MARK}{words} pressure; 0 is not without pressure, which is beside")
+    structure, springs = found.structure, list[int]()
+    springs += [n for joint in structure.joints if joint.role == "ring" for n in joint.blocks]
+    if any(structure.blocks[number].fixed for number in springs):
+        words = 'abutments are taken as immovable: state = "free" tests them, of [structure.'
+        lines.append(f"{NOTE_MARK}{words}sidewalls]")
     words = "a second lorry that meets the vehicle, and all that spandrel walls carry"
     return [*lines, f"{NOTE_MARK}left out: {words}"]
 

@@ -330,11 +330,11 @@ def rate(options: argparse.Namespace) -> int:
     (first, lines), varied, stated = ratings[0], None, state_ratings(ratings)
     interrupted = len(ratings) < len(tables) and not np.isnan(first.factor)
     if options.vary and not interrupted and not np.isnan(first.factor):
-        varied, sentence, doubts = _vary(case, table, first, options.out)
+        varied, sentences, doubts = _vary(case, table, first, options.out)
         interrupted = len(doubts) > 0
-        lines[:0] = [sentence, *doubts]
+        lines[:0] = [*sentences, *doubts]
         every = [*stated.doubts, *doubts]
-        stated = stated._replace(sentences=[*stated.sentences, sentence], doubts=every)
+        stated = stated._replace(sentences=[*stated.sentences, *sentences], doubts=every)
     text, files = result_text.describe_ratings(case, ratings, varied)
     # the case of the folder, that of a run, may be rated for another vehicle
     files |= {RATING_FILE: format_tables({"rating": table}).rstrip(), **stated.as_file("rating")}
@@ -353,17 +353,17 @@ def rate(options: argparse.Namespace) -> int:
 
 def _vary(
     case: Case, table: Mapping[str, Any], first: Rating, out: str | None
-) -> tuple[result_text.ResultTable, str, list[str]]:
-    """Return table and sentence of the variations of a rating, and what Ctrl-C left out."""
+) -> tuple[result_text.ResultTable, list[str], list[str]]:
+    """Return table and sentences of the variations of a rating, and what Ctrl-C left out."""
     from archfem.studies.variations import vary_rating
 
     folder = None if out is None else path_inside(Path(out), "rating_variations")
-    varied, sentence, left = vary_rating(case, table, first, folder)
+    varied, sentences, left = vary_rating(case, table, first, folder)
     remedy = "give --out, which keeps the others"
     if folder is not None:
         remedy = f"run the same command again, which continues from {folder}"
     words = f"interrupted: {left} variations of the rating were not computed; {remedy}"
-    return varied, sentence, [f"{DOUBT_MARK}{words}"] if left else []
+    return varied, sentences, [f"{DOUBT_MARK}{words}"] if left else []
 
 
 def _rate_each(

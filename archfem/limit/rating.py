@@ -1,5 +1,6 @@
 """Rating of bridges for vehicles of codes: partial factors, widths, geometric factor of safety."""
 
+import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import islice
@@ -37,6 +38,7 @@ from archfem.limit.vehicles import (
     find_vehicle,
     find_worst_rows,
     moving_load,
+    name_missing,
     parse_axles,
     places_at_ends,
     vehicle_positions,
@@ -56,14 +58,6 @@ from archfem.units import MPa
 # Strength of masonry where none is given [Pa]: squared stones in lime mortar have 3 to 10 MPa (from
 # memory)
 ASSUMED_STRENGTH = 5e6
-
-# Partial and dynamic factor on a lorry of one's own [-] by EN 1990 and EN 1991-2, annex B, and by
-# CS 458 (from memory)
-CODE_FACTORS: Mapping[str, tuple[float, float]] = {
-    "by Eurocodes on a good road": (1.35, 1.2),
-    "by Eurocodes on a fair road": (1.35, 1.4),
-    "alone at walking pace": (1.1, 1.0),
-}
 
 # Factors of a rating that its outcome is made of, in other states of fill and stones
 _PRESSURES = ("without_pressure", "full_pressure", "without_backing", "without_either")
@@ -160,6 +154,16 @@ class Rating(ResultDisplay):
         words += self._say_range()
         words += f" without {self.vehicle.left_out}" if self.vehicle.left_out else ""
         return words if np.isnan(self.by_rule) else f"{words}; {self._rule_text()}"
+
+    @property
+    def label(self) -> str:
+        """Name of the vehicle, and which factors of a code it has not."""
+        return self.vehicle.name + name_missing(self.missing)
+
+    @property
+    def short_outcome(self) -> str:
+        """The outcome without range and conditions on factors, and which of these are missing."""
+        return re.split(r" if the| even| \(|;", self.outcome)[0] + name_missing(self.missing)
 
     @property
     def headline(self) -> str:
@@ -296,7 +300,8 @@ class Rating(ResultDisplay):
             *self._describe_hinges(),
             f"every x is that of the case and the picture; {describe_spans(self.structure)}",
             f"geometric factor of safety at that place{self._as_given}: {self._geometric_text()}",
-            "it is Heyman's criterion, often 2 or more (from memory), which no code has",
+            "the geometric factor is Heyman's criterion, often 2 or more (from memory), which no "
+            "code has",
             f"{vehicle.name}: axles {len(vehicle.axles)}, {sum(vehicle.axles) / 1e3:.4g} kN"
             f"{beside}; {source}",
             vehicle.describe_width(self.structure, self.width),
@@ -353,16 +358,16 @@ class Rating(ResultDisplay):
         """Factor and outcome of a vehicle of one's own with the factors of codes, by their names.
 
         They are from memory. With a distributed load or an impact on one axle they are of CS 454
-        alone.
+        alone. Of a train of a code the dynamic factor is that of the span.
         """
-        if self.vehicle.grade != "given" or np.isnan(self.factor):
+        if np.isnan(self.factor):
             return {}
         found, code = dict[str, Mapping[str, float]](), VEHICLES["CS454-single"]
         # the dynamic factor is not on a distributed load, and may be on one axle alone
-        for name, (live, impact) in CODE_FACTORS.items() if self._is_multiple else ():
-            share = self.live * self.impact / (live * impact)
-            of = {each: share * getattr(self, each) for each in ("factor", "by_rule", *_STATES)}
-            found[f"{name} ({live:g} × {impact:g}, from memory)"] = of
+        products = self.vehicle.list_products(self.structure, self.live, self.missing)
+        for name, product in products.items() if self._is_multiple else ():
+            share = self.live * self.impact / product
+            found[name] = {x: share * getattr(self, x) for x in ("factor", "by_rule", *_STATES)}
         if self.by_cs454:
             live, impact = code.factors
             words = f"by CS 454 ({live:g}, and {impact:g} on the worst axle, from memory)"
@@ -385,7 +390,7 @@ class Rating(ResultDisplay):
     def describe_codes(self) -> list[str]:
         """Return the lines on a vehicle of one's own with the factors of codes, if it is one."""
         codes, product, lines = self.by_codes, self.live * self.impact, list[str]()
-        if codes and self._is_multiple and len(self.missing) < 2:
+        if codes and self._is_multiple and len(self.missing) < 2 and self.vehicle.grade == "given":
             given = f"live × impact {product:.4g} given"
             lines = [f"bare axles {product * self.factor:.4g}, {given}"]
         name = self.vehicle.name

@@ -21,7 +21,13 @@ from archfem.limit.fill_strength import Fill, PlasticFill, as_pressure
 from archfem.limit.linear_programme import Optimum, Programme
 from archfem.limit.nonassociated import find_weakest, starting_forces
 from archfem.masonry.loads import PointLoad
-from archfem.masonry.structure import CONTACT_TOLERANCE, HasStructure, Structure, structure_of
+from archfem.masonry.structure import (
+    CONTACT_TOLERANCE,
+    HasStructure,
+    Structure,
+    find_clear_spans,
+    structure_of,
+)
 
 DRIVING_DIRECTIONS = ("right", "left")
 
@@ -31,6 +37,14 @@ MIN_AREA_LOAD = 100.0
 # Largest spacing of axles and width of wheels [m], above which they are in mm
 MAX_LENGTH = 100.0
 
+
+# Partial and dynamic factor on a lorry of one's own [-] by EN 1990 and EN 1991-2, annex B, and by
+# CS 458 (from memory)
+CODE_FACTORS: Mapping[str, tuple[float, float]] = {
+    "by Eurocodes on a good road": (1.35, 1.2),
+    "by Eurocodes on a fair road": (1.35, 1.4),
+    "alone at walking pace": (1.1, 1.0),
+}
 
 # Axles that stand on the structure, from left to right, or these and a distributed load
 AxleRow = tuple[PointLoad, ...]
@@ -134,6 +148,28 @@ class Vehicle:
             ways = (behind, self.spacings), (behind[::-1], self.spacings[::-1])
             kept.setdefault(min(ways), row)
         return [*kept.values()]
+
+    def list_products(
+        self, structure: Structure, live: float, missing: Sequence[str]
+    ) -> dict[str, float]:
+        """Return partial times dynamic factor of codes on one's own vehicle, or by the span.
+
+        Args:
+            structure: the bridge.
+            live: partial factor [-].
+            missing: names of the factors that nobody gave.
+        """
+        if self.grade == "given":
+            codes = CODE_FACTORS.items()
+            return {f"{k} ({a:g} × {b:g}, from memory)": a * b for k, (a, b) in codes}
+        spans = [high - low for low, high in find_clear_spans(structure).values()]
+        if "impact" not in missing or not spans:
+            return {}
+        half = 0.5 * min(spans)
+        impact = float(np.clip(1.44 / (np.sqrt(half) - 0.2) + 0.82, 1.0, 1.67))
+        return {
+            f"with impact {impact:.3g} (by half the span, {half:.3g} m; from memory)": live * impact
+        }
 
     def spread_over(self, structure: Structure) -> float:
         """Return the width over which one vehicle spreads on a bridge, by rule [m].
@@ -623,6 +659,11 @@ def places_at_ends(
                 after = int(np.searchsorted(ends, place + sense * ahead))
                 places |= {float(x - sense * ahead) for x in ends[max(after - 1, 0) : after + 1]}
     return sorted(places - {*least["position"].values.tolist()})
+
+
+def name_missing(missing: Sequence[str]) -> str:
+    """Return which factors of a code are missing, as words behind a name; empty for none."""
+    return f", without {'partial factors' if 'live' in missing else 'impact'}" if missing else ""
 
 
 def find_vehicle(vehicle: str | Vehicle) -> Vehicle:

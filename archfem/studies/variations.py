@@ -19,8 +19,9 @@ from scipy.stats import qmc
 
 from archfem._validation import check_integer, check_number, validate_arguments
 from archfem.cases.case import Case
+from archfem.cases.defaults import list_default_keys
 from archfem.cases.result_text import ResultTable
-from archfem.cases.toml_file import format_key
+from archfem.cases.toml_file import Table, format_key
 from archfem.dynamics.analysis import Analysis, with_one_facet
 from archfem.dynamics.collapse_state import CollapseState, classify_collapse, doubt_soft_blocks
 from archfem.dynamics.damping import damping_kind, resolve_effective_damping, vary_damping
@@ -59,6 +60,12 @@ DEFAULT_RANGES: dict[str, tuple[Any, ...]] = {
 
 # What is varied on request: finish of the faces, whose usual law of closing replaces that given
 FINISH_RANGE = {"finish": ("as given", *FINISHES)}
+
+# Row of a rating with the worst value of each property
+ALL_AT_ONCE = "all unfavourable at once"
+
+# A property that is varied beside a rating, its value in words, and keys of the case with it
+Change = tuple[str, str, dict[str, Any]]
 
 # Values at which a run is as given
 NEUTRAL: dict[str, Any] = {
@@ -457,8 +464,8 @@ def evaluate_rating_variation(variation: RatingVariation) -> dict[str, float]:
 
 def vary_rating(
     case: Case, rating: Mapping[str, Any], found: Rating, folder: str | Path | None = None
-) -> tuple[ResultTable, str, int]:
-    """Rate the bridge of a case with other properties, one at a time, and state the range.
+) -> tuple[ResultTable, list[str], int]:
+    """Rate the bridge of a case with other properties, one at a time and the worst at once.
 
     Args:
         case: case of the bridge.
@@ -467,8 +474,8 @@ def vary_rating(
         folder: folder that keeps finished variations, from which the same call continues.
 
     Returns:
-        Table of properties and factors; the least and the greatest factor in words; and how many
-        variations are left after Ctrl-C.
+        Table of properties and factors, the worst first; the range, and what to measure first, in
+        words; and how many variations are left after Ctrl-C.
 
     Raises:
         InvalidInput: the fill is a plastic one.
@@ -476,45 +483,103 @@ def vary_rating(
     if isinstance(found.fill, PlasticFill):
         raise InvalidInput('a rating is varied with fill of law "pressure", not with "plastic"')
     case = Case.of({**case.settings, "rating": dict(rating)}, case.folder)
-    names = list(dict(_list_rating_changes(case, found)))
-    computed = _rate_changed(case, found, folder)
-    late = [name for name in names if name not in computed]
-    factors = {name: computed.get(name, np.nan) for name in names}
-    factors |= {"no pressure of the fill": found.without_pressure}
-    factors |= {"all of its passive pressure": found.full_pressure}
-    factors |= {f"stones of {ASSUMED_STRENGTH / MPa:g} MPa that crush": found.crushing}
+    listed = [*_list_rating_changes(case, found)]
+    changes = {name: change for _, name, change in listed}
     known = {"the values of the case": found.factor}
-    known |= {name: value for name, value in factors.items() if np.isfinite(value)}
-    rows = [[name, f"{known[name]:.4g}"] if name in known else [name, "-"] for name in factors]
-    rows = [row for row in rows if row[0] in {*names, *known}]
-    rows = [[name, "not computed" if name in late else cell] for name, cell in rows]
-    least, most = min(known, key=known.__getitem__), max(known, key=known.__getitem__)
-    missing = f"; {len(late)} of {len(names)} variations were not computed" if late else ""
-    text = (
-        f"one property at a time changes the factor of {found.factor:.4g} to {known[least]:.4g} "
-        f"({least}) at least and {known[most]:.4g} ({most}) at most{missing}"
+    if found.fill is not None:
+        known |= {"no pressure of the fill": np.nan_to_num(found.without_pressure)}
+        known |= {"all of its passive pressure": found.full_pressure}
+        none = {"limit.fill.mobilisation": 0.0, "limit.fill.active": 0.0}
+        listed.append(("pressure", "no pressure of the fill", none))
+    crushing = {f"stones of {ASSUMED_STRENGTH / MPa:g} MPa that crush": found.crushing}
+    known |= crushing if np.isfinite(found.crushing) else {}
+    known |= _rate_changed(case, found, changes, folder)
+    if known.keys() >= changes.keys():
+        known |= _rate_changed(case, found, {ALL_AT_ONCE: _merge_worst(listed, known)}, folder)
+    late = [name for name in (*changes, ALL_AT_ONCE) if name not in known]
+    order = sorted(known, key=lambda name: np.nan_to_num(known[name], nan=inf))
+    rows = [[name, f"{known[name]:.4g}".replace("nan", "-")] for name in order]
+    rows += [[name, "not computed"] for name in late]
+    rows = [[name, "does not stand" if cell == "0" else cell] for name, cell in rows]
+    return ResultTable(["with", "factor"], rows), _say_spreads(listed, known, len(late)), len(late)
+
+
+def _merge_worst(listed: Sequence[Change], known: Mapping[str, float]) -> dict[str, Any]:
+    """Return the changed keys of a case with the worst value of each property."""
+    worst = dict[str, tuple[float, dict[str, Any]]]()
+    for subject, name, change in listed:
+        if known[name] < worst.get(subject, (known["the values of the case"],))[0]:
+            worst[subject] = known[name], change
+    return {key: value for _, change in worst.values() for key, value in change.items()}
+
+
+def _say_spreads(listed: Sequence[Change], known: Mapping[str, float], late: int) -> list[str]:
+    """Return the range of single changes, all at once, and what to measure first, in words."""
+    given = known["the values of the case"]
+    single = {k: x for k, x in known.items() if k != ALL_AT_ONCE and np.isfinite(x)}
+    least, most = min(single, key=single.__getitem__), max(single, key=single.__getitem__)
+    missing = f"; {late} variations were not computed" if late else ""
+    at_once = f"; {ALL_AT_ONCE} {known[ALL_AT_ONCE]:.4g}" if ALL_AT_ONCE in known else ""
+    range_text = (
+        f"one property at a time changes the factor of {given:.4g} to {single[least]:.4g} "
+        f"({least}) at least and {single[most]:.4g} ({most}) at most{at_once}{missing}"
     )
-    return ResultTable(["with", "factor"], rows), text, len(late)
+    ends = dict[str, list[float]]()
+    for subject, name, _ in listed:
+        # that of a vehicle is a rule, and no measurement finds the pressure of a fill
+        if name in single and subject not in ("width", "pressure"):
+            ends.setdefault(subject, [given]).append(single[name])
+    first = sorted(ends, key=lambda subject: -float(np.ptp(ends[subject])))[:3]
+    spreads = (f"{each} ({min(ends[each]):.4g} to {max(ends[each]):.4g})" for each in first)
+    return [range_text, *([f"measure first: {', '.join(spreads)}"] if first else [])]
 
 
-def _rate_changed(case: Case, found: Rating, folder: str | Path | None) -> dict[str, float]:
-    """Return the factor with each change by its name, up to Ctrl-C; NaN where there is none."""
-    changes, factors = dict(_list_rating_changes(case, found)), dict[str, float]()
-    names, inputs = [*changes], case.hash_inputs()
+def _rate_changed(
+    case: Case, found: Rating, changes: Mapping[str, dict[str, Any]], folder: str | Path | None
+) -> dict[str, float]:
+    """Return the factor with each change by its name, up to Ctrl-C.
+
+    It is 0 where the bridge does not stand, and NaN where there is no such bridge.
+    """
+    names, inputs, factors = [*changes], case.hash_inputs(), dict[str, float]()
     given = [RatingVariation(inputs, tuple(each.items()), case, found) for each in changes.values()]
     evaluate = partial(evaluate_with_progress, name="variations of the rating", folder=folder)
     with suppress(KeyboardInterrupt):
         for k, row in evaluate([*enumerate(given)], evaluate_rating_variation, 1):
-            factors[names[k]] = row["found"].get("factor", np.nan)
+            factors[names[k]] = np.nan if row["error"] else np.nan_to_num(row["found"]["factor"])
             # rings may not fit on a narrower pier
             if row["error"] and not row["error"].startswith(InvalidStructure.__name__):
                 logger.warning("%s: %s", names[k], row["error"])
     return factors
 
 
-def _list_rating_changes(case: Case, found: Rating) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Yield what is varied beside a rating, in words, and the keys of the case with new values."""
-    lengths = dict(_list_lengths(case.settings["structure"], "structure"))
+def _list_rating_changes(case: Case, found: Rating) -> Iterator[Change]:
+    """Yield what is varied beside a rating, its value in words, and keys of the case with it."""
+    yield from _list_changed_lengths(case, found)
+    fixed = _list_keys(case.settings["structure"], ("state",))
+    if free := {path: "free" for path, state in fixed if state == "fixed"}:
+        yield "abutments", "abutments free", free
+    yield from _list_changed_weights(case, found)
+    if np.isfinite(found.strength):
+        yield (
+            "strength",
+            "half the strength of the stones",
+            {"limit.strength": 0.5 * found.strength},
+        )
+    if found.fill is not None:
+        for sign in (-1.0, 1.0):
+            angle = found.fill.friction_angle + 5.0 * sign
+            change_of_fill = {"limit.fill.friction_angle": f"{angle:.17g} degree"}
+            yield "friction angle of the fill", f"fill of {angle:.3g}°", change_of_fill
+    for share in (0.9, 1.1):
+        width = min(share * found.width, found.structure.width)
+        yield "width", f"a vehicle on {width:.3g} m", {"rating.width": width}
+
+
+def _list_changed_lengths(case: Case, found: Rating) -> Iterator[Change]:
+    """Yield rings, piers and cover likewise."""
+    every = _list_keys(case.settings["structure"], ("thickness", "breadth", "gap", "cover"))
+    lengths = {path: in_unit(value, "m", path) for path, value in every}
     breadth = min((x.depth for x in found.structure.joints if x.role == "pier"), default=0.0)
     rows: tuple[tuple[str, str, Callable[[float, float], float]], ...] = (
         ("thickness", "rings a tenth thinner, rings a tenth thicker", lambda x, by: x + by * x),
@@ -525,23 +590,24 @@ def _list_rating_changes(case: Case, found: Rating) -> Iterator[tuple[str, dict[
     for key, names, change in rows:
         paths = {path: x for path, x in lengths.items() if path.endswith(f".{key}")}
         for name, by in zip(names.split(", "), (-0.1, 0.1), strict=True) if paths else ():
-            yield name, {path: change(x, by) for path, x in paths.items()}
-    if np.isfinite(found.strength):
-        yield "half the strength of the stones", {"limit.strength": 0.5 * found.strength}
-    if found.fill is not None:
-        for sign in (-1.0, 1.0):
-            angle = found.fill.friction_angle + 5.0 * sign
-            yield f"fill of {angle:.3g}°", {"limit.fill.friction_angle": f"{angle:.17g} degree"}
-    for share in (0.9, 1.1):
-        width = min(share * found.width, found.structure.width)
-        yield f"a vehicle on {width:.3g} m", {"rating.width": width}
+            subject = "cover" if key == "cover" else name.split()[0]
+            yield subject, name, {path: change(x, by) for path, x in paths.items()}
 
 
-def _list_lengths(table: Mapping[str, Any], path: str) -> Iterator[tuple[str, float]]:
-    """Yield path and value of each length in the tables of a structure [m]."""
+def _list_changed_weights(case: Case, found: Rating) -> Iterator[Change]:
+    """Yield weights that the case does not give likewise."""
+    for material in dict.fromkeys(block.material for block in found.structure.blocks):
+        if "unit_weight" in list_default_keys(case, material):
+            key, name = f"materials.{format_key(material.name)}.unit_weight", material.name
+            for by, words in ((0.9, "a tenth lighter"), (1.1, "a tenth heavier")):
+                yield f"weight of {name}", f"{name} {words}", {key: by * material.unit_weight}
+
+
+def _list_keys(table: Table, keys: Sequence[str], path: str = "structure") -> Iterator[Any]:
+    """Yield path and value of some keys in the tables of a structure."""
     for key, value in table.items():
         place = f"{path}.{format_key(key)}"
         if isinstance(value, Mapping) and key != "paving":
-            yield from _list_lengths(value, place)
-        elif key in ("thickness", "breadth", "gap", "cover"):
-            yield place, in_unit(value, "m", place)
+            yield from _list_keys(value, keys, place)
+        elif key in keys:
+            yield place, value

@@ -192,7 +192,7 @@ def draw_ratings(ratings: Sequence[Rating]) -> Figure:
     for k, found in enumerate(drawn):
         over = found.moving.factors["factor"].min("direction")
         finite = over.where(np.isfinite(over))
-        upper.plot(over["position"], finite, label=found.vehicle.name, lw=1.5, **line_style(k))
+        upper.plot(over["position"], finite, label=found.label, lw=1.5, **line_style(k))
         style = {"color": line_style(k)["color"], "mec": "white", "ms": 6.5, "zorder": 5}
         upper.plot([found.moving.position], [found.factor], "o", **style)
     upper.axhline(1.0, color=Colour.GREY, lw=1.0)
@@ -226,7 +226,7 @@ def draw_worst_places(ratings: Sequence[Rating]) -> Figure:
         _mark_strips(axes, structure, strips)
         axes.get_legend().remove()
         axes.set_axis_off()
-        set_title(axes, f"{found.vehicle.name}: {found.factor:.3g}")
+        set_title(axes, f"{found.label}: {found.factor:.3g}")
     labelled = {x.get_label(): x for axes in rows for x in axes.get_legend_handles_labels()[0]}
     # the size of the loads is another one in each panel
     kept = [handle for label, handle in labelled.items() if not label.startswith("live load")]

@@ -167,6 +167,12 @@ def test_a_case_is_rated_by_its_own_table(ring):
     assert parse_rating({"vehicle": [lorry, "LM1"]}) == {"vehicle": own}
     with pytest.raises(af.InvalidInput, match=r"rating.vehicle.axles.0. = '20 m'"):
         parse_rating({"vehicle": {**lorry, "axles": ["20 m"]}})
+    # of a lorry in kg; an axle of a cart has its unit, and that of 1 N is one of a study
+    heavy = {"name": "lorry", "axles": [7000, "9 kN"], "spacings": [3.0]}
+    with pytest.raises(af.InvalidInput, match=r"are in N, and the heaviest, 9 kN, is that of a c"):
+        parse_rating({"vehicle": ["LM1", heavy]})
+    for axles in (["7 kN", "9 kN"], [7000, 20000], [1.0, 1.0]):
+        parse_rating({"vehicle": heavy | {"axles": axles}})
 
 
 @pytest.mark.parametrize(

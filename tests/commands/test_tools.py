@@ -196,3 +196,15 @@ def test_a_thickness_names_a_stone_on_a_wrong_layer(tmp_path, capsys):
         assert "'RING 1' at (-1.600, " in said
         assert "may be one of 'west pier'" in said
         assert ("least thickness" in said) == (code == 3)
+
+
+def test_a_strength_in_another_unit_is_refused_by_a_check(tmp_path, capsys):
+    """As by a rating, though the case has no load of a limit analysis."""
+    path = tmp_path / "ring.toml"
+    ring = "shape = 'circular_arch'\nradius = 3.0\nthickness = 0.5\nembrace = '150 degree'"
+    path.write_text(
+        f"[structure]\n{ring}\nvoussoirs = 9\n[model]\nfidelity = 'rigid'\n[limit]\nstrength = 12\n"
+    )
+    assert af.commands.main(["check", str(path)]) == 1
+    assert "strength [Pa], of which 5 MPa are 5e6, = 12.0 is below" in capsys.readouterr().err
+    assert af.commands.main(["check", str(path), "--set", "limit.strength=12 MPa"]) in (0, 3)

@@ -8,10 +8,11 @@ import pytest
 from backfilled import arch_bridge
 
 import archfem as af
-from archfem.cases.analysis_keys import LimitAnalysis
+from archfem.cases.analysis_keys import LimitAnalysis, parse_limit
 from archfem.cases.result_text import doubt_rating, state_ratings, tabulate_ratings
 from archfem.limit import VEHICLES, Vehicle, rating
 from archfem.limit.rating import _places_along as places_along
+from archfem.view.collapse import draw_ratings
 
 EXACT = 1e-6
 """Relative: the programme is solved to 1e-9 block weights, corners count as one within 1e-6."""
@@ -451,9 +452,9 @@ def test_a_plastic_fill_has_the_factors_of_its_pressure_beside_its_own(monkeypat
     assert begin + values in str(found)
     weak = replace(found, by_pressure=0.99).outcome
     assert weak.startswith("passes only with the fill as a plastic body if the code's")
-    assert tabulate_ratings([found]).head[:3] == ["vehicle", "factor", "by pressure"]
-    head = ["vehicle", "factor", "without pressure", "full pressure", "without backing"]
-    assert tabulate_ratings([pressed]).head[:5] == head
+    assert tabulate_ratings([found]).head[2:4] == ["factor", "by pressure"]
+    head = ["factor", "without pressure", "full pressure", "without backing"]
+    assert tabulate_ratings([pressed]).head[2:6] == head
 
 
 def test_a_bridge_that_the_fill_holds_has_no_factor_without_it(monkeypatch):
@@ -626,7 +627,52 @@ def test_factors_of_codes_are_stated_with_outcome_and_range():
     ]
     # the impact is not on a distributed load, so that no multiple of the factor is that of a code
     assert [*replace(given, area_load=1e3).by_codes] == [code]
-    assert not replace(given, vehicle=VEHICLES["LM2"]).by_codes
+    assert not replace(given, vehicle=VEHICLES["LM2"], by_cs454={}).by_codes
+
+
+def test_the_impact_on_a_train_is_that_of_half_the_span(monkeypatch):
+    """1.67 at most (EN 1991-2, 6.4.5.2): against a rating with it."""
+    monkeypatch.setattr(rating, "_places_along", lambda *_: (3.0, 3.5, 4.0))
+    for span, impact in ((6.0, 1.44 / (3.0**0.5 - 0.2) + 0.82), (3.0, 1.67)):
+        arch = af.shapes.Arch(span=span, rise=span / 4.0, thickness=0.5, voussoirs=9)
+        bridge = af.bridge(arches=[arch], backfill=af.shapes.Backfill(cover=0.4), width=3.0)
+        found = af.rate(bridge, "LM71", fill=GRAVEL, strength=10e6)
+        ((name, (factor, outcome)),) = found.by_codes.items()
+        half = f"{span / 2.0:g} m; from memory"
+        assert name == f"with impact {min(impact, 1.67):.3g} (by half the span, {half})"
+        other = af.rate(bridge, "LM71", fill=GRAVEL, strength=10e6, impact=min(impact, 1.67))
+        assert factor == pytest.approx(other.factor, rel=EXACT)
+        assert outcome == other.outcome
+        assert not other.by_codes
+        assert found.describe_codes() == [f"LM71 {name}: factor {factor:.4g}, {outcome}"]
+
+
+def test_abutments_that_cannot_move_are_noted():
+    """Those with courses of their own are not, nor a ring on free blocks."""
+    arch = af.shapes.Arch(span=5.0, rise=1.25, thickness=0.5, voussoirs=9)
+    limit = parse_limit({"strength": "none"})
+    for state in ("fixed", "free", None):
+        walls = [af.shapes.Sidewall(length=2.0, height=1.0, state=state or "free")] * 2
+        walls = [replace(wall, name=side) for wall, side in zip(walls, "ab", strict=True)]
+        bridge = af.bridge(arches=[arch], sidewalls=walls if state else [], width=3.0)
+        found = af.rate(bridge, Vehicle("axle", (50e3,)), strength=np.inf)
+        note = 'abutments are taken as immovable: state = "free" tests them'
+        assert (note in str(doubt_rating(found, limit))) == (state != "free")
+
+
+def test_pictures_and_tables_name_the_factors_that_are_missing(lorry_rating):
+    given = replace(lorry_rating, missing=())
+    name = given.vehicle.name
+    for missing, words, column in (
+        (("live", "impact"), ", without partial factors", "none × none"),
+        (("impact",), ", without impact", f"{given.live:g} × none"),
+        ((), "", f"{given.live:g} × {given.impact:g}"),
+    ):
+        found = replace(given, missing=missing)
+        assert found.label == f"{name}{words}"
+        assert tabulate_ratings([found]).rows[0][1] == column
+        figure = draw_ratings([found, given])
+        assert figure.axes[0].get_legend().get_texts()[0].get_text() == f"{name}{words}"
 
 
 def test_an_axle_that_loads_no_ring_does_not_count(monkeypatch):

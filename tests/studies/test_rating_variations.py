@@ -75,21 +75,41 @@ def test_each_row_is_the_rating_of_a_changed_case(tmp_path):
         width = f"a vehicle on {share * 1.8:.3g} m"
         assert factors[width] == pytest.approx(share * found.factor, rel=SEARCHED)
     assert factors["no pressure of the fill"] == pytest.approx(found.without_pressure, rel=1e-3)
-    least, most = min(factors, key=factors.get), max(factors, key=factors.get)
+    least_of_all, least, *_, most = sorted(factors, key=factors.get)
     ends = f"to {factors[least]:.4g} ({least}) at least and {factors[most]:.4g} ({most}) at most"
-    assert words == f"one property at a time changes the factor of {found.factor:.4g} {ends}"
+    at_once = f"all unfavourable at once {factors[least_of_all]:.4g}"
+    first = f"one property at a time changes the factor of {found.factor:.4g} {ends}; {at_once}"
+    assert words[0] == first
+    # against a rating with the worst of each property
+    worst = [*thin, "structure.backfill.cover=0.2", "limit.strength=2e6", "rating.width=1.62"]
+    worst += ["limit.fill.mobilisation=0", "limit.fill.active=0"]
+    weight = case.structure.blocks[-1].material.unit_weight
+    worst += [f"materials.backfill.unit_weight={0.9 * weight}"]
+    other = af.Case.read(path, worst)
+    whole = rate_case(other.structure, other.rating, other.limit)
+    assert factors[least_of_all] == pytest.approx(whole.factor, rel=SEARCHED)
+    assert next(iter(cells)) == least_of_all
+    assert [*factors.values()] == sorted(factors.values())
+    assert words[1].startswith("measure first: ")
 
 
 @pytest.mark.parametrize("key", ["breadth", "gap"])
 def test_the_keys_of_a_case_are_changed_one_property_at_a_time(tmp_path, key):
     """By a gap all piers are a tenth of the least breadth broader."""
     path = tmp_path / "case.toml"
-    path.write_text(CASE.replace("PIER", f'{key} = "0.8 m"').replace("0.3 m", "0.05 m"))
+    text = CASE.replace("PIER", f'{key} = "0.8 m"').replace("0.3 m", "0.05 m")
+    walls = '[structure.sidewalls]\nlength = "1.5 m"\nheight = "1 m"\nstate = "fixed"\n'
+    text = text.replace("[structure.backfill]", f"{walls}a = {{}}\nb = {{}}\n[structure.backfill]")
+    path.write_text(text)
     case = af.Case.read(path)
     joints = [SimpleNamespace(role="pier", depth=depth) for depth in (0.7, 0.5, 0.6)]
-    structure = SimpleNamespace(width=3.0, joints=joints)
+    structure = SimpleNamespace(width=3.0, joints=joints, blocks=case.structure.blocks)
     found = SimpleNamespace(structure=structure, strength=4e6, width=2.8, fill=case.limit.fill)
-    changes = dict(_list_rating_changes(case, found))
+    listed = [*_list_rating_changes(case, found)]
+    changes = {name: change for _, name, change in listed}
+    subjects = {"rings", "piers", "cover", "abutments", "weight of backfill"}
+    subjects |= {"strength", "friction angle of the fill", "width"}
+    assert {subject for subject, *_ in listed} == subjects
     by = {"breadth": 0.08, "gap": 0.05}[key]
     rings = ["structure.arches.thickness", "structure.arches.right.thickness"]
     expected = {
@@ -102,13 +122,20 @@ def test_the_keys_of_a_case_are_changed_one_property_at_a_time(tmp_path, key):
         "half the strength of the stones": {"limit.strength": 2e6},
         "a vehicle on 2.52 m": {"rating.width": 2.52},
         "a vehicle on 3 m": {"rating.width": 3.0},
+        "abutments free": {"structure.sidewalls.state": "free"},
     }
+    # that of the stones is given
+    name, key = "backfill", "materials.backfill.unit_weight"
+    weight = next(b.material.unit_weight for b in structure.blocks if b.material.name == name)
+    expected |= {"backfill a tenth lighter": {key: 0.9 * weight}}
+    expected |= {"backfill a tenth heavier": {key: 1.1 * weight}}
     for angle in (30, 40):
         changed = changes.pop(f"fill of {angle}°")["limit.fill.friction_angle"]
         assert float(changed.removesuffix(" degree")) == pytest.approx(angle)
     assert changes.keys() == expected.keys()
     for name, values in expected.items():
-        assert changes[name] == pytest.approx(values), name
+        own = changes[name]
+        assert own == (values if name == "abutments free" else pytest.approx(values)), name
 
 
 def test_variations_that_are_stopped_are_kept(tmp_path, unplotted, capsys, monkeypatch, caplog):
@@ -129,21 +156,23 @@ def test_variations_that_are_stopped_are_kept(tmp_path, unplotted, capsys, monke
     assert af.commands.main(command) == 130
     rows = pd.read_csv(out / "rating_variations.csv").set_index("with")["factor"]
     late = rows[rows == "not computed"]
-    assert len(late) == 11 - 3  # rings, and a narrower pier, which is refused before it is rated
+    assert len(late) == 14 - 3  # rings, and a narrower pier, which is refused before it is rated
     assert float(rows["rings a tenth thinner"]) < float(rows["rings a tenth thicker"])
     text = (out / "rating.txt").read_text()
     assert f"in doubt: interrupted: {len(late)} variations of the rating were not computed" in text
-    assert f"; {len(late)} of 11 variations were not computed" in text
+    assert f"; {len(late)} variations were not computed" in text
     stop[0] = 0
     assert af.commands.main(command) == 3
-    assert len(seen) == 10 + 1  # all but the narrower pier, and the interrupted one twice
+    assert len(seen) == 13 + 1  # all but the narrower pier, and the interrupted one twice
     second = pd.read_csv(out / "rating_variations.csv").set_index("with")["factor"]
     assert "not computed" not in set(second)
     assert second["rings a tenth thinner"] == rows["rings a tenth thinner"]
     text, factors = (out / "rating.txt").read_text(), pd.to_numeric(second, errors="coerce")
     assert "interrupted" not in text
-    ends = [f"{factors[name]:.4g} ({name})" for name in (factors.idxmin(), factors.idxmax())]
-    assert " to {} at least and {} at most\n".format(*ends) in text
+    at_once, *single = factors.dropna().sort_values().items()
+    ends = [f"{factor:.4g} ({name})" for name, factor in (single[0], single[-1])]
+    assert " to {} at least and {} at most; ".format(*ends) in text
+    assert "; {} {:.4g}\n".format(*at_once) in text
     seen.clear()
 
     def refuse(*given, **_):
@@ -152,9 +181,9 @@ def test_variations_that_are_stopped_are_kept(tmp_path, unplotted, capsys, monke
 
     monkeypatch.setattr(variations, "rate_again", refuse)
     af.commands.main([*command, "--live", "1.5"])
-    assert len(seen) == 10
+    assert len(seen) == 13
     # that rings do not fit on a narrower pier is no failure
-    assert caplog.text.count("no optimum") == 10
+    assert caplog.text.count("no optimum") == 13
     assert "piers a tenth narrower" not in caplog.text
     capsys.readouterr()
 

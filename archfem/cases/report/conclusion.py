@@ -115,7 +115,8 @@ def list_facts(data: ReportData) -> list[tuple[str, str]]:
     doubts = [("in doubt", ", ".join(doubtful))] if doubtful else []
     if not runs:
         verdict = "; ".join([*_say_checks(data), *_say_factors(data)])
-        return [*signed, *([("verdict", verdict)] if verdict else []), *doubts, *blocks]
+        verdicts = [("verdict", verdict)] if verdict else []
+        return [*signed, *verdicts, *_list_ratings(data), *doubts, *blocks]
     peak = [("motions" if len(runs) > 1 else "motion", _describe_peaks(runs))]
     did, *others = summarise_outcomes(data, runs).split("; ")
     did = ", ".join([did, *_say_movement(data)])
@@ -127,16 +128,22 @@ def list_facts(data: ReportData) -> list[tuple[str, str]]:
 
 
 def _say_factors(data: ReportData) -> Iterator[str]:
-    """Yield the factors of results without runs; those of checks are said apart."""
+    """Yield the factors of results without runs; those of checks and vehicles are said apart."""
     for result, (_, demand, outcome, factor) in _capacity_rows(data):
-        if result == RESULTS["assessment"] or (factor == "-" and demand != "no demand given"):
+        said = result in (RESULTS["assessment"], RESULTS["rating"])
+        if said or (factor == "-" and demand != "no demand given"):
             continue
-        # the place of a vehicle is in the conclusion
-        text = f"{demand}: {outcome.partition(', with')[0]}" + f", factor {factor}" * (
-            factor != "-"
-        )
+        text = f"{demand}: {outcome}" + f", factor {factor}" * (factor != "-")
         begins = result in PUSHES and demand.startswith("the site")
         yield f"a push begins to move it at {factor} times {demand}" if begins else text
+
+
+def _list_ratings(data: ReportData) -> Iterator[tuple[str, str]]:
+    """Yield each vehicle, by each code, with its outcome; its place is in the conclusion."""
+    stated = data.statements.get("rating")
+    for _, demand, outcome, factor in stated.rows if stated else []:
+        if factor != "-":
+            yield demand, f"{outcome.partition(', with')[0]}, factor {factor}"
 
 
 def _say_movement(data: ReportData) -> Iterator[str]:
