@@ -252,5 +252,9 @@ def _convert(value: Any, kind: Any, key: str) -> Any:
                 return _convert(value, each, key)
         table = f"a table, as in {key.rpartition('.')[2]} = {{ … }}"
         words = {int: "a whole number", str: "a word", bool: "true or false", dict: table}
-        raise InvalidInput(f"{key} = {value!r} is not {' or '.join(words[each] for each in kinds)}")
+        reason = f"{key} = {value!r} is not {' or '.join(words[each] for each in kinds)}"
+        pair = key.removeprefix("structure.contacts.")
+        if pair != key and isinstance(value, Mapping):  # of a law, where its name is expected
+            reason += f": write its law under [contacts.{format_key(pair)}], at the top of the file"
+        raise InvalidInput(reason)
     return value

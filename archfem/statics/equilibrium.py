@@ -276,14 +276,15 @@ def _describe_failure(model: Model, error: DidNotConverge, newton: Newton | None
     if cause is not None:
         return f"'{model.structure.name}' does not stand under its own weight: {cause}"
     soft = "joints are" if model.fidelity == "rigid" else "joints and blocks are"
-    text = f"{error}; as rigid blocks it stands, but its {soft} too soft for its depth"
+    text = f"as rigid blocks it stands, but its {soft} too soft for its depth"
     part = _find_carried_part(model, newton)
     if part is None:
-        return f"{text}: compare with stiffer joints"
+        return f"{text}: compare with stiffer joints; {error}"
     # rounded up to two digits
     factor = float(f"{1.05 / part:.2g}")
     least = factor * min(joint.contact.normal_stiffness for joint in model.structure.joints)
-    return f"{text}: it stands if they are {factor:g} times as stiff, k_n from {least:.2g} Pa/m on"
+    stiff = f"it stands if they are {factor:g} times as stiff, k_n from {least:.2g} Pa/m on"
+    return f"{text}: {stiff}; {error}"
 
 
 def _find_carried_part(model: Model, newton: Newton | None, rounds: int = 20) -> float | None:

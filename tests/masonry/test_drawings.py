@@ -559,3 +559,9 @@ def test_a_unit_of_the_case_that_contradicts_the_drawing_is_said(tmp_path, caplo
         af.InvalidStructure, match=f"dxf: unit = 'cm' {contradiction}By unit = .* or else"
     ):
         af.Case.read(case, ["structure.unit=cm"])
+
+
+def test_a_law_among_the_names_of_laws_of_a_structure_is_sent_to_its_place(tmp_path):
+    change = 'structure.contacts."stone to stone".finish=dressed'
+    with pytest.raises(af.InvalidInput, match=r'law under \[contacts\."stone to stone"\], at'):
+        af.Case.read(draw_portal(tmp_path), [change])

@@ -584,7 +584,7 @@ def test_an_error_of_large_displacements_states_the_stiffness_that_is_needed(ver
     factors = path.curve["factor"].values
     least = 1e11 / (light * (1.0 + factors.max()))
     assert factors[-1] < 0.999 * factors.max()
-    with pytest.raises(af.DidNotConverge, match="joints are too soft for its depth") as caught:
+    with pytest.raises(af.DidNotConverge, match=r"^as rigid .* joints are too soft") as caught:
         dead_load(thin_ring(1e11))
     reported = float(re.search(r"k_n from (\S+) Pa/m on", str(caught.value))[1])
     verified("stiffness at which a thin ring stands [Pa/m]", least, "path past its peak", reported)
@@ -609,7 +609,7 @@ def test_with_cohesion_no_needed_stiffness_is_stated():
     ring = thin_ring(1e11).structure
     joints = tuple(replace(joint, contact=contact) for joint in ring.joints)
     glued = af.build(replace(ring, joints=joints), fidelity="rigid", displacements="large")
-    with pytest.raises(af.DidNotConverge, match="compare with stiffer joints"):
+    with pytest.raises(af.DidNotConverge, match="compare with stiffer joints; no equilibrium"):
         dead_load(glued)
 
 

@@ -122,7 +122,8 @@ def build_input_section(data: ReportData) -> Section:
         "full": "elastic finite elements, all nodes kept",
         "monolithic": "elastic finite elements, all nodes kept, weak forms of joints",
     }
-    fixed = dict.fromkeys(f"'{b.part or b.name}'" for b in data.case.structure.blocks if b.fixed)
+    supports = (block for block in data.case.structure.blocks if block.fixed)
+    fixed = list(dict.fromkeys(f"'{block.part or block.name}'" for block in supports))
     large = data.case.analysis.discretisation.displacements == "large"
     moved = "of any size" if large else "small: equilibrium where blocks stood"
     follows = "; an assessment follows its mechanism" * ("assessment" in data.statements)
