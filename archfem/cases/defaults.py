@@ -5,12 +5,14 @@ from itertools import groupby
 from math import inf
 from typing import NamedTuple
 
+from archfem._display import NOTE_MARK
 from archfem._validation import declared_keys
 from archfem.cases.case import Case
 from archfem.cases.toml_file import Table, format_key
+from archfem.limit.instability import describe_friction, least_friction
 from archfem.masonry.joint_closing import FINISHED_KEYS, finish_range
 from archfem.masonry.materials import Contact, Material
-from archfem.masonry.structure import Structure
+from archfem.masonry.structure import Structure, join_names
 from archfem.units import GPa, MPa, kN, kPa, mm
 
 HINGE_REASON = "8 % short of the edge, as in Demirel and Aldemir (2021)"
@@ -207,3 +209,19 @@ def _has_default_vertical(case: Case) -> bool:
         "synthetic" in each and "vertical_ratio" not in each["synthetic"] and "vertical" not in each
         for each in motions
     )
+
+
+def describe_friction_margin(case: Case, structure: Structure) -> list[str]:
+    """Describe from which friction rigid blocks stand, with a note where that is left open."""
+    if not (sentence := describe_friction(structure)):
+        return []
+    least = least_friction(structure) or 0.0
+    contacts = {joint.contact for joint in structure.joints}
+    open_ones = [each.name for each in contacts if "friction" in list_default_keys(case, each)]
+    lines = [f"as rigid blocks {sentence}"]
+    if open_ones and least > DRY_FRICTION[0]:
+        names = join_names([f'contacts."{name}"' for name in sorted(open_ones)])
+        low, high = DRY_FRICTION
+        words = f"friction decides whether it stands: dry stone has {low:g} to {high:g}"
+        lines.append(f"{NOTE_MARK}{words}, and the case gives none in {names}")
+    return lines

@@ -3,9 +3,7 @@
 import json
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from contextlib import suppress
 from csv import writer
-from functools import partial
 from io import StringIO
 from typing import Any, NamedTuple
 
@@ -17,11 +15,10 @@ from archfem._files import align_columns
 from archfem.cases.analysis_keys import LimitAnalysis
 from archfem.cases.case import Case
 from archfem.cases.defaults import (
-    DRY_FRICTION,
     describe_defaults,
     describe_fill_defaults,
+    describe_friction_margin,
     explain_defaults,
-    list_default_keys,
 )
 from archfem.cases.run import DeadLoadResult
 from archfem.dynamics.accuracy import Accuracy
@@ -29,7 +26,6 @@ from archfem.dynamics.collapse_state import FALLEN_STATES
 from archfem.dynamics.history import Ending, History
 from archfem.dynamics.motion_scaling import CollapseScale, MechanismScales
 from archfem.dynamics.verdict import ALL_DEFINITIONS, Verdict
-from archfem.errors import InvalidInput
 from archfem.joints.criteria import (
     assessed_joints,
     envelope,
@@ -37,14 +33,11 @@ from archfem.joints.criteria import (
     longest_duration,
     with_failure_flags,
 )
-from archfem.limit.collapse import Collapse, Outcome, describe_crushing, describe_fill
+from archfem.limit.collapse import Collapse, Outcome, describe_fill
 from archfem.limit.fill_range import FillRange
 from archfem.limit.fill_strength import PlasticFill, as_pressure
-from archfem.limit.instability import describe_friction, explain_instability, least_friction
 from archfem.limit.mechanism_count import Mechanism, duration_text
 from archfem.limit.rating import Rating
-from archfem.limit.thickness import minimum_thickness
-from archfem.masonry.ring_thickness import Ring
 from archfem.masonry.structure import (
     Structure,
     describe_spans,
@@ -251,22 +244,6 @@ def describe_dead_load(result: DeadLoadResult, *, explain: bool = False) -> str:
     return "\n".join([*lines, *(f"{DOUBT_MARK}{doubt}" for doubt in result.doubts)])
 
 
-def describe_friction_margin(case: Case, structure: Structure) -> list[str]:
-    """Describe from which friction rigid blocks stand, with a note where that is left open."""
-    if not (sentence := describe_friction(structure)):
-        return []
-    least = least_friction(structure) or 0.0
-    contacts = {joint.contact for joint in structure.joints}
-    open_ones = [each.name for each in contacts if "friction" in list_default_keys(case, each)]
-    lines = [f"as rigid blocks {sentence}"]
-    if open_ones and least > DRY_FRICTION[0]:
-        names = join_names([f'contacts."{name}"' for name in sorted(open_ones)])
-        low, high = DRY_FRICTION
-        words = f"friction decides whether it stands: dry stone has {low:g} to {high:g}"
-        lines.append(f"{NOTE_MARK}{words}, and the case gives none in {names}")
-    return lines
-
-
 def _describe_largest(joints: xr.Dataset) -> str:
     """Return the largest |e| and V / N of joints, and their smallest compression."""
     return (
@@ -432,29 +409,6 @@ def site_acceleration(case: Case) -> float:
     """Return the ground acceleration of the site's spectrum [g]; undefined (NaN) without one."""
     spectrum = case.assessment.spectrum or case.target
     return float(spectrum.horizontal(0.0)) if spectrum is not None else np.nan
-
-
-def describe_thickness(case: Case, ring: Ring) -> tuple[str, str, list[str]]:
-    """Find a ring's least thickness: in words, as a factor of safety, and in lines."""
-    limit, build = case.limit, ring.with_thickness
-    find = partial(minimum_thickness, build, strength=limit.strength, tolerance=1e-5)
-    least = find(friction=limit.friction)
-    words, factor = f"{format_mm(least)} of {format_mm(ring.thickness)}", ring.thickness / least
-    lines = [
-        f"least thickness at rest: {words}, the mean depth of its joints as drawn, all stones "
-        "scaled alike about the middle line; the ring alone on fixed springings",
-        f"geometric factor of safety: {factor:.3g}; "
-        f"{describe_crushing(limit.strength, case.structure)}",
-    ]
-    if limit.friction is not None:
-        with suppress(InvalidInput):  # without sliding it may stand at any thickness
-            rough = find(friction=None)
-            moving = explain_instability(build(0.99 * least)) or "joints crush"
-            moving = moving.partition(": ")[0]
-            lines.append(f"if thinner, {moving}; without sliding {format_mm(rough)} are enough")
-        alone = describe_friction_margin(case, build(ring.thickness))
-        lines += [f"the ring alone, as drawn: {alone[0]}", *alone[1:]] if alone else []
-    return words, f"{factor:.3g}", lines
 
 
 def compare_with_site(case: Case, found: Collapse) -> tuple[str, str]:

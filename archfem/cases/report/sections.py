@@ -12,6 +12,7 @@ import numpy as np
 import xarray as xr
 
 from archfem._files import read_listed
+from archfem.cases.defaults import describe_friction_margin
 from archfem.cases.report.conclusion import build_conclusion, sentence
 from archfem.cases.report.doubts import list_elastic_fill, list_varied
 from archfem.cases.report.inputs import describe_value, tabulate_inputs
@@ -27,7 +28,6 @@ from archfem.cases.report.response import (
     build_run_sections,
 )
 from archfem.cases.report.study_findings import read_study, tabulate_study
-from archfem.cases.result_text import describe_friction_margin
 from archfem.cases.run import DRAWING_FILE
 from archfem.dynamics.collapse_state import DISLOCATION, FALLEN_STATES, shallowest_part
 from archfem.dynamics.history import SIGN_CONVENTION

@@ -54,13 +54,6 @@ class Frame:
     upwards: float = 1.0  # 1 or -1
     stated: str = ""  # another unit that the file states
 
-    @property
-    def question(self) -> str:
-        """Question whether the unit is wrong, which may contradict that of the file."""
-        if not self.stated:
-            return "is the unit wrong?"
-        return f"unit = '{self.unit}' contradicts the drawing, in {self.stated} by its $INSUNITS."
-
     def place(self, point: Sequence[float]) -> str:
         """Return a place [m] in words, in coordinates of the drawing."""
         x, y = np.round(np.multiply(point, [1.0, self.upwards]), 6) / self.factor + 0.0
@@ -120,8 +113,7 @@ def read_polylines(
     """Read what can be drawn of a DXF file that is in error: closed outlines, and open lines."""
     with _foreign_reader("ezdxf", "DXF drawing"):
         read, frame = _load_dxf(path, ignored)
-    frame = frame or Frame(1.0, "units")
-    frame = frame if unit is None else _read_unit(unit)
+    frame = (frame or Frame(1.0, "units")) if unit is None else _read_unit(unit)
     closed, lines = list[Outline](), list[Outline]()
     for entity in read:
         points = np.array([point[:2] for point in entity.points], dtype=float) * frame.factor
@@ -224,18 +216,19 @@ def _read_geojson(path: Path, unit: str | None, ignored: Counter[str]) -> Iterat
             yield replace(outline, frame=frame)
 
 
-def _read_unit(unit: str, upwards: float = 1.0) -> Frame:
-    """Return the coordinates of a drawing in a unit."""
-    return Frame(in_unit(f"1 {unit}", "m", "unit"), unit, upwards)
+def _read_unit(unit: str, upwards: float = 1.0, other: Frame | None = None) -> Frame:
+    """Return the coordinates of a drawing in a unit, which may contradict that of the file."""
+    factor = in_unit(f"1 {unit}", "m", "unit")
+    stated = other.unit if other and not isclose(factor, other.factor) else ""
+    return Frame(factor, unit, upwards, stated)
 
 
 def _refuse_unit(problem: str, points: Array, frame: Frame = Frame()) -> InvalidInput:
     """Return the error of a drawing whose unit is not known, with its breadth in likely ones."""
     breadth = float(np.ptp(points[:, 0])) / frame.factor if len(points) else 0.0
-    sizes = ", ".join(
-        f'{_read_unit(unit).factor * breadth:.3g} m by unit = "{unit}"' for unit in UNITS
-    )
-    return InvalidInput(f"{problem}: give the unit that makes its breadth right, {sizes}")
+    sizes = (f'{_read_unit(x).factor * breadth:.3g} m by unit = "{x}"' for x in UNITS)
+    right = "give the unit that makes its breadth right"
+    return InvalidInput(f"{problem}: {right}, {', '.join(sizes)}")
 
 
 def _as_table(value: Any, name: str) -> dict[str, Any]:
@@ -312,18 +305,15 @@ def _read_dxf(
             f"layer '{layer}' has a {kind}{beside}: make a closed polyline of each stone, and "
             "ignore layers of other things"
         )
-    points = (complex(*point[:2]) for each in polylines for point in each.points)
+    points = [complex(*point[:2]) for each in polylines for point in each.points]
     corners = np.array([point for point in points if abs(point) < 1e12])  # others are refused
-    if unit is not None:
-        given = _read_unit(unit)
-        other = frame is not None and not isclose(frame.factor, given.factor)
-        frame = replace(given, stated=frame.unit) if frame and other else given
+    frame = frame if unit is None else _read_unit(unit, other=frame)
     if frame is None:
-        problem = "the drawing does not say its unit ($INSUNITS)"
-        raise _refuse_unit(problem, np.column_stack([corners.real, corners.imag]))
+        drawn = np.column_stack([corners.real, corners.imag])
+        raise _refuse_unit("the drawing does not say its unit ($INSUNITS)", drawn)
     # before ends are compared, whose distance a wrong unit would misstate
     known = [np.multiply(each.points, frame.factor)[:, :2] for each in polylines if each.points]
-    if corners.size and len(corners) == sum(map(len, known)):
+    if 0 < len(corners) == len(points):
         # a unit of the case is deliberate, as of a model in a laboratory
         _check_unit(known, frame, 0.1 if unit is None else 0.02)
     outlines = [_read_polyline(entity, frame, snap, corners) for entity in polylines]
@@ -368,10 +358,8 @@ def _load_dxf(path: Path, ignored: Counter[str]) -> tuple[list[Entity], Frame | 
         else:
             entities.append(Entity(kind, layer, []))
     known = drawing.units  # 0 where the drawing has none
-    if not known:
-        return entities, None
-    factor = units.conversion_factor(known, InsertUnits.Meters)
-    return entities, Frame(float(factor), units.decode(known) or "units")
+    factor = float(units.conversion_factor(known, InsertUnits.Meters)) if known else 0.0
+    return entities, Frame(factor, units.decode(known) or "units") if known else None
 
 
 def _walk_dxf(

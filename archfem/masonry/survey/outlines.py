@@ -205,7 +205,7 @@ def surveyed(  # noqa: PLR0913  (the drawing, and what its blocks are and how th
         path, unit=unit, snap=snap, layers=layers, material=material, materials=materials
     )
     if survey.frame.stated:
-        question = f"{survey.frame.question} By it that is {_say_size(survey.size)}"
+        question = f"{_question_unit(survey.frame)} By it that is {_say_size(survey.size)}"
         logger.warning("%s: %s; leave unit out, or correct the drawing", path, question)
     law, name = by_materials(contact, contacts), Path(path).stem
     structure = assembled(survey.blocks, law, width=width, gravity=gravity, name=name)
@@ -348,12 +348,19 @@ def _close_or_advise(outlines: list[Outline], snap: float) -> Closed:
             break
     if asks_unit:
         size = _say_size(_measure(outlines))
-        question = f"{frame.question} By unit = '{frame.unit}' the drawing is {size}"
+        question = f"{_question_unit(frame)} By unit = '{frame.unit}' the drawing is {size}"
         breadths = [np.hypot(*np.ptp(outline.points, axis=0)) for outline in outlines]
         # no stone is that large: what is said first is what a reader tries first
         is_first = np.median(breadths) > LARGE_STONE or frame.stated
         advice = f"{question}; or else {advice}" if is_first else f"{advice}; or {question}"
     raise InvalidStructure(advice)
+
+
+def _question_unit(frame: Frame) -> str:
+    """Ask whether the unit is wrong, or say that it contradicts that of the file."""
+    if not frame.stated:
+        return "is the unit wrong?"
+    return f"unit = '{frame.unit}' contradicts the drawing, in {frame.stated} by its $INSUNITS."
 
 
 def _closes_all(outlines: list[Outline], snap: float) -> bool:
