@@ -12,10 +12,11 @@ from pathlib import Path
 from archfem import _files
 from archfem._optional import can_film
 from archfem._validation import validate_arguments, validate_methods
+from archfem.cases.answers import state_outcome
 from archfem.cases.case import Case
 from archfem.cases.defaults import describe_friction_margin
 from archfem.cases.provenance import list_input_files
-from archfem.cases.result_text import compare_push, compare_with_site, state_outcome
+from archfem.cases.result_text import compare_push, compare_with_site
 from archfem.cases.run import (
     CASE_FILE,
     HISTORY_FILE,

@@ -9,7 +9,7 @@ from typing import Any
 
 from archfem._display import DOUBT_MARK, write_progress_line
 from archfem._files import create_result_folder, intact_file_list, path_inside, read_listed
-from archfem.cases import result_text
+from archfem.cases import answers
 from archfem.cases.case import Case
 from archfem.commands.cli import ExitCode
 from archfem.commands.run import (
@@ -110,7 +110,7 @@ def scale(options: argparse.Namespace) -> int:
     doubts = [line for line in doubts if not line.startswith(f"{DOUBT_MARK}interrupted at ")]
     doubts += [f"{DOUBT_MARK}{doubt}" for doubt in found.doubts]
     text = "\n".join([f"{motion.name}: {found}", *dict.fromkeys(doubts), "", found.table()])
-    files: Files = {"scale.txt": text, **result_text.state_scale(found, motion, doubts)}
+    files: Files = {"scale.txt": text, **answers.state_scale(found, motion, doubts)}
     if isinstance(found, CollapseScale):
         from archfem.view.studies import draw_scale
 

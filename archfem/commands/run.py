@@ -22,12 +22,12 @@ from archfem._files import (
     replace_results,
 )
 from archfem._optional import can_film
+from archfem.cases import answers, result_text
 from archfem.cases import result_folder as results
-from archfem.cases import result_text
 from archfem.cases.analysis_keys import name_vehicles, parse_rating, rate_case
+from archfem.cases.answers import RESULTS, state_ratings
 from archfem.cases.case import Case
 from archfem.cases.defaults import describe_defaults, describe_fill_defaults
-from archfem.cases.result_text import RESULTS, state_ratings
 from archfem.cases.run import (
     RATING_FILE,
     DeadLoadResult,
@@ -199,7 +199,7 @@ def keep_attempt(name: str) -> Callable[[Command], Command]:
                 case = Case.read(options.case, options.changes)
                 text, pair = f"no answer: {error}", getattr(options, "pair", None)
                 demand = f"'{pair}'" if pair else "-"
-                stated = result_text.state_outcome(RESULTS[name], text, demand=demand)
+                stated = answers.state_outcome(RESULTS[name], text, demand=demand)
                 files: Files = {f"{name}.txt": text, **stated.as_file(name)}
                 write_results(command.__name__, case, options.out, text, lambda: files, pair)
                 raise
@@ -255,7 +255,7 @@ def thickness(options: argparse.Namespace) -> int:
     text = "\n".join([*lines, *doubts])
     notes = [line for line in lines if line.startswith(NOTE_MARK)]
     given = words, [*doubts, *notes], "at rest", factor
-    stated = result_text.state_outcome(RESULTS["thickness"], *given)
+    stated = answers.state_outcome(RESULTS["thickness"], *given)
     files: Files = {"thickness.txt": text, **stated.as_file("thickness")}
     write_results("thickness", case, options.out, f"{case.title}\n{text}", lambda: files)
     return doubt_code(doubts)
@@ -276,8 +276,8 @@ def assess(options: argparse.Namespace) -> int:
     finally:
         logger.removeFilter(_refuse)
     doubts += [f"{DOUBT_MARK}{doubt}" for result in found.values() for doubt in result.doubts]
-    doubts += result_text.note_band(case, found.values())
-    texts = [result_text.describe_margin(found.values())]
+    doubts += answers.note_band(case, found.values())
+    texts = [answers.describe_margin(found.values())]
     for name, result in found.items():
         # doubts follow at the end, once
         lines = [x for x in str(result).splitlines() if not x.startswith(DOUBT_MARK)]
@@ -289,7 +289,7 @@ def assess(options: argparse.Namespace) -> int:
     def draw() -> Files:
         mechanisms = [k for k, result in enumerate(found.values()) if result.path is not None]
         figures = {f"assessment_{k}.png": list(found.values())[k].plot() for k in mechanisms}
-        stated = result_text.state_assessments(found, doubts).as_file("assessment")
+        stated = answers.state_assessments(found, doubts).as_file("assessment")
         return {"assessment.txt": text, **stated, **figures}
 
     write_results("assess", case, options.out, f"{case.title}\n{text}", draw)
@@ -443,7 +443,7 @@ def risk(options: argparse.Namespace) -> int:
         **case.risk.options,
     )
     files: Files = {"risk.txt": str(found), "risk.nc": found.save, "risk.png": found.plot()}
-    files |= result_text.state_risk(found).as_file("risk")
+    files |= answers.state_risk(found).as_file("risk")
     write_results("risk", case, options.out, str(found), lambda: files)
     return ExitCode.DOUBTFUL if found.doubts else 0
 

@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 
 import archfem as af
-from archfem.cases import result_text
+from archfem.cases import answers
 from archfem.cases.report import conclusion, doubts, sections
 from archfem.cases.report.report_data import ReportData
 from archfem.dynamics import VerdictRange
@@ -237,8 +237,8 @@ def test_the_answer_has_displacements_the_first_fall_and_the_checks(case):
     data = data_of(case, a=verdict_of(displacement=0.06), b=verdict_of(displacement=0.08))
     bound = "the curve is an upper bound"
     vars(data)["statements"] = {
-        "assessment": result_text.Statement([], [check], [bound]),
-        "scale": result_text.Statement([], rows, scaled),
+        "assessment": answers.Statement([], [check], [bound]),
+        "scale": answers.Statement([], rows, scaled),
     }
     answer = (
         "moves by 60 to 80 mm, first falls at 1.30 × the motion (1.30 to 1.51 over motions and "
@@ -259,10 +259,10 @@ def test_the_answer_has_displacements_the_first_fall_and_the_checks(case):
     for at, said in ("1.20", True), ("1.35", False):
         parted = rows[0][2].replace(", falls", f", dislocated from {at} ×, falls")
         changed = [(*rows[0][:2], parted, "1.1"), rows[1]]
-        data.statements["scale"] = result_text.Statement([], changed, scaled)
+        data.statements["scale"] = answers.Statement([], changed, scaled)
         words = f", is first dislocated at {at} × the motion; "
         assert (words in dict(conclusion.list_facts(data))["verdict"]) == said
-    data.statements["scale"] = result_text.Statement([], rows, scaled)
+    data.statements["scale"] = answers.Statement([], rows, scaled)
     rows[0] = (*rows[0][:2], f"search unfinished, {rows[0][2]}", "1.1")
     facts = dict(conclusion.list_facts(data))
     assert "over motions and time steps, search unfinished); " in facts["verdict"]
@@ -272,7 +272,7 @@ def test_the_answer_has_displacements_the_first_fall_and_the_checks(case):
         "0.1 m, passes",
         "1.1 (0.842 by displacements)",
     )
-    data.statements["assessment"] = result_text.Statement([], [passed], [bound])
+    data.statements["assessment"] = answers.Statement([], [passed], [bound])
     facts = dict(conclusion.list_facts(data))
     rested = "the displacement check of damage, right is met at rest (0.842 by displacements)"
     assert facts["verdict"].endswith(rested)
@@ -428,18 +428,18 @@ def test_motions_matched_to_shorter_periods_than_that_of_a_check_are_noted(perio
     case = SimpleNamespace(suite={"matched": matched})
     found = SimpleNamespace(checks=[SimpleNamespace(period=3.0), SimpleNamespace(period=period)])
     still = SimpleNamespace(checks=[SimpleNamespace(period=np.nan)])
-    notes = result_text.note_band(case, [still, found])
+    notes = answers.note_band(case, [still, found])
     assert len(notes) == noted
     assert all(
         note.startswith("note: the motions of the suite are matched from 0.05 to 2 s, and T = 2.04")
         for note in notes
     )
-    assert result_text.note_band(SimpleNamespace(suite=None), [found]) == []
+    assert answers.note_band(SimpleNamespace(suite=None), [found]) == []
 
 
 def test_the_head_of_a_push_says_when_it_begins_to_move(case):
     row = ("limit analysis", "the site's 0.2 g", "four-hinge mechanism, at 0.1 g", "0.5")
     data = data_of(case)
-    vars(data)["statements"] = {"limit": result_text.Statement(["limit analysis"], [row])}
+    vars(data)["statements"] = {"limit": answers.Statement(["limit analysis"], [row])}
     begins = "a push begins to move it at 0.5 times the site's 0.2 g"
     assert dict(conclusion.list_facts(data))["verdict"] == begins

@@ -17,7 +17,7 @@ from pages import read_page
 
 import archfem as af
 from archfem._files import read_file_list, replace_results
-from archfem.cases import result_text
+from archfem.cases import answers, result_text
 from archfem.cases.defaults import describe_defaults, list_defaults
 from archfem.cases.report import conclusion, report, report_data
 from archfem.cases.report.conclusion import build_conclusion, list_facts
@@ -123,12 +123,12 @@ def state_each(hazard):
     doubts = ["in doubt: a made one; mend it"]
     turns = "it turns, at 4.8 times the load", doubts, "the given load", "4.8"
     return {
-        ("limit", "limit"): result_text.state_outcome("limit analysis", *turns),
-        ("rate", "rating"): result_text.Statement(["rated"], [("rating", "LM1", place, "1.25")]),
-        ("assess", "assessment"): result_text.state_assessments(
+        ("limit", "limit"): answers.state_outcome("limit analysis", *turns),
+        ("rate", "rating"): answers.Statement(["rated"], [("rating", "LM1", place, "1.25")]),
+        ("assess", "assessment"): answers.state_assessments(
             {"right": assessed, "left": assessed}, upper
         ),
-        ("risk", "risk"): result_text.state_risk(found),
+        ("risk", "risk"): answers.state_risk(found),
     }
 
 
@@ -264,7 +264,7 @@ def test_a_rate_is_stated_beside_the_hazard_at_its_return_periods():
 def test_a_check_that_passes_at_rest_says_so():
     resting = replace(CHECKS[1], ratio=1.5)
     found = SimpleNamespace(checks=[resting], notes=(), of_bodies=None)
-    (row,) = result_text.state_assessments({"right": found}, []).rows
+    (row,) = answers.state_assessments({"right": found}, []).rows
     outcome = "0.11 m, passes, for the mechanism does not begin to move"
     assert row == ("assessment: a code, right", "0.22 m", outcome, "1.5 (0.5 by displacements)")
 
@@ -372,10 +372,8 @@ def test_a_case_without_motion_has_a_report_too(small, unplotted, tmp_path):
     )
     with replace_run(case, folder) as draft:
         files = {"limit.txt": "it stands", "assessment.txt": "right: it moves"}
-        files |= result_text.Statement(["it stands"], []).as_file("limit")
-        noted = result_text.Statement(
-            [], [], ["note: faces slide; flat", "in doubt: it is so; run"]
-        )
+        files |= answers.Statement(["it stands"], []).as_file("limit")
+        noted = answers.Statement([], [], ["note: faces slide; flat", "in doubt: it is so; run"])
         write_files(files | noted.as_file("assessment"), draft)
     words = " ".join(read_page(af.cases.open_results(folder).report().read_text()).words)
     assert "It stands." in words  # the conclusion

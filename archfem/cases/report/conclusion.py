@@ -12,6 +12,7 @@ import numpy as np
 
 from archfem._files import read_file_list
 from archfem.cases import result_text
+from archfem.cases.answers import RESULTS, Row
 from archfem.cases.case import REPORT_KEYS
 from archfem.cases.report.doubts import (
     HISTORIES,
@@ -29,7 +30,6 @@ from archfem.cases.report.doubts import (
 )
 from archfem.cases.report.report_data import SHOWN_RESULTS, ReportData
 from archfem.cases.report.study_findings import read_study, say_what_changes
-from archfem.cases.result_text import RESULTS, Row
 from archfem.dynamics.collapse_state import COLLAPSE_STATES, FALLEN_STATES, CollapseState
 from archfem.dynamics.history import History
 from archfem.dynamics.motion_scaling import UNFINISHED

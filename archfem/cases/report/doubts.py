@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from archfem.cases.answers import RESULTS, Row
 from archfem.cases.report.motion_rules import note_checks
 from archfem.cases.report.report_data import ReportData
 from archfem.cases.report.study_findings import list_studied, read_study
-from archfem.cases.result_text import RESULTS, Row
 from archfem.dynamics.collapse_state import COLLAPSE_STATES, FALLEN_STATES
 from archfem.dynamics.history import History
 from archfem.dynamics.verdict_range import MAX_RATIO_OF_DISPLACEMENTS, VerdictRange

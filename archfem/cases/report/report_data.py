@@ -13,8 +13,8 @@ import xarray as xr
 
 from archfem._display import DOUBT_MARK
 from archfem._files import check_listed, describe_deleted, group_of, path_inside, read_file_list
+from archfem.cases.answers import RESULTS, Statement, cut_remedy
 from archfem.cases.case import Case
-from archfem.cases.result_text import RESULTS, Statement, cut_remedy
 from archfem.cases.run import CASE_FILE, RATING_FILE
 from archfem.cases.toml_file import Table, parse_tables
 from archfem.dynamics.history import History
