@@ -131,8 +131,6 @@ def at_the_limit(side):
 def assessed(side):
     """The finite motion of a pile that leans."""
     found, pile = {}, skew(af.column(breadth=0.8, heights=[0.7, 1.1]), af.Contact(1e9, 1e9, 1.0))
-    smooth = replace(pile.joints[1], contact=af.Contact(1e9, 1e9, 0.2))
-    pile = replace(pile, joints=(pile.joints[0], smooth))
     pile = pile if side > 0.0 else image(pile)
     each = af.kinematic_assessment(pile, af.Eurocode8(ag=0.2, ground="B"), direction=side)
     for key in ("alpha_0", "M_star", "e_star", "a_0_star", "d_0_star"):

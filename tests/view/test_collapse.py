@@ -223,7 +223,7 @@ def test_several_vehicles_are_drawn_each_at_its_worst_place(coarse_ring, few_pla
     sizes = [text.get_fontsize() for text in figure.findobj(Text) if text.get_text()]
     assert min(sizes) >= 7.0
     legend = [text.get_text() for text in upper.get_legend().get_texts()]
-    assert legend == 2 * [lorry.name for lorry in lorries]
+    assert legend == 2 * [f"{lorry.name}, without partial factors" for lorry in lorries]
     points = [line.get_xydata()[0] for line in upper.lines if line.get_marker() == "o"]
     expected = [(found.moving.position, found.factor) for found in 2 * ratings]
     np.testing.assert_allclose(points, expected)
