@@ -124,13 +124,13 @@ def test_a_push_is_no_margin_of_what_moves(case, outcomes, verified, moves):
         ]
     else:
         expected = [
-            f"a push begins to move it {body} at {size} times the site's 0.2 g, "
+            f"a push of {size} times the site's 0.2 g begins to move it {body}, "
             "which is no collapse"
             for size, body in bodies.items()
         ]
     assert [*conclusion._describe_margin(data, rows)] == expected
     rows[:] = [("limit analysis", "the site's 0.2 g", "mechanism", "0.9")]
-    least = "a push begins to move it at 0.9 times the site's 0.2 g, which is no collapse"
+    least = "a push of 0.9 times the site's 0.2 g begins to move it, which is no collapse"
     assert [*conclusion._describe_margin(data, rows)] == [least, *filter(None, [moves])]
     unshaken = [*conclusion._describe_margin(data_of(case), rows)]
     assert unshaken == [least, "shaken it may begin to move at less"]

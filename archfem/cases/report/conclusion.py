@@ -363,7 +363,7 @@ def _describe_margin(data: ReportData, rows: Sequence[Row]) -> Iterator[str]:
             if moves and least >= 1.0:  # shaken it moves before
                 apart.append(f"a push of {size} times {demand}{over}{of} is no margin: {moves}")
             else:
-                begins = f"a push begins to move it{of} at {size} times {demand}{over}"
+                begins = f"a push of {size} times {demand}{over} begins to move it{of}"
                 then = moves if data.runs else "shaken it may begin to move at less"
                 apart += [f"{begins}, which is no collapse", *filter(None, [then])]
     margins += _describe_scales(data, [row for row in rows if row[0] == RESULTS["scale"]])
