@@ -27,12 +27,13 @@ from archfem.dynamics.separation import MeetingMonitor
 from archfem.dynamics.state import Batch, State
 from archfem.errors import DidNotConverge, logger
 from archfem.models.model import Doubt, Model, Observer
+from archfem.statics.equilibrium import SOIL_ANGLE, SOIL_COHESION
 from archfem.statics.stress import observe_fill_tension
 from archfem.units import kPa
 
-# Largest tension that cohesive loose soil bears, 30° and 5 kPa as in `fill_doubts`: where Mohr's
-# circle touches the limit, 2 c cos φ / (1 + sin φ) [Pa]
-SOIL_TENSION = 2.0 * 5e3 * cos(radians(30.0)) / (1.0 + sin(radians(30.0)))
+# Largest tension that loose soil bears: where Mohr's circle touches the limit,
+# 2 c cos φ / (1 + sin φ) [Pa]
+SOIL_TENSION = 2.0 * SOIL_COHESION * cos(radians(SOIL_ANGLE)) / (1.0 + sin(radians(SOIL_ANGLE)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -262,7 +263,8 @@ class RunMonitor:
             self._add_doubt(
                 "tension",
                 f"elastic fill bears {tension / kPa:.3g} kPa of tension, at t = {time:.4g} s: soil "
-                f"has next to none, {SOIL_TENSION / kPa:.2g} kPa with a cohesion of 5 kPa",
+                f"has next to none, {SOIL_TENSION / kPa:.2g} kPa with a cohesion of "
+                f"{SOIL_COHESION / kPa:g} kPa",
                 'compare with fill in pieces (law = "jointed", friction_angle, cohesion and '
                 "piece_size in [structure.fill] of a case)",
             )

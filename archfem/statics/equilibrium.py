@@ -611,14 +611,18 @@ def _doubt_support(structure: Structure, numbers: Sequence[int], part: str) -> D
     )
 
 
+# Strength of loose soil, with the cohesion with which a fill meets load tests of bridges [°], [Pa]
+SOIL_ANGLE, SOIL_COHESION = 30.0, 5e3
+
+
 @lru_cache(maxsize=8)
 def fill_doubts(structure: Structure) -> tuple[Doubt, ...]:
     """Return a doubt where fill in one piece holds itself as no soil does.
 
     Fill in one piece carries tension. Cut into pieces whose joints carry none, with the strength of
-    loose soil and the cohesion with which a fill meets load tests of bridges, it must hold too.
+    loose soil, it must hold too.
     """
-    angle, cohesion = 30.0, 5e3  # [°], [Pa]
+    angle, cohesion = SOIL_ANGLE, SOIL_COHESION
     fill = find_yielding_blocks(structure)
     if not fill or any(structure.blocks[number].grain for number in fill):
         return ()
