@@ -4,7 +4,6 @@ The files of a run appear in its folder together, when all of them exist (`archf
 """
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -14,7 +13,6 @@ from archfem._optional import can_film
 from archfem._validation import validate_arguments, validate_methods
 from archfem.cases.answers import state_outcome
 from archfem.cases.case import Case
-from archfem.cases.defaults import describe_friction_margin
 from archfem.cases.provenance import list_input_files
 from archfem.cases.result_text import compare_push, compare_with_site
 from archfem.cases.run import (
@@ -30,14 +28,10 @@ from archfem.cases.toml_file import read_tables
 from archfem.dynamics.collapse_state import FALLEN_STATES
 from archfem.dynamics.history import History
 from archfem.errors import ArchfemError, InvalidInput, logger
-from archfem.limit.collapse import Collapse, Outcome, describe_crushing
-from archfem.limit.instability import explain_instability
-from archfem.limit.thickness import minimum_thickness
+from archfem.limit.collapse import Collapse, Outcome
 from archfem.masonry.loads import find_push
-from archfem.masonry.ring_thickness import Ring
 from archfem.statics.pushover import Pushover
 from archfem.statics.stress import strength_use_table
-from archfem.units import format_mm
 from archfem.view.collapse import draw_fall
 from archfem.view.histories import draw_envelope, draw_envelopes
 from archfem.view.statics import draw_free_body
@@ -206,29 +200,6 @@ def limit_files(case: Case, collapse: Collapse, text: str, doubts: Sequence[str]
     given = collapse.sentence, doubts, demand, factor
     stated = state_outcome("limit analysis", *given).as_file("limit")
     return {"limit.txt": text, "limit.csv": joints, "collapse.png": collapse.plot(), **stated}
-
-
-def describe_thickness(case: Case, ring: Ring) -> tuple[str, str, list[str]]:
-    """Find a ring's least thickness: in words, as a factor of safety, and in lines."""
-    limit, build = case.limit, ring.with_thickness
-    find = partial(minimum_thickness, build, strength=limit.strength, tolerance=1e-5)
-    least = find(friction=limit.friction)
-    words, factor = f"{format_mm(least)} of {format_mm(ring.thickness)}", ring.thickness / least
-    lines = [
-        f"least thickness at rest: {words}, the mean depth of its joints as drawn, all stones "
-        "scaled alike about the middle line; the ring alone on fixed springings",
-        f"geometric factor of safety: {factor:.3g}; "
-        f"{describe_crushing(limit.strength, case.structure)}",
-    ]
-    if limit.friction is not None:
-        with suppress(InvalidInput):  # without sliding it may stand at any thickness
-            rough = find(friction=None)
-            moving = explain_instability(build(0.99 * least)) or "joints crush"
-            moving = moving.partition(": ")[0]
-            lines.append(f"if thinner, {moving}; without sliding {format_mm(rough)} are enough")
-        alone = describe_friction_margin(case, build(ring.thickness))
-        lines += [f"the ring alone, as drawn: {alone[0]}", *alone[1:]] if alone else []
-    return words, f"{factor:.3g}", lines
 
 
 def pushover_files(case: Case, push: Pushover, text: str) -> Files:

@@ -2,7 +2,9 @@
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from csv import writer
+from functools import partial
 from io import StringIO
 from typing import NamedTuple
 
@@ -24,6 +26,7 @@ from archfem.dynamics.accuracy import Accuracy
 from archfem.dynamics.collapse_state import FALLEN_STATES
 from archfem.dynamics.history import Ending, History
 from archfem.dynamics.verdict import ALL_DEFINITIONS, Verdict
+from archfem.errors import InvalidInput
 from archfem.joints.criteria import (
     assessed_joints,
     envelope,
@@ -31,10 +34,13 @@ from archfem.joints.criteria import (
     longest_duration,
     with_failure_flags,
 )
-from archfem.limit.collapse import Collapse, Outcome, describe_fill
+from archfem.limit.collapse import Collapse, Outcome, describe_crushing, describe_fill
 from archfem.limit.fill_strength import PlasticFill, as_pressure
+from archfem.limit.instability import explain_instability
 from archfem.limit.mechanism_count import Mechanism, duration_text
 from archfem.limit.rating import Rating
+from archfem.limit.thickness import minimum_thickness
+from archfem.masonry.ring_thickness import Ring
 from archfem.masonry.structure import (
     Structure,
     describe_spans,
@@ -387,6 +393,29 @@ def site_acceleration(case: Case) -> float:
     """Return the ground acceleration of the site's spectrum [g]; undefined (NaN) without one."""
     spectrum = case.assessment.spectrum or case.target
     return float(spectrum.horizontal(0.0)) if spectrum is not None else np.nan
+
+
+def describe_thickness(case: Case, ring: Ring) -> tuple[str, str, list[str]]:
+    """Find a ring's least thickness: in words, as a factor of safety, and in lines."""
+    limit, build = case.limit, ring.with_thickness
+    find = partial(minimum_thickness, build, strength=limit.strength, tolerance=1e-5)
+    least = find(friction=limit.friction)
+    words, factor = f"{format_mm(least)} of {format_mm(ring.thickness)}", ring.thickness / least
+    lines = [
+        f"least thickness at rest: {words}, the mean depth of its joints as drawn, all stones "
+        "scaled alike about the middle line; the ring alone on fixed springings",
+        f"geometric factor of safety: {factor:.3g}; "
+        f"{describe_crushing(limit.strength, case.structure)}",
+    ]
+    if limit.friction is not None:
+        with suppress(InvalidInput):  # without sliding it may stand at any thickness
+            rough = find(friction=None)
+            moving = explain_instability(build(0.99 * least)) or "joints crush"
+            moving = moving.partition(": ")[0]
+            lines.append(f"if thinner, {moving}; without sliding {format_mm(rough)} are enough")
+        alone = describe_friction_margin(case, build(ring.thickness))
+        lines += [f"the ring alone, as drawn: {alone[0]}", *alone[1:]] if alone else []
+    return words, f"{factor:.3g}", lines
 
 
 def compare_with_site(case: Case, found: Collapse) -> tuple[str, str]:

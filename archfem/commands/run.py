@@ -251,7 +251,7 @@ def thickness(options: argparse.Namespace) -> int:
     case = Case.read(options.case, options.changes)
     ring = find_ring(case.structure, options.part)
     with record_doubts(case.structure) as doubts:
-        words, factor, lines = results.describe_thickness(case, ring)
+        words, factor, lines = result_text.describe_thickness(case, ring)
     text = "\n".join([*lines, *doubts])
     notes = [line for line in lines if line.startswith(NOTE_MARK)]
     given = words, [*doubts, *notes], "at rest", factor
