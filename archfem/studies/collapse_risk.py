@@ -643,9 +643,9 @@ class CollapseRisk(ResultDisplay):
             )
             doubts.append(Doubt(cause, "give its points at longer return periods"))
         doubts += self._doubt_records()
-        steps = self.dataset.get("admissible_step", self.dataset["upper"])  # of earlier versions
-        dt = self.dataset.attrs.get("dt")
-        doubts += doubt_steps_of_sliding(steps.values.tolist(), dt, "samples", "")
+        if "admissible_step" in self.dataset:  # files of earlier versions have none
+            steps, dt = self.dataset["admissible_step"].values.tolist(), self.dataset.attrs["dt"]
+            doubts += doubt_steps_of_sliding(steps, dt, "samples", "")
         count = len(self.dataset["sample"])
         # a twentieth of all is what the 90 % interval leaves out at each of its ends
         if count - len(self.answered) > 0.05 * count:
