@@ -132,7 +132,7 @@ class MechanismScales:
         return _doubts_of_searches({"": self}, first)
 
     @property
-    def kept_runs(self) -> "KeptRuns":
+    def kept_runs(self) -> KeptRuns:
         """Runs by time step and scale."""
         return {(self.dt, run.scale): run for run in self.runs}
 

@@ -631,8 +631,10 @@ def describe_crushing(strength: float | None, structure: Structure) -> str:
     blocks = {structure.blocks[k] for k in np.unique(structure.pairs[structure.judged]).tolist()}
     own = sorted({block.material.strength or np.inf for block in blocks})
     if strength is None or np.isinf(strength):
-        preset = " (56 MPa of the preset is not given)" * (STONE.strength in own)
-        return f"joints do not crush: no strength of the stones counts{preset}"
+        words = "joints do not crush: no strength of the stones counts"
+        if not (preset := STONE.strength) or preset not in own:
+            return words
+        return f"{words} ({preset / MPa:g} MPa of the preset is not given)"
     of_stones = "the strength of the stones"
     if not np.isclose(strength, own).any():
         listed = " and ".join(f"{x / MPa:.3g} MPa" for x in own if x < np.inf) or "not known"
