@@ -2,7 +2,7 @@
 
 Results of a command replace earlier ones together. They are written to a draft folder, which is
 renamed when all of them exist, and then moved. A list in the folder has the SHA-256 of each file
-and that of the command's inputs, so that a file of another run is recognised when it is read.
+and that of the command's inputs. By this list a file of another run is recognised when it is read.
 
 A result folder may come from a stranger. Paths in it are made by `path_inside`, which refuses
 links; `SECURITY.md` says what is promised.

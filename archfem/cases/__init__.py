@@ -2,7 +2,7 @@
 
     analysis_keys    [limit], [rating] and [assessment]
     analysis_tables  [model], [analysis], [criteria], [record], [dead_load]: read and written
-    answers          what a result answers to the report: sentences, rows, doubts
+    answers          answers of a result for the report: sentences, rows, doubts
     case             Case: an analysis, its motion, outputs
     defaults         deciding values that a case does not give
     examples         shipped cases

@@ -91,8 +91,8 @@ class LimitAnalysis:
             Result of `archfem.collapse_factor`.
 
         Raises:
-            InvalidInput: there is no load, a load misses the structure, or blocks are too soft to
-                be rigid and the case gives no strength of a fill.
+            InvalidInput: there is no load, or a load misses the structure; or blocks are too soft
+                to be rigid and the case gives no strength of a fill.
         """
         if not self.live:
             raise InvalidInput(

@@ -152,8 +152,8 @@ def load_extension(path: str | Path) -> ModuleType:
         The module.
 
     Raises:
-        InvalidInput: there is no such file or package, it ends in an error, its name is that of
-            another module, or it was changed after it had been loaded.
+        InvalidInput: there is no such file or package, or it ends in an error; its name is that of
+            another module; or it was changed after it had been loaded.
     """
     if not str(path).endswith(".py"):
         return _load_package(str(path))

@@ -233,7 +233,7 @@ def run_case(
     With a folder each history is saved: that of one motion as history.nc, that of a pair of a suite
     in a folder of the pair's name. Case, history and list of files appear together, in place of
     those of another case; `open_results` reads them. Pairs that an earlier call has finished are
-    reused, if case, input files, program and motion are the same, so that an interrupted call can
+    reused if case, input files, program and motion are the same. An interrupted call can therefore
     be repeated. A failed step ends its run alone; Ctrl-C ends the run, which is still yielded, and
     the suite; neither replaces a run that was finished before.
 

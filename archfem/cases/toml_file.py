@@ -1,11 +1,11 @@
 """TOML files: read safely, merged with their base, checked against tables of keys, and changed.
 
-A file is refused before it is parsed if it is too large or too deeply nested, since the parser of
-the standard library would take hours or exhaust the memory.
+A file that is too large or too deeply nested is refused before it is parsed. The parser of the
+standard library would take hours or exhaust the memory.
 
-A table of keys gives for each key the kind of its value: a unit such as "m" for a number or a
-quantity, `NumberOrWord`, a Python type, a list of one kind for a list of values, or a tuple of
-several of these. `declared_keys` reads it from a dataclass or function.
+A table of keys gives for each key the kind of its value. A kind is a unit such as "m" for a number
+or a quantity, `NumberOrWord`, or a Python type. A list of one kind is for a list of values, and a
+tuple for one of several kinds. `declared_keys` reads it from a dataclass or function.
 """
 
 import json

@@ -36,11 +36,11 @@ FALLEN_STATES = COLLAPSE_STATES[2:]
 class CollapseState:
     """State of collapse at the end of a run.
 
-    A block is *lost* once its centroid has sunk by more than half the root of its area, or once it
-    has turned by more than 45°, wherever it comes to rest. Fill does not count. The structure
+    A block is *lost* once its centroid sinks by more than half the root of its area, or the block
+    turns by more than 45°. Its place of rest does not matter. Fill does not count. The structure
 
-    - *stands*: no block is lost, and none is displaced by more than a tenth of the depth of the
-      joints of the shallowest ring or pier, the median of each;
+    - *stands*: no block is lost, and none is displaced by more than a tenth of the median joint
+      depth of the shallowest ring or pier;
     - is *dislocated*: no block is lost, but some are displaced further;
     - is *partly fallen*: blocks are lost, but a ring retains all of its own;
     - is *fallen*: every ring has lost a block. Where there is no ring, the piers count instead,

@@ -2,8 +2,8 @@
 
 *Effective modes.* Codes take as many modes, the lowest first, as together have 90 % of the mass
 that can move (EN 1998-1, 4.3.3.3.1(3); ASCE 7-16, 12.9.1.1). The last of them is the last effective
-mode here. The first effective mode is the lowest up to which the sum is 5 %, a share that the same
-clause of EN 1998-1 does not permit to neglect. Both are independent of the mesh. Two other
+mode here. The first effective mode is the lowest up to which the sum is 5 %. The same clause of EN
+1998-1 does not permit such a share to be neglected. Both are independent of the mesh. Two other
 definitions are not: modes with 5 % each, since neighbouring modes exchange their mass; and 90 % by
 decreasing mass, which with hundreds of small modes of a fill depends on the number computed.
 
@@ -160,13 +160,12 @@ def effective_damping(
     the first effective mode since most of the mass oscillates in it: in rings and arches on piers
     whose joints do not yet separate, the largest |e| is within 0.02 of that by Rayleigh damping.
     Set at the last effective mode it would be about 1 % at the first. Higher modes and landing
-    blocks lose more than the ratio: at 5 % a block of 0.6 m by 2.4 m on a joint of 1 MPa/mm keeps
-    0.965 of its angular velocity from one landing to the next, against 0.912 by rigid impacts and
-    0.46 by Rayleigh damping (see `restitution`).
+    blocks lose more than the ratio. At 5 % a block of 0.6 m by 2.4 m on a joint of 1 MPa/mm keeps
+    0.965 of its angular velocity between landings. It keeps 0.912 by rigid impacts and 0.46 by
+    Rayleigh damping (see `restitution`).
 
-    With kind "rayleigh" the ratio is set at the first and the last effective mode, with less
-    between them (Demirel and Aldemir, Buildings 11 (2021), section 2). Its mass part also drags
-    loose blocks.
+    Kind "rayleigh" sets the ratio at the first and the last effective mode, with less between them
+    (Demirel and Aldemir, Buildings 11 (2021), section 2). Its mass part also drags loose blocks.
 
     Args:
         model: model of any fidelity, or an `archfem.Analysis`.

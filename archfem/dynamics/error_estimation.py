@@ -1,8 +1,8 @@
 """A-posteriori error of model, time step and small displacements, from short runs.
 
 The measure is the largest |e| of every joint, by which hinges are detected. Settings are run over
-the strongest part of the motion, each with half the time step of the one before. With P_k the peaks
-of setting k, and n the finest,
+the strongest part of the motion, each with half the time step of the one before. P_k are the peaks
+of setting k, and n is the finest setting:
 
     error of n = |P_n - P_(n-1)| / (2^p - 1),    error of k = |P_k - P_n| + error of n,
 

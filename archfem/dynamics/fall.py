@@ -1,8 +1,8 @@
 """Fall of loose blocks: from joints with large displacements to rigid blocks on the ground.
 
-Once a joint has turned or slid so far that its blocks are loose, or stones meet outside their
-joints, all blocks continue as free rigid blocks (`dynamics.rigid_body`), with the positions and the
-momentum of the model, until they rest.
+The fall begins once a joint has turned or slid so far that its blocks are loose, or stones meet
+outside their joints. All blocks then continue as free rigid blocks until they rest
+(`dynamics.rigid_body`), from the positions and the momentum of the model.
 """
 
 from collections.abc import Iterator, Sequence

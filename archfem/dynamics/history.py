@@ -198,11 +198,11 @@ class History(ResultDisplay):
     def doubts(self) -> tuple[Doubt, ...]:
         """Reasons why the run may be wrong, each with its remedy.
 
-        They concern energy drift above 5 % at any step, rotations and displacements too large for
-        a model of small displacements, damping that drags loose blocks, a missed tolerance of the
-        steps, constant steps that are long for sliding, a fidelity that does not suit a block, a
-        predicted error above its tolerance, a run that was broken off, soft blocks that fall in one
-        piece, and joints between stones that fail and are not assessed. The last need the
+        They concern energy drift above 5 % at any step; rotations and displacements too large for a
+        model of small displacements; damping that drags loose blocks; a missed tolerance of the
+        steps; constant steps that are long for sliding; a fidelity that does not suit a block; a
+        predicted error above its tolerance; a run that was broken off; soft blocks that fall in one
+        piece; and joints between stones that fail and are not assessed. The last need the
         structure.
         """
         lines = str(self.dataset.attrs.get("doubts", "")).splitlines()

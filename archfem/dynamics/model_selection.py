@@ -1,9 +1,9 @@
 """Building of models, and selection of a model and time step by predicted error.
 
 The selection runs settings over the strongest part of the motion, each with half the time step of
-the one before, until the predicted error is within the tolerance (`dynamics.error_estimation`). The
-first two share one model, and the second runs about the peaks of the first alone, so that a
-selection takes about as long as the run for which it selects.
+the one before. It ends when the predicted error is within the tolerance
+(`dynamics.error_estimation`). The first two settings share one model, and the second runs about the
+peaks of the first alone. A selection therefore takes about as long as the run for which it selects.
 """
 
 import math

@@ -1,12 +1,12 @@
 """Energy balance and validity of a run, checked after every step.
 
-The work of the ground must be stored or dissipated. With T the kinetic energy, E the potential
-energy of blocks and joints and p the weight, over a step
+The work of the ground must be stored or dissipated. T is the kinetic energy, E the potential energy
+of blocks and joints, and p the weight. Over a step
 
     Δ(T + E(u) - p·u) = W - D,
-    W = -Δu · M r ½ Σ a_g,    D = Δu · ½ Σ (C v + f(u + β v) - f(u)),
+    W = -Δu · M r ½ Σ a_g,    D = Δu · ½ Σ (C v + f(u + β v) - f(u)).
 
-with sums over both ends of the step. Average acceleration satisfies this balance exactly while no
+Sums are over both ends of the step. Average acceleration satisfies this balance exactly while no
 joint opens or closes. Across such an event the trapezoidal rule has an error, and over thousands of
 impacts the errors may add up. The difference of both sides, summed from the start, is the energy
 drift. It is negative for a scheme with numerical damping, such as HHT.

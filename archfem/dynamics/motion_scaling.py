@@ -681,14 +681,14 @@ def collapse_scale(
     sensitive to all parameters, and a result on which two steps disagree is not reliable. One that
     stands where another one falls is run at the scales around that fall, too. Whether a structure
     falls need not be monotonic in the scale. Hence gaps between scales are filled to a ratio of 1.1
-    from half of the smallest fall on and 1.05 from 0.7 of it, or `precision` where that is larger,
-    and the search continues below a fall found there. A window of falls narrower than a gap is
-    found by chance only: for a check at one scale, run that scale.
+    from half of the smallest fall on, and of 1.05 from 0.7 of it. The ratio is `precision` where
+    that is larger. The search continues below a fall found there. A window of falls narrower than a
+    gap is found by chance only: for a check at one scale, run that scale.
 
     Args:
         model: model of large displacements, `build(…, displacements="large")`, or such an
-            `Analysis`, whose settings are then the defaults, but that fill in one piece has one
-            facet on each stone.
+            `Analysis`. The settings of an analysis are then the defaults, except that fill in one
+            piece has one facet on each stone.
         motion: motion to scale, vertical component included.
         start: dead load, computed if not given.
         damping: as for `time_history`.

@@ -1,8 +1,8 @@
 """Time integration schemes and viscous damping of a time history.
 
 Damping forces are C v with C = a M + b K: Rayleigh damping has both parts, stiffness damping b K
-alone. A scheme is given by the weights β, γ of the new acceleration and by the instant
-t + (1 + α) Δt at which forces are taken.
+alone. A scheme has the weights β, γ of the new acceleration, and the instant t + (1 + α) Δt at
+which forces are taken.
 """
 
 from collections.abc import Mapping
@@ -43,9 +43,9 @@ class Rayleigh:
         ratio: damping ratio at both frequencies, ζ [-].
         frequencies: the two frequencies, the lower first; between them damping is below the
             ratio [Hz].
-        joints: what the stiffness part acts on: blocks and the closed part of joints ("closed"),
-            blocks and all joints as if they were closed ("initial", a dashpot even in an open
-            joint), or the blocks alone ("none").
+        joints: bodies on which the stiffness part acts. "closed": blocks and the closed part of
+            joints; "initial": blocks and all joints as if they were closed, a dashpot even in an
+            open joint; "none": the blocks alone.
     """
 
     ratio: float
@@ -237,8 +237,8 @@ class Conserving:
     Displacements are linear over a step, and every force is its mean along that path: blocks and
     closed joints at the middle of the step, joints that open, close or slide by integration. The
     work of a step is then the change of the stored energy plus the energy exchanged by friction,
-    damping and ground motion (averaged vector field, Quispel and McLaren, J. Phys. A 41 (2008)
-    045206; second order). Resultants are means over steps.
+    damping and ground motion. The method is the averaged vector field, of second order (Quispel and
+    McLaren, J. Phys. A 41 (2008) 045206). Resultants are means over steps.
     """
 
     beta = 0.5

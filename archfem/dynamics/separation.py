@@ -285,7 +285,7 @@ def _only_vibrates(model: Model, state: State) -> bool:
     """Return whether blocks move too weakly to overturn on a ground at rest.
 
     The kinetic energy of each block suffices to raise it by less than 2e-4 of the depth of the
-    shallowest part, and no joint is rotated by more than 0.02 rad.
+    shallowest part. No joint is rotated by more than 0.02 rad.
     """
     # A column of slenderness 20, tilted by 0.02 rad, has to rise by 4.5e-3 of its width to overturn
     if _largest_rotation(model, state) > 0.02:

@@ -1,13 +1,14 @@
 """Error of the slip of joints in time stepping, from the mean resultants of consecutive steps.
 
 A joint slides where its shear V is at the limit μ N. Where sliding begins or ends within a step,
-the mean shear differs from that of exact integration by a share of the curvature of V in time, or
-by what the ground's acceleration a varies within the step. The slip errs in a step Δt by
+the mean shear differs from that of exact integration. It differs by a share of the curvature of V
+in time, or by the variation of the ground's acceleration a within the step. The slip errs in a step
+Δt by
 
-    Δs = ½ Δt² c N₀ (ΔV/N - margin),   ΔV/N = max(Δt² |d²(V/N)/dt²| / 6, max |a - mean a| / g),
+    Δs = ½ Δt² c N₀ (ΔV/N - margin),   ΔV/N = max(Δt² |d²(V/N)/dt²| / 6, max |a - mean a| / g).
 
-with N₀ that at rest, and c = 1/m₁ + 1/m₂ of the two blocks, their relative acceleration by 1 N.
-The margin is what V/N lacks to its limit: below it nothing slides.
+N₀ is the normal force at rest, and c = 1/m₁ + 1/m₂ the relative acceleration of the two blocks by 1
+N. The margin is the distance of V/N from its limit: below it nothing slides.
 
 Where a slide turns within a step without rest, the mean shear is that of a turn in its middle. The
 velocity then errs by up to ½ Δt c N₀ |ΔV/N| until it turns or rests again, 1/√3 of that on average.

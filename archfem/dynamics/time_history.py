@@ -80,9 +80,9 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
             varying length by `tolerance`. Accelerations between samples are interpolated.
         tolerance: admissible error of |e| of the joints of rings and piers from time stepping [-],
             without `dt`; by default 0.005. The slip of a joint may err in one step by 4e-4 of its
-            depth times this tolerance. Steps are from 0.1 to 20 ms long; `tolerance_unmet` of
-            the history is the share of the shortest steps in which an error was larger, and
-            `slip_error` the sum of the errors of the slip of the worst joint [m].
+            depth times this tolerance. Steps are from 0.1 to 20 ms long; `tolerance_unmet` of the
+            history is the share of the shortest steps in which an error was larger. Its
+            `slip_error` is the sum of the errors of the slip of the worst joint [m].
         start: dead load, computed if not given, or the `last_state` of an earlier run, which is
             then continued.
         damping: "effective", 5 % at the first mode effective along x about the dead load, or
@@ -92,9 +92,9 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
         scheme: `Conserving` (the default), `Newmark` (average acceleration) or `HHT`; the last two
             for joints that never slide.
         record: which steps are recorded; by default the resultants of every step.
-        until: event that ends the run, or a function of the structure and N, V, M of its joints
-            (n_joints, 3) [N, N, N m] that returns a reason to end it; by default only the end of
-            the motion does.
+        until: event that ends the run, or a function that returns a reason to end it. The function
+            has the structure and N, V, M of its joints (n_joints, 3) [N, N, N m] as arguments. By
+            default only the end of the motion ends the run.
         criteria: failure criteria of joints and number of failures of a mechanism, stored in the
             history. By default those of the event, or else the default `Criteria`.
         newton: settings of Newton's method.

@@ -9,7 +9,7 @@ integrates: exactly along facets at an instant, and so that it conserves energy 
 
 Dilatancy and tensile bonds shift the gap of the normal law. Dilatancy, by saw teeth of the angle ψ,
 opens a joint by tan ψ |s_p|. An intact bond reaches its tensile strength f_t at the gap
-g_t = f_t / k_n, and
+g_t = f_t / k_n. The law
 
     t_n = k_n <g - g_t>_- + f_t,    |t_s| ≤ (c - μ f_t) - μ k_n <g - g_t>_-
 
@@ -199,10 +199,10 @@ class Facets(NormalLaw):
 
         f_i = ∫ w t φ_i,   ∂f_i/∂g_j = ∫ w t' φ_i φ_j.
 
-    Gauss's rule integrates between the places where the facet opens or closes, at an instant, or
-    at the start and at the end of a step. There traction, energy and their means over a step with
-    gaps linear in time are polynomials, which the rule integrates exactly; so the work of a step is
-    the change of energy.
+    Gauss's rule integrates between the places where the facet opens or closes: at an instant, or at
+    the start and at the end of a step. There traction, energy and their means over a step with gaps
+    linear in time are polynomials, which the rule integrates exactly; so the work of a step is the
+    change of energy.
     """
 
     end_count = 2

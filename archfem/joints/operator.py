@@ -1,9 +1,9 @@
 """The joint operator: from generalised coordinates to gaps and slips at joint points, and back.
 
 The sparse operator G takes coordinates q to (opening, slip) at points along the joints, its
-transpose takes forces there to generalised forces. Whatever the coordinates are (nodal
-displacements, rigid motions, modes), the joint forces are Gᵀ f(G q) and their tangent is Gᵀ f' G,
-with the law f of `contact_law`, and the dilatancy and tensile bonds of `normal_law`.
+transpose takes forces there to generalised forces. In all coordinates (nodal displacements, rigid
+motions, modes) the joint forces are Gᵀ f(G q) and their tangent is Gᵀ f' G. The law f is that of
+`contact_law`, with the dilatancy and tensile bonds of `normal_law`.
 
 Joints have memory: the irreversible slip of each point, and the damage of bonds. Forces follow
 from the displacements since the memory was updated.
@@ -397,9 +397,9 @@ class JointOperator:
     def stiffness(self, q: Array) -> Array:
         """Return the point stiffnesses on which the tangent depends, for `tangent_map` (m,) [N/m].
 
-        They are the derivatives of normal forces by gaps for each coupled pair of points, of shear
-        forces by slips for each point, and, if any point slides, of shear forces by gaps for each
-        coupled pair.
+        They are the derivatives of normal forces by gaps for each coupled pair of points, and of
+        shear forces by slips for each point. If any point slides, those of shear forces by gaps
+        follow for each coupled pair.
 
         Args:
             q: coordinates (n,).

@@ -22,8 +22,8 @@ Numbers = NDArray[np.intp]
 class Quadrature:
     """Define a quadrature rule on each facet of a joint.
 
-    Near a hinge the outermost point is the lever arm, so a rule with points at the ends of the
-    joint (Lobatto, trapezoidal, nodal) can reach |e| = 0.5 and a Gauss rule cannot.
+    Near a hinge the outermost point is the lever arm. A rule with points at the ends of the joint
+    (Lobatto, trapezoidal, nodal) can therefore reach |e| = 0.5, and a Gauss rule cannot.
 
     Attributes:
         rule: "lobatto" or "gauss"; "trapezoidal": n equidistant points, the ends with half the

@@ -4,8 +4,8 @@ Signs: N > 0 is compression; M and eccentricity are positive toward the extrados
 where the higher block is pushed toward the extrados by its slip.
 
 Faces of elastic blocks do not stay plane. Their opening and rotation are those of the plane nearest
-to the openings at the joint points, by least squares with the points' areas, and slip is the mean.
-For rigid blocks both are exact.
+to the openings at the joint points, by least squares with the points' areas. Their slip is the
+mean. For rigid blocks both are exact.
 """
 
 from collections.abc import Callable
@@ -40,11 +40,11 @@ if TYPE_CHECKING:
 def face_matrix(operator: JointOperator) -> tuple[sparse.csr_matrix, Array]:
     """Return the matrix from coordinates to gap, rotation and slip of all joints, and its offset.
 
-    With g and s opening and slip at the points of a joint, r their offsets and w their areas,
+    g and s are the opening and slip at the points of a joint, r their offsets and w their areas:
 
-        min Σ w (g - g_0 + θ r)²  over g_0 and θ,      s_0 = Σ w s / Σ w,
+        min Σ w (g - g_0 + θ r)²  over g_0 and θ,      s_0 = Σ w s / Σ w.
 
-    so that θ > 0 opens the intrados, as the moment of a positive eccentricity does.
+    θ > 0 opens the intrados, as the moment of a positive eccentricity does.
     """
     points = operator.points
     mean, slope = _fit_matrices(points.joint, points.weight, points.offset, points.joint_count)
@@ -92,9 +92,9 @@ def joint_dataset(
     Eccentricity is e = M / (N h), from mid-depth, as a fraction of the joint's depth h. A joint
     without compression is open, unless a bond carries tension: its eccentricity and friction are
     undefined (NaN). Opening, rotation and slip follow from displacements alone: `opening` is the
-    largest gap between the faces, at the end that is more open (0 where they touch all over),
-    `rotation` the rotation of the higher face relative to the lower one, positive where it opens
-    the intrados, `slip` the mean displacement of the higher block along the joint, positive toward
+    largest gap between the faces, at the end that is more open (0 where they touch all over).
+    `rotation` is that of the higher face relative to the lower one, positive where it opens the
+    intrados. `slip` is the mean displacement of the higher block along the joint, positive toward
     the extrados.
 
     Args:
@@ -110,10 +110,10 @@ def joint_dataset(
 
     Returns:
         Variables N, V, M, eccentricity and friction, `opening`, `rotation` and `slip` if `faces`
-        is given, and `failure_flags`, over joint, or over time and joint; names, parts, roles,
-        depths, heights of the middles, coefficients of friction and resistances by cohesion of the
-        joints, whether they are assessed, and in walls whether they are head joints, as
-        coordinates; the criteria as attributes.
+        is given, and `failure_flags`, over joint, or over time and joint. The coordinates are
+        names, parts, roles, depths, heights of the middles, coefficients of friction and
+        resistances by cohesion of the joints; whether they are assessed; and in walls whether they
+        are head joints. The attributes are the criteria.
     """
     return xr.Dataset(*joint_variables(structure, resultants, time, criteria, faces, moved))
 

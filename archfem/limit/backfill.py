@@ -1,9 +1,9 @@
 """Backfill in limit analysis: earth pressure, load spreading, linear programme of self-weight.
 
 A fill is not a body here but an action on the stones below it. The structure is cut into vertical
-strips: the weight of each column of fill rests on the stone at its foot, the vertical stress in it
-gives the active and the passive pressure on the stones' faces (Rankine), and a load on the road
-spreads in a fan down to the stones that it meets first (Flamant).
+strips. The weight of each column of fill rests on the stone at its foot. The vertical stress in it
+gives the active and the passive pressure on the stones' faces (Rankine). A load on the road spreads
+in a fan down to the stones that it meets first (Flamant).
 """
 
 from collections.abc import Sequence
@@ -542,9 +542,9 @@ def attach_fill(structure: Structure, fill: object) -> BlocksWithFill:
     if names and fill is None:
         raise InvalidInput(
             f"blocks {names} are softer than the joints around them: rigid, they would hold every "
-            "ring below; give their strength, fill=af.limit.Fill(friction_angle=35.0) or in a "
-            'case fill = { friction_angle = "35 degree" } in [limit], to take them as weight and '
-            "earth pressure, or push a finite-element model over"
+            "ring below; to take them as weight and earth pressure, give their strength: "
+            "fill=af.limit.Fill(friction_angle=35.0), or in a case fill = "
+            '{ friction_angle = "35 degree" } in [limit]; or push a finite-element model over'
         )
     if fill is not None and not names:
         raise InvalidInput(

@@ -4,10 +4,10 @@ The programme of `linear_programme` is set up by `backfill` and solved here; its
 mechanism. Warnings name strength that joints might not have: friction with the dilatancy of
 associated flow, dilatancy that is neglected, and cohesion of joints that are partly open.
 
-Faces of rigid blocks press on an elastic joint linearly, over c = 3 (h/2 - |e|) where the thrust is
-outside the middle third, at any stiffness. A gap transmits no shear, so cohesion acts on the
-closed part only, as in elastic joints. Limit analysis takes it over the whole joint; how much of
-it remains depends on where the thrust of the state is.
+At any stiffness, faces of rigid blocks press linearly on an elastic joint. Where the thrust is
+outside the middle third, they press over c = 3 (h/2 - |e|). A gap transmits no shear, so cohesion
+acts on the closed part only, as in elastic joints. Limit analysis takes it over the whole joint;
+how much of it remains depends on where the thrust of the state is.
 """
 
 from collections.abc import Sequence
@@ -77,12 +77,13 @@ class Collapse(ResultDisplay):
         sliding: numbers of the joints that slide.
         joints: N, V, M and derived quantities, as made by `joint_dataset`, at the factor; of one
             state under self-weight where the factor is infinite, NaN where there is none.
-        motion: velocities of all blocks' centroids and rotations (n_blocks, 3) [m/s, m/s, rad/s],
-            scaled so that the fastest corner has 1 m/s, or those that follow a settlement. Zero
-            where nothing moves. Where it does not stand: the motion of its fall under its weight.
+        motion: velocities of all blocks' centroids and rotations (n_blocks, 3) [m/s, m/s, rad/s].
+            They are scaled so that the fastest corner has 1 m/s, or follow a settlement. Zero where
+            nothing moves. Where the structure does not stand: the motion of its fall under its
+            weight.
         solutions: bounds on all solutions where sliding is without dilatancy; else None.
         soil: pressure of the fill on each piece of a stone's face, with its least and largest
-            possible values [Pa], the number of the block, the piece's ends and the sense of the
+            possible values [Pa]; the number of the block, the piece's ends and the sense of the
             pressure along x; of a `PlasticFill` pressure and shear at both ends; None without fill.
         fill_motion: velocities of a `PlasticFill` by triangle, and strain rates over the largest;
             else None.
@@ -237,57 +238,57 @@ def collapse_factor(
 ) -> Collapse:
     """Find the factor at which live actions, over self-weight, make rigid blocks a mechanism.
 
-    Static theorem: the largest factor for which equilibrium and the joint criteria can both hold,
+    Static theorem: the largest factor for which equilibrium and the joint criteria can both hold:
 
-        max λ   subject to   -G_oᵀ F + G_sᵀ V = f_dead + λ f_live,   F >= 0,   |V| <= c A + μ N,
+        max λ   subject to   -G_oᵀ F + G_sᵀ V = f_dead + λ f_live,   F >= 0,   |V| <= c A + μ N.
 
-    with F the compressions at both ends of each joint, F >= 0 the same as |M| <= N h/2. Its dual
-    is the mechanism of least work: velocities v with f_live·v = 1 and joints that nowhere close,
+    F are the compressions at both ends of each joint; F >= 0 is the same as |M| <= N h/2. The dual
+    programme finds the mechanism of least work: velocities v with f_live·v = 1 and joints that
+    nowhere close,
 
         min c A·|G_s v| - f_dead·v   subject to   G_o v >= μ |G_s v|.
 
     Cohesion c (`Contact.cohesion`) acts on the area A of the whole joint, depth times width, and
-    not only on its closed part: the factor is an upper estimate where a joint with cohesion opens,
-    a warning says so, and `closed_cohesion` reduces it to the closed part of a given state.
-    Tensile strength f_t (`Contact.tension`) yields too, over the depth h: F >= -f_t w h/2 at both
-    ends, so that a hinge resists f_t w h²/2 about its edge. Bonds break where such joints yield: a
-    warning says that the factor is an upper estimate. The dilatancy of contacts plays no part:
-    sliding dilates by μ ("coulomb") or not at all ("nonassociated"), and a warning says so where
-    the latter neglects it.
+    not only on its closed part. Where a joint with cohesion opens, the factor is an upper estimate,
+    and a warning says so; `closed_cohesion` reduces it to the closed part of a given state. Tensile
+    strength f_t (`Contact.tension`) yields too, over the depth h: F >= -f_t w h/2 at both ends, so
+    that a hinge resists f_t w h²/2 about its edge. Bonds break where such joints yield: a warning
+    says that the factor is an upper estimate. The dilatancy of contacts plays no part: sliding
+    dilates by μ ("coulomb") or not at all ("nonassociated"), and a warning says so where the latter
+    neglects it.
 
-    A *settlement* s poses another problem: of all states of equilibrium under self-weight, the
-    movement of a support selects the one that resists it least, and the factor is the work of the
-    weights on it,
+    A *settlement* s poses another problem. Of all states of equilibrium under self-weight, the
+    movement of a support selects the one that resists it least. The factor is the work of the
+    weights on it:
 
-        min F·o_s - V·s_s   subject to   -G_oᵀ F + G_sᵀ V = f_dead,   F >= 0,   |V| <= c A + μ N,
+        min F·o_s - V·s_s   subject to   -G_oᵀ F + G_sᵀ V = f_dead,   F >= 0,   |V| <= c A + μ N.
 
-    with o_s, s_s the openings and slips that the settlement alone would cause. Spreading supports
+    The settlement alone would cause the openings o_s and the slips s_s. Spreading supports
     give the least thrust of an arch and closing supports the greatest.
 
     Args:
         structure: supports are its fixed blocks; or an `archfem.Analysis` of it.
         live: one action, or several that grow together; a `Settlement` stands alone.
-        friction: "coulomb" holds |V| <= c A + μ N with sliding that dilates (associated), so that
-            with sliding joints the factor is an upper estimate and a warning is logged;
-            "nonassociated" searches states whose joints slide without dilating for the weakest;
-            None forbids sliding.
+        friction: "coulomb" holds |V| <= c A + μ N with sliding that dilates (associated). If joints
+            slide, the factor is an upper estimate and a warning is logged; "nonassociated" searches
+            states whose joints slide without dilating for the weakest; None forbids sliding.
         strength: compressive strength σ of the blocks [Pa], which limits |M| to
             N h/2 - N²/(2 σ w), by a rectangular stress block. By default it is the least that the
             materials at assessed joints have, or are given in a case; 56 MPa, the value of the
             preset `STONE`, does not count. Infinite for no limit, "none" in a case. Joints of fill
             in pieces (`jointed_fill`) have their own strength, and not this one.
-        fill: strength of blocks softer than their joints, which become weight and pressures on the
-            stones (`Fill`), with those that rest on them, or a plastic continuum (`PlasticFill`),
-            for which the result has two bounds; None where there are none, or where they are cut
-            into pieces (`jointed_fill`), whose joints have that strength.
+        fill: strength of blocks softer than their joints. These and the blocks on them become
+            weight and pressures on the stones (`Fill`), or a plastic continuum with two bounds of
+            the result (`PlasticFill`). None where there are none, or where they are cut into pieces
+            (`jointed_fill`), whose joints have that strength.
         dead: loads that act beside self-weight and do not grow, such as that of a press.
 
     Returns:
         The factor, the outcome and the mechanism.
 
     Raises:
-        InvalidInput: an option is unknown, an action misses the structure or what can move of it,
-            joints have tensile strength under a settlement, or bodies too soft to be rigid are
+        InvalidInput: an option is unknown; an action misses the structure or its movable part;
+            joints have tensile strength under a settlement; or bodies too soft to be rigid are
             without the strength of a fill.
         DidNotConverge: the solver of linear programmes gave up.
 
@@ -372,11 +373,11 @@ def stands(
 ) -> bool:
     """Check whether rigid blocks can be in equilibrium under their own weight (the safe theorem).
 
-    The programme finds the least forces that would have to be added to the blocks' weights,
+    The programme finds the least forces that would have to be added to the blocks' weights:
 
-        min Σ |r|   subject to   -G_oᵀ F + G_sᵀ V + r = f_dead,   F >= 0,   |V| <= c A + μ N,
+        min Σ |r|   subject to   -G_oᵀ F + G_sᵀ V + r = f_dead,   F >= 0,   |V| <= c A + μ N.
 
-    and the structure stands where they vanish.
+    The structure stands where they vanish.
 
     Args:
         structure: supports are its fixed blocks; or an `archfem.Analysis` of it.

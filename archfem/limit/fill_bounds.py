@@ -1,13 +1,13 @@
 """Bounds on the collapse factor of rigid stones around a fill that is a plastic continuum.
 
 The fill is a Mohr-Coulomb body without tension in plane strain. Its stress is linear in each
-triangle of `fill_mesh` and within the strength at the corners, and so everywhere in the triangle,
+triangle of `fill_mesh` and within the strength at the corners, and so everywhere in the triangle:
 
     √((σ_x - σ_y)² + 4 τ²) <= 2 c cos φ - (σ_x + σ_y) sin φ,   <= -(σ_x + σ_y).
 
 *From below* (Sloan, 1988): stresses in equilibrium at every point, with equal tractions on both
 sides of each edge, prove that the load is carried. *From above* (Makrodimopoulos and Martin, 2007):
-velocities are quadratic in each triangle, so that strain rates are linear, and the power that they
+velocities are quadratic in each triangle, so that strain rates are linear. The power that they
 dissipate is at most that of the rates at the corners. The programme of this bound is solved in its
 dual form: stresses at the corners that are in equilibrium with all such velocities. Between fill
 and stones the velocities of both differ by a quadratic jump; its Bernstein coefficients obey the

@@ -1,8 +1,9 @@
 """Range of a result over what nobody measures of a fill: where its inertia acts, passive pressure.
 
-Horizontal forces on a fill act at the feet of its columns, from where shear carries their moment to
-ends that hold, or at the centroids, where the stones below carry all of it. Its passive pressure
-needs movement to develop. Both are assumed; a result that holds must hold whatever they are.
+Horizontal forces on a fill act at the feet of its columns or at their centroids. From the feet,
+shear carries their moment to ends that hold; at the centroids the stones below carry all of it. Its
+passive pressure needs movement to develop. Both are assumed; a result that holds must hold whatever
+they are.
 """
 
 from collections.abc import Iterable, Mapping, Sequence

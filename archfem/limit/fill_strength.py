@@ -27,7 +27,7 @@ class Fill:
 
     - its weight, column by column, rests on the stone below the column;
     - it presses on the stones' faces horizontally, by anything from the active pressure to a part
-      of the passive one (Rankine, smooth faces), with the vertical stress σ of the columns above,
+      of the passive one (Rankine, smooth faces). With the vertical stress σ of the columns above
 
         a max(K_a σ - 2 c √K_a, 0) <= p <= m (K_p σ + 2 c √K_p),   K_p = 1 / K_a = tan²(45° + φ/2),
 
@@ -121,8 +121,8 @@ class Fill:
     def share(self, slope: Array) -> Array:
         """Return the part of a load that spreads to the left of some rays, shaped as given [-].
 
-        Under a line load on an elastic half-plane stresses are radial (Flamant), so that the force
-        between two rays of the fan is the same on any face that it meets.
+        Under a line load on an elastic half-plane stresses are radial (Flamant). The force between
+        two rays of the fan is therefore the same on any face that it meets.
 
         Args:
             slope: tan θ of rays at θ from the vertical, positive to the right, any shape.

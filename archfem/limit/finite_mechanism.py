@@ -298,10 +298,10 @@ def collapse_path(
 
         α f_live·v + f_dead·v - Σ μ N |G_s v| = 0.
 
-    Where a joint closes, a contact would need tension, or a corner slides off its face, limit
-    analysis on the displaced blocks gives the next mechanism. Forces keep their direction and stay
-    with the points of the blocks on which they act. Joints are rigid, have no cohesion and do not
-    crush: with elastic ones a curve lies below, and tends to this path as displacements grow.
+    A mechanism ends where a joint closes, a contact would need tension, or a corner slides off its
+    face. Limit analysis on the displaced blocks gives the next one. Forces keep their direction and
+    stay with the points of the blocks on which they act. Joints are rigid, have no cohesion and do
+    not crush: with elastic ones a curve lies below, and tends to this path as displacements grow.
 
     Args:
         structure: supports are its fixed blocks; or an `archfem.Analysis` of it.
@@ -314,8 +314,9 @@ def collapse_path(
         Factors, displacements and events; its `curve` is that of a pushover.
 
     Raises:
-        InvalidInput: an option is unknown, an action misses the structure, it does not stand, no
-            factor makes it a mechanism, joints have cohesion or tensile strength, or it has a fill.
+        InvalidInput: an option is unknown; an action misses the structure; the structure does not
+            stand, has a fill, or has joints with cohesion or tensile strength; or no factor makes
+            it a mechanism.
         DidNotConverge: no mechanism was found that moves without the dilatancy of sliding faces.
 
     Example:

@@ -380,8 +380,8 @@ class Programme:
 class Chains:
     """Blocks with two joints, the links, which pass the forces of one on to the other.
 
-    Their balance is solved for the forces of one joint each, the pivots, so that a chain of any
-    length, as a ring, has the unknowns of a single joint.
+    Their balance is solved for the forces of one joint each, the pivots. A chain of any length,
+    such as a ring, then has the unknowns of a single joint.
     """
 
     def __init__(self, balance: sparse.csr_matrix, links: Numbers, pivots: Numbers) -> None:
@@ -400,7 +400,7 @@ class ReducedBalance:
     """Equilibrium in few unknowns v, of which joint forces are x = T v + t, with t of the load.
 
     Limits of the pivots become rows. In other joints forces are sums >= 0 of generators of the
-    friction cone, a compression at either end with a shear of ±μ times it, which need no rows. The
+    friction cone, a compression at either end with a shear of ±μ times it. They need no rows. The
     last of v are z. Programmes of the same friction and columns share it.
     """
 

@@ -119,12 +119,12 @@ def counted_mechanism(
 ) -> Mechanism | None:
     """Find the first instant from which on enough joints have failed at once.
 
-    A wide reading of Demirel and Aldemir (2021): at least four hinging or sliding joints in one
-    ring alone (local), with joints of one pier among the four (semi-global), or of more rings and
-    piers (global); `demirel_aldemir_mechanism` follows their words. A joint that has come apart
-    counts too. The class is that of all joints failed at the instant; `kinds=("local",)` finds
-    four in one ring regardless of further failures. Over time enough joints must have failed for
-    as long as the criteria say, the same ones or others.
+    A wide reading of Demirel and Aldemir (2021) takes at least four hinging or sliding joints. They
+    are in one ring alone (local), have joints of one pier among the four (semi-global), or belong
+    to more rings and piers (global). `demirel_aldemir_mechanism` follows their words. A joint that
+    has come apart counts too. The class is that of all joints failed at the instant;
+    `kinds=("local",)` finds four in one ring regardless of further failures. Over time enough
+    joints must have failed for as long as the criteria say, the same ones or others.
 
     Args:
         joints: over joint, or over time and joint; those of `judged` are counted.
@@ -178,9 +178,8 @@ def demirel_aldemir_mechanism(
     `counted_mechanism`. Open points of the paper are read so: a joint counts once, though it
     hinges and slides; one that has come apart, whose ratios are beyond any limit, counts as failed;
     with joints of one pier it is semi-global, with joints of more global. The number four is that
-    of the criteria, and their hinge is at |e| = 0.46, 8 % short of the 0.5 of the paper's equation,
-    as in its evaluation of the bridge. The paper does not word a duration; it is that of the
-    criteria.
+    of the criteria. Their hinge is at |e| = 0.46, 8 % short of the 0.5 of the paper's equation, as
+    in its evaluation of the bridge. The paper does not word a duration; it is that of the criteria.
 
     Args:
         joints: over joint, or over time and joint.

@@ -5,12 +5,12 @@ Before it is solved, a smaller problem rules out most states. Blocks between whi
 failed are one body; where all are joined to the ground, nothing moves. The gaps g of the joints
 between bodies, openings and slips, are compatible where every closed loop of bodies closes:
 Rᵀ g = 0, with R a basis of the self-stresses, Gᵀ R = 0. A motion that the failed joints permit is
-then a point of a small cone,
+then a point of a small cone:
 
-    Rᵀ g = 0,   g >= 0 where a joint moves one way only,   g = 0 where it does not move,
+    Rᵀ g = 0,   g >= 0 where a joint moves one way only,   g = 0 where it does not move.
 
-three equations a loop (Gordan's alternative: either such a point exists, or a self-stress that
-presses every failed joint shut).
+It has three equations a loop (Gordan's alternative: either such a point exists, or a self-stress
+that presses every failed joint shut).
 """
 
 from dataclasses import dataclass, replace
@@ -135,15 +135,15 @@ def verified_mechanism(
 ) -> VerifiedMechanism:
     """Search for a rigid-block motion that the joints failed at one instant permit.
 
-    The largest motion v, within a box, that opens a joint only where it hinges (away from the face
-    that stays in contact) or has come apart, slides only where friction and cohesion are used up
-    and in the sense of the shear force, and closes none:
+    The motion v is the largest within a box that closes no joint. It opens a joint only where the
+    joint hinges (away from the face that stays in contact) or has come apart. It slides only where
+    friction and cohesion are used up, and in the sense of the shear force:
 
-        max Σ g   subject to   g = G v,   g >= 0 where the joint may move,   g = 0 elsewhere,
+        max Σ g   subject to   g = G v,   g >= 0 where the joint may move,   g = 0 elsewhere.
 
-    with g the openings of both ends and the slip of each joint, and |v| <= 1. Where the maximum is
-    zero the failures are not a mechanism, however many they are. Bodies that yield, such as a
-    fill, are left out. The class is that of the rings and piers that move
+    The gaps g are the openings of both ends and the slip of each joint, and |v| <= 1. Where the
+    maximum is zero the failures are not a mechanism, however many they are. Bodies that yield, such
+    as a fill, are left out. The class is that of the rings and piers that move
     (`select_assessed_parts`); where only other parts can move it is "none".
 
     Args:

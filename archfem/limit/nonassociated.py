@@ -2,8 +2,8 @@
 
 Let φ(R) be the optimum of the linear programme whose joints carry |V| <= R. A state with normal
 forces N is a solution without dilatancy where it is itself an optimum for R = c A + μ N: its
-mechanism slides where |V| = R, opens only ends that carry nothing, and dissipates R |slip|. With y
-the mechanism that is dual to φ, and t(y) its slips, the gap
+mechanism slides where |V| = R, opens only ends that carry nothing, and dissipates R |slip|. The
+mechanism y is dual to φ, and t(y) are its slips. The gap
 
     value(x) + [c A + μ N(x)]·t(y) - [φ(R) + R·t(y)]  >=  0
 

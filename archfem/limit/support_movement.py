@@ -2,8 +2,8 @@
 
 A small movement of a support makes rigid blocks a mechanism, whose hinges the linear programme of
 `collapse_factor` finds. Here the blocks move along with it, by finite rotations, and the programme
-is set up again at their places. With g the present gaps at the ends of the joints, and s those
-that a further movement alone would cause, the forces of
+is set up again at their places. The gaps g at the ends of the joints are the present ones, and s
+those that a further movement alone would cause. The forces of
 
     min (g + s)·x   subject to   A x = f_dead,   F_i, F_e >= 0,
 
@@ -12,9 +12,9 @@ g + s > 0 carry nothing, and hinges close and new ones open where that costs les
 balance the weights in the present geometry the structure falls.
 
 The two faces of a joint move with their blocks and need not coincide any more. An end is open by
-the distance of the higher block's corner from the lower block's face, and slip is counted at the
-end that is nearer to contact. The rates of openings and slip are exact for corners that touch, so
-that the forces of hinges act where the hinges are.
+the distance of the higher block's corner from the lower block's face. Slip is counted at the end
+that is nearer to contact. The rates of openings and slip are exact for corners that touch, so that
+the forces of hinges act where the hinges are.
 """
 
 from contextlib import suppress

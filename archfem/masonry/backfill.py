@@ -5,11 +5,11 @@ is divided by its medians into six (the kisrhombille tiling). A slip line of any
 within 15° of such a direction, which bounds the error in strength; see `jointed_fill`. Bricks or
 hexagons, whose joints are not continuous, would interlock and could not fail like soil.
 
-All compliance is in the joints. A piece is the mirror image of its neighbour in their joint, so
-the incentres are 2 r apart on its normal, with r the radius of the inscribed circle. Joints of
-stiffness E / 2 r in both directions strain like a homogeneous body of modulus E and Poisson's ratio
-zero under any uniform stress, for any size of the pieces. The argument is that of Bolander and
-Saito, Engineering Fracture Mechanics 61 (1998) 569-591, for Voronoi cells.
+All compliance is in the joints. A piece is the mirror image of its neighbour in their joint. The
+incentres are therefore 2 r apart on its normal, with r the radius of the inscribed circle. Joints
+of stiffness E / 2 r in both directions strain like a homogeneous body of modulus E and Poisson's
+ratio zero. They do so under any uniform stress, for any size of the pieces. The argument is that of
+Bolander and Saito, Engineering Fracture Mechanics 61 (1998) 569-591, for Voronoi cells.
 """
 
 from collections.abc import Iterator, Sequence

@@ -16,9 +16,9 @@ finish. Measurements are to be preferred: `fit_closing` takes them.
 References:
     Bandis, Lumsden and Barton, Int. J. Rock Mech. Min. Sci. 20 (1983) 249-268: closure, initial
     stiffness, joints that do not match. Barton and Bandis, Proc. 23rd US Symp. Rock Mech. (1982)
-    739-760: aperture. Barton and Choubey, Rock Mech. 10 (1977) 1-54: shear stiffness to the peak,
-    and profiles of JRC 0.4, 2.8, 5.8, 6.7, 9.5, 10.8, 12.8, 14.5, 16.7 and 18.7, with which the eye
-    compares a face. Vanin, Zaganelli, Penna and Beyer (2017), doi 10.1007/s10518-017-0188-5: moduli
+    739-760: aperture. Barton and Choubey, Rock Mech. 10 (1977) 1-54: shear stiffness to the peak;
+    profiles with which the eye compares a face, of JRC 0.4, 2.8, 5.8, 6.7, 9.5, 10.8, 12.8, 14.5,
+    16.7 and 18.7. Vanin, Zaganelli, Penna and Beyer (2017), doi 10.1007/s10518-017-0188-5: moduli
     of the walls of Vasconcelos and Lourenço (2009) and Lourenço et al. (2005) by their stress.
     Lourenço, Computational strategies for masonry structures, Delft (1996): k_s by elasticity.
     Demirel and Aldemir, Buildings 11 (2021): 1.48 and 0.30 MPa/mm.
@@ -188,13 +188,14 @@ def face_closing(
 ) -> tuple[float, float]:
     """Return the stiffness and the closure of mated faces from their roughness and strength.
 
-    With JRC the roughness, JCS the strength of the faces, σ_c that of the stone [MPa] and a the
-    aperture without load [mm],
+    JRC is the roughness, JCS the strength of the faces, σ_c that of the stone [MPa] and a the
+    aperture without load [mm]:
 
         a = JRC / 5 (0.2 σ_c / JCS - 0.1),   k_i = -7.15 + 1.75 JRC + 0.02 JCS / a [GPa/m],
-        δ_m = -0.1032 - 0.0074 JRC + 1.135 (JCS / a)^-0.251 [mm],
+        δ_m = -0.1032 - 0.0074 JRC + 1.135 (JCS / a)^-0.251 [mm].
 
-    cut off at 0.1 GPa/m and 1 µm. The regressions are of joints that were loaded three times.
+    Both are cut off, at 0.1 GPa/m and 1 µm. The regressions are of joints that were loaded three
+    times.
 
     Args:
         roughness: joint roughness coefficient JRC, 0.4 to 20 [-].
@@ -247,9 +248,9 @@ def joint_stiffness(
 ) -> JointStiffness:
     """Estimate the range of stiffness and closure of joints from stone, finish and stress.
 
-    JRC is 2 to 4 for sawn faces, 4 to 8 for dressed and 6 to 12 for hewn and weathered ones, JCS
-    over σ_c is 1, 1, 0.6 and 0.33: judgement. `face_closing` gives the law of mated faces, and
-    others close 1 to 4 times as far. The usual law is the geometric mean of the softest and the
+    JRC is 2 to 4 for sawn faces, 4 to 8 for dressed and 6 to 12 for hewn and weathered ones. JCS
+    over σ_c is 1, 1, 0.6 and 0.33. Both are judgement. `face_closing` gives the law of mated faces,
+    and others close 1 to 4 times as far. The usual law is the geometric mean of the softest and the
     stiffest at the stress. A bed of weak mortar fills the aperture: 0.1 to 1 GPa on 10 mm, linear.
 
     A joint between rigid blocks also includes the flexibility of the stone up to the next joint, in
@@ -307,8 +308,8 @@ def joint_stiffness(
 def with_finish(structure: Structure, finish: str, contact: Contact | None = None) -> Structure:
     """Return a structure whose joints of stones have the usual law of closing of a finish.
 
-    Stiffnesses and closure are those of `joint_stiffness` at 0.05 MPa by the strength of the weaker
-    stone of a joint, 56 MPa where none is given. All else of its contact stays.
+    Stiffnesses and closure are those of `joint_stiffness` at 0.05 MPa, by the strength of the
+    weaker stone of a joint. It is 56 MPa where none is given. All else of its contact stays.
 
     Args:
         structure: structure of the joints.

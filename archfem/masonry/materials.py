@@ -88,15 +88,15 @@ class Contact:
     friction μ (Itasca, 3DEC: Mohr-Coulomb joint model with zero residual values). Breaking is
     checked at the end of each load step or time step.
 
-    With fracture energies a bond softens linearly. Strengths are (1 - D) f_t and (1 - D) c, with
-    the damage D, up to 1, from the irreversible opening κ_n and all slip κ_s of a point,
+    With fracture energies a bond softens linearly. Strengths are (1 - D) f_t and (1 - D) c. The
+    damage D, up to 1, follows from the irreversible opening κ_n and all slip κ_s of a point:
 
-        D = κ_n f_t / (2 G_I) + κ_s c / (2 G_II),
+        D = κ_n f_t / (2 G_I) + κ_s c / (2 G_II).
 
-    so that opening alone takes G_I to full separation, and slip alone G_II beside friction
-    (isotropic softening of Lourenço, Delft (1996), section 4.2, with his exponential as a line).
-    Unloading is elastic; faces touch again where the joint is closed, and pull again from κ_n on.
-    D grows at the end of each load step, until it is in balance, or of each time step.
+    Opening alone takes G_I to full separation, and slip alone G_II beside friction. This is the
+    isotropic softening of Lourenço (Delft, 1996, section 4.2), with his exponential as a line.
+    Unloading is elastic; faces touch again where the joint is closed, and pull again from κ_n on. D
+    grows at the end of each load step, until it is in balance, or of each time step.
 
     Attributes:
         normal_stiffness: compression per closing of the joint, k_n [Pa/m].

@@ -4,9 +4,9 @@ Blocks and joints may state the role of their part (`Block.role`, `Joint.role`).
 the part's name decide, with a warning where they are ambiguous.
 
 The direction of a ring orders and names its joints. A circle is fitted to the mid-points of the
-joints between its stones (Kåsa, IEEE Transactions on Instrumentation and Measurement 25 (1976) 8),
-and for few stones to their centroids as well. Only directions are derived from it, so elliptic and
-pointed arches are covered.
+joints between its stones (Kåsa, IEEE Transactions on Instrumentation and Measurement 25 (1976) 8).
+For few stones it is fitted to their centroids as well. Only directions are derived from it, so
+elliptic and pointed arches are covered.
 """
 
 import re

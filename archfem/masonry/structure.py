@@ -327,8 +327,9 @@ class Structure(ResultDisplay):
             slip: of the higher block, positive toward the extrados (…, n_joints) [m].
 
         Returns:
-            Length, at least 0, and middle of the overlap toward the extrados, from the mean of
-            both places of the joint's middle, on either face, (…, n_joints) [m].
+            Length of the overlap, at least 0, and its middle (…, n_joints) [m]. The middle is
+            measured toward the extrados, from the mean of both places of the joint's middle, on
+            either face.
         """
         # Each end of the overlap is that of the face which ends first. It moves by half the slip
         # with either face, relative to the mean of both.

@@ -7,7 +7,7 @@
     export          DXF, VTU and meshio files of one state
     fem             finite elements: gmsh meshes, function spaces and UFL forms
     large           models with large displacements, in corotational coordinates
-    linear_blocks   linear or rigid blocks between joints, and what is read from them
+    linear_blocks   linear or rigid blocks between joints, and their stress
     model           protocol Model, Prediction, cells for drawing
     programs        input of OpenSees and 3DEC
     reference       all nodes; reference model: UFL forms of joints assembled anew

@@ -24,8 +24,8 @@ MODEL_FIDELITIES = ("rigid", "faces", "condensed", "full", "monolithic")
 class Discretisation:
     """Define fidelity, mesh and quadrature of a model.
 
-    Numbers of cells are minima: a side has more where a neighbour needs them, where it bends or
-    touches at more points, or where cells of a polygon would be longer than twice its thickness.
+    Numbers of cells are minima. A side has more where a neighbour needs them, or where it bends or
+    touches at more points. Cells of a polygon are at most twice as long as its thickness.
 
     Attributes:
         fidelity: "rigid", "faces", "condensed", "full" or "monolithic"; or one of the first four

@@ -370,8 +370,8 @@ class Model(Protocol):
     def memory(self) -> Array:
         """Irreversible slip of each joint point (p,) [m].
 
-        Where any joint has tensile strength, the damage of bonds follows, 1 if broken (2 p,), and
-        where any softens, their irreversible openings (3 p,) [m].
+        Where any joint has tensile strength, the damage of bonds follows, 1 if broken (2 p,). Where
+        any joint softens, the irreversible openings of bonds follow too (3 p,) [m].
         """
 
     def with_memory(self, memory: Array) -> Self:

@@ -39,8 +39,8 @@ def write_model(structure: Structure, path: str | Path, *, points: int = 5) -> P
         The file.
 
     Raises:
-        InvalidInput: the suffix is another, joints have cohesion, tension, dilatancy, closure or a
-            law of the user, or 3DEC or UDEC would get a block that is not convex.
+        InvalidInput: the suffix is another; joints have cohesion, tension, dilatancy, closure or a
+            law of the user; or 3DEC or UDEC would get a block that is not convex.
     """
     path = Path(path)
     writers = {

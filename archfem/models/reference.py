@@ -3,12 +3,12 @@
 Both are of elastic blocks, meshed by gmsh and assembled by DOLFINx. The reference assembles the
 weak forms of its joints at every iteration; it is the independent check of the other models.
 
-For a step along which displacements are linear from u_0 to u_1, with the tractions of
-`joints.contact_law` averaged over the step, internal forces are, for all v,
+Displacements are linear along a step, from u_0 to u_1, and the tractions of `joints.contact_law`
+are averaged over it. Internal forces are, for all v,
 
-    ∫ w σ(ū):ε(v) + Σ_joints ∫ w (<t_n> ⟦v⟧·n + <t_s> ⟦v⟧·t),    ū = (½ - λ) u_0 + (½ + λ) u_1,
+    ∫ w σ(ū):ε(v) + Σ_joints ∫ w (<t_n> ⟦v⟧·n + <t_s> ⟦v⟧·t),    ū = (½ - λ) u_0 + (½ + λ) u_1.
 
-with λ = β/Δt of damping with the time lag β, which also shifts gaps to g + λ Δg. Friction over the
+With the time lag β of damping, λ = β/Δt; the lag also shifts gaps to g + λ Δg. Friction over the
 step is limited by μ |<t_n>| + c times the part of it for which the joint is closed.
 """
 

@@ -359,8 +359,8 @@ class TableSpectrum:
 class Ntc2018(CodeSpectrum):
     """Elastic spectra of the Italian technical standards for constructions of 2018.
 
-    Horizontal: a_g S η F_0 (T/T_B + (1 - T/T_B)/(η F_0)), a_g S η F_0 from T_B = T_C/3, times T_C/T
-    from T_C = C_C T_C* and T_C T_D/T² from T_D = 4 a_g/g + 1.6 s to 4 s, with S = S_S S_T.
+    Horizontal: a_g S η F_0 (T/T_B + (1 - T/T_B)/(η F_0)); a_g S η F_0 from T_B = T_C/3; times T_C/T
+    from T_C = C_C T_C*; times T_C T_D/T² from T_D = 4 a_g/g + 1.6 s to 4 s. S = S_S S_T.
     Vertical: the same with the factor F_v = 1.35 F_0 √(a_g/g) in place of F_0, S_S = 1 and periods
     of its own.
     η = √(10/(5 + ξ)) >= 0.55 with the damping ξ in per cent.
@@ -470,8 +470,8 @@ class Asce2022(CodeSpectrum):
 class Eurocode2024(CodeSpectrum):
     """Horizontal elastic spectrum of EN 1998-1-1:2024 with the recommended values, 5 % damping.
 
-    With S_α = F_T F_α S_α,RP and S_β = F_T F_β S_β,RP: S_α/F_A to T_A = 0.02 s, straight to S_α at
-    T_B = T_C/χ within 0.05 and 0.1 s, S_β/T from T_C = S_β/S_α, S_β T_D/T² from T_D = 2 s, or
+    With S_α = F_T F_α S_α,RP and S_β = F_T F_β S_β,RP: S_α/F_A to T_A = 0.02 s; straight to S_α at
+    T_B = T_C/χ within 0.05 and 0.1 s; S_β/T from T_C = S_β/S_α; S_β T_D/T² from T_D = 2 s, or
     1 + S_β,RP/(m/s²) s where that is more, to 4 s; F_A = 2.5 and χ = 4.
 
     The site factors F_α and F_β depend on category, depth and stiffness of the ground and on the

@@ -49,9 +49,9 @@ class Hazard:
     Attributes:
         intensity: intensities, ascending (n,) [m/s² or m/s].
         rate: annual rates at which they are exceeded, descending (n,) [1/year].
-        measure: "pga", "pgv", "sa" at `period`, or "sa_avg", the geometric mean of Sa over periods
-            from 0.2 to 3 times that of the structure (Eads, Miranda and Lignos, Earthq. Eng.
-            Struct. Dyn. 44 (2015) 2057-2073).
+        measure: "pga", "pgv", "sa" at `period`, or "sa_avg". The last is the geometric mean of Sa
+            over periods from 0.2 to 3 times that of the structure (Eads, Miranda and Lignos,
+            Earthq. Eng. Struct. Dyn. 44 (2015) 2057-2073).
         period: of "sa" [s]; None takes that of the structure.
         source: where the curve is from, such as a map with its edition; "" if that is not known.
 

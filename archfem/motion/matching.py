@@ -58,12 +58,12 @@ def matched(
 
     The component is corrected for its baseline, scaled, then corrected by iteration. In each
     iteration, oscillator i of 100 reaches its peak R_i at the time t_i. Wavelet j is placed so that
-    its response of oscillator j peaks at t_j. With C_ij its response of oscillator i at t_i, the
-    amplitudes b solve
+    its response of oscillator j peaks at t_j. C_ij is its response of oscillator i at t_i, and S_i
+    is the target. The amplitudes b solve
 
-        min  Σ_i ((Σ_j C_ij b_j + R_i - S_i sign R_i) / S_i)²  +  λ² |b|²,
+        min  Σ_i ((Σ_j C_ij b_j + R_i - S_i sign R_i) / S_i)²  +  λ² |b|².
 
-    with the target S_i. The wavelets have the width of Al Atik and Abrahamson. They are second
+    The wavelets have the width of Al Atik and Abrahamson. They are second
     differences of a displacement, a cosine under a Gauss bell that vanishes at the ends of the
     record: the final velocity and displacement are unchanged to round-off. Where the spectrum
     starts at period zero, the peak acceleration is corrected as well. Horizontal components are

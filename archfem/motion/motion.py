@@ -38,8 +38,8 @@ class Motion(ResultDisplay):
             date; None where nothing states it, and components added begin with this motion.
 
     Raises:
-        InvalidInput: a component is no row of finite numbers up to 5 g, or dt is no
-            positive number, or above 2 s for more than ten samples.
+        InvalidInput: a component is no row of finite numbers up to 5 g; or dt is no positive
+            number, or above 2 s for more than ten samples.
     """
 
     horizontal: Array

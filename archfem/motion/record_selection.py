@@ -280,9 +280,9 @@ def select_records(
     Files of one instrument are joined where their names differ by the direction alone: vertical and
     second horizontal accompany the horizontal that is selected. Each record is scaled to the least
     square of its ratio to the design spectrum minus 1; one further factor brings the mean of the
-    set within the rule. Sets are built record by record from the best 30 ones, then improved by
-    exchanging single records until no exchange lowers the root mean square of the mean's ratio
-    minus 1. The search is deterministic, and need not find the best of all sets.
+    set within the rule. Sets are built record by record from the best 30 ones. Single records are
+    then exchanged until no exchange lowers the root mean square of the mean's ratio minus 1. The
+    search is deterministic, and need not find the best of all sets.
 
     At most one record of each event is selected. The event is the date of the earthquake in the
     head of a file or in its name, else PEER's name for it: all earthquakes of a day are one event.

@@ -185,8 +185,8 @@ def rotated_spectrum(
     """Return a percentile of the pseudo-acceleration spectra over all horizontal directions.
 
     The response of a pair of components is u(θ) = cos θ u₁ + sin θ u₂. Its largest value over time
-    is found for θ = 0, 1, … 179°, as `response_spectrum` finds it, and the percentile is that over
-    the directions, at each period by itself.
+    is that of `response_spectrum`, for θ = 0, 1, … 179°. The percentile is that over the
+    directions, at each period by itself.
 
     Args:
         motion: ground motion with a transverse component.

@@ -248,8 +248,9 @@ def generate_enveloped_noise(
     """Generate one component of an artificial accelerogram with a peak of 1.
 
     White noise is given the Kanai-Tajimi spectrum with Clough and Penzien's high-pass at a tenth of
-    the ground's frequency, grows over 15 % of the duration, stays for 35 % and fades exponentially
-    (Jennings, Housner and Tsai). The corrected baseline ends at zero velocity and displacement.
+    the ground's frequency. It grows over 15 % of the duration, stays for 35 % and fades
+    exponentially (Jennings, Housner and Tsai). The corrected baseline ends at zero velocity and
+    displacement.
 
     References:
         Clough, Penzien, Dynamics of structures (1993). Jennings, Housner, Tsai, Simulated

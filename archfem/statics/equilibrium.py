@@ -606,8 +606,8 @@ def _doubt_support(structure: Structure, numbers: Sequence[int], part: str) -> D
     return Doubt(
         f"{names} at ({x:.2f}, {y:.2f}) m cannot move, but stands between {within}: what it holds "
         "is far stronger than a structure in which it moves",
-        "take fixed from it, in a drawing by its layer, or, if it is a support, give the stones on "
-        "either side of it parts of their own",
+        "take fixed from it, in a drawing by its layer, or, if it is a support, give the stones "
+        "beside it parts of their own",
     )
 
 

@@ -60,8 +60,8 @@ def forces_on(
 ) -> FreeBody:
     """Compute the forces on one block at rest: the resultants of its joints, and its weight.
 
-    With n the joint's normal, from its lower to its higher block, and t its tangent, toward the
-    extrados, the force on the higher block is N n - V t, on the lower one the opposite. It acts
+    The joint's normal n is from its lower to its higher block, and its tangent t is toward the
+    extrados. The force on the higher block is N n - V t, on the lower one the opposite. It acts
     where the thrust line crosses the joint, e h from mid-depth; where N is zero, at mid-depth.
     Under dead load the forces close; under shaking their sum is the block's inertia force.
 

@@ -1,17 +1,17 @@
 """Kinematic assessment: a collapse mechanism against a design spectrum, by force and displacement.
 
-The mechanism becomes an oscillator of one degree of freedom. With the weights P of all that moves
-and their horizontal virtual displacements δ at rest, it has the participating mass and the share
+The mechanism becomes an oscillator of one degree of freedom. P are the weights of all that moves,
+and δ their horizontal virtual displacements at rest. The participating mass and its share are
 
-    M* = (Σ P δ)² / (g Σ P δ²),   e* = g M* / Σ P,
+    M* = (Σ P δ)² / (g Σ P δ²),   e* = g M* / Σ P.
 
-and its spectral acceleration and displacement are those of a control point C along the finite path,
+Spectral acceleration and displacement are those of a control point C along the finite path:
 
     a* = α g / e*,   d* = d_C Σ P δ² / (δ_C Σ P δ).
 
 a*(d*) is the capacity curve; it begins at a₀* and vanishes at d₀*. C is the centroid that moves
-fastest along x at rest. The checks compare a₀* with the ground acceleration, raised by a behaviour
-factor, and a share of d₀* with the displacement spectrum at a secant period.
+fastest along x at rest. The checks compare a₀*, raised by a behaviour factor, with the ground
+acceleration. They compare a share of d₀* with the displacement spectrum at a secant period.
 
 References:
     Circolare 21 January 2019 n. 7 C.S.LL.PP. on the NTC 2018, C8.7.1.2.1.1 to C8.7.1.2.1.8.
@@ -240,7 +240,7 @@ class KinematicAssessment(ResultDisplay):
             return []
         ratios = join_names([f"{check.ratio:.3g} by {check.name}" for check in whole.checks])
         return [
-            "weights are at the centroids of blocks, and one for each body that moves as one gives "
+            "weights are at the centroids of blocks: one for each body that moves as one gives "
             f"e* = {whole.e_star:.3f}, and the spectrum may be as strong as {ratios}"
         ]
 
@@ -269,14 +269,14 @@ def kinematic_assessment(  # noqa: PLR0913  (the factors of the codes are argume
 
     - *linear*: q a₀* / FC against the ground acceleration, that of the spectrum at T = 0;
     - *displacement*: d_u* as a share of d₀* against the displacement spectrum at the period of the
-      limit state, with the accelerations of the curve divided by FC. A mechanism that the ground
-      acceleration does not set in motion, a₀* / FC above it, passes as well. There is none for a
-      mechanism without a finite motion, such as most wedges of walls in bond, nor for one that
-      slides without turning, whose factor does not fall as it moves.
+      limit state. The accelerations of the curve are divided by FC. A mechanism that the ground
+      acceleration does not set in motion, a₀* / FC above it, passes as well. There is no check of a
+      mechanism without a finite motion, such as most wedges of walls in bond. Nor is there one
+      where the mechanism slides without turning, and its factor does not fall as it moves.
 
     A fill, bodies softer than their joints, counts by its weight and mass on the stones below,
     column by column; with its strength, `fill`, it presses on them as in `collapse_factor`. Along
-    the motion pressures are those of the weights as built, active on faces that move away and
+    the motion pressures are those of the weights as built: active on faces that move away, and
     passive on those that move into the fill. The mechanism must stand on the ground: spectra at a
     height of a building are not built here; give one as a `TableSpectrum`, or a `Motion`.
 
@@ -556,8 +556,8 @@ class _Oscillator:
         found, collapse = [], self.path.mechanisms[0].factor
         if self.placed.fill is not None:
             found.append(
-                "the pressures of the fill on the stones are those of the weights as built, all "
-                "along the motion, and that the fill stays in place is not checked"
+                "all along the motion the pressures of the fill on the stones are those of the "
+                "weights as built: that the fill stays in place is not checked"
             )
         if any(any(load.force) for load in self.placed.loads):
             found.append(
@@ -573,8 +573,8 @@ class _Oscillator:
             why = "this mechanism begins, and its contacts permit no finite motion"
             if self.path.end is PathEnd.SLIDES:
                 why = (
-                    "this mechanism slides without turning, alpha does not fall as it moves, and "
-                    "where the faces or the ground end in the drawing is no capacity"
+                    "this mechanism slides without turning and alpha does not fall as it moves; "
+                    "the end of the faces or of the ground in the drawing is no capacity"
                 )
             found.append(
                 f"{why}: there is no displacement check, and what it withstands beyond its start, "

@@ -1,8 +1,7 @@
 """Pushover: a load grows, or a support moves, until the structure resists no more.
 
-`continuation` adds one equilibrium after the other; here are the length of the steps, relaxation
-where steps fail and joints slide, the rules that end a pushover, and the extrapolation of its
-limit.
+`continuation` adds one equilibrium after the other. This module has the length of the steps,
+relaxation where they fail and joints slide, stopping rules, and the extrapolation of the limit.
 """
 
 from collections.abc import Sequence
@@ -77,8 +76,8 @@ class Pushover(ResultDisplay):
     Attributes:
         curve: over step, the factor [-], the displacement of the load along itself since the dead
             load [m], and the number of Newton iterations; step 0 is the dead load. For a settlement
-            the displacement is that of the support's fastest corner, and the factor the work of the
-            weights on a unit of the settlement, as in `collapse_factor` [N m].
+            the displacement is that of the support's fastest corner. The factor is then the work of
+            the weights on a unit of the settlement, as in `collapse_factor` [N m].
         joints: N, V, M and derived quantities over step and joint.
         hinges: joints in the order in which they first hinge, with the face that stays in contact.
         hinge_steps: step at which each of them first hinges.
@@ -142,16 +141,16 @@ def pushover(
 ) -> Pushover:
     """Let a load grow over the dead load, and follow the equilibrium.
 
-    In each step the unknowns are q and the factor λ, with one more equation,
+    In each step the unknowns are q and the factor λ, with one more equation:
 
-        f(q) = f_dead + λ f_live,   a d(q) / d_1 + b λ / λ_1 = s,
+        f(q) = f_dead + λ f_live,   a d(q) / d_1 + b λ / λ_1 = s.
 
-    where d = f_live·q / |f_live| is the displacement of the load along itself: a = 0 is control by
-    force, b = 0 by displacement, and for arc length (a, b) is the direction of the last step, in
-    units of the first, so that it turns from one to the other as the curve bends (Riks). Steps
-    grow by a tenth each. Where Newton's method fails and joints slide, as those of fill in pieces
-    do, the load grows by itself, and the structure is relaxed to rest under it; else steps are
-    halved.
+    Here d = f_live·q / |f_live| is the displacement of the load along itself. Control is by force
+    where a = 0, by displacement where b = 0. For arc length, (a, b) is the direction of the last
+    step, in units of the first. Control then turns from one to the other as the curve bends (Riks).
+    Steps grow by a tenth each. Where Newton's method fails and joints slide, as those of fill in
+    pieces do, the load grows by itself. The structure is then relaxed to rest under it; else steps
+    are halved.
 
     Displacements are small and the joint law is the gradient of a convex energy: the curve never
     falls nor snaps back, but rises to the limit of rigid blocks as an asymptote. The thrust at a

@@ -13,8 +13,8 @@ then updated from the solution and the step is repeated, first with limits that 
 
 Slip changes no force in a flat dry joint. Dilatancy raises the blocks that have slid, and a bond
 that breaks releases its force: then equilibrium is solved again, from the present state, until
-nothing slides or breaks any more. Of overstrained bonds those break first where each joint opens
-most, so that a crack grows from its tip, and stops where the rest bears the load.
+nothing slides or breaks any more. The overstrained bonds where each joint opens most break first. A
+crack thus grows from its tip, and stops where the rest bears the load.
 
 Where joints slide a structure has many equilibria, and the loading path decides between them. A
 search therefore starts near the last equilibrium, and joint memory is taken from equilibria alone.

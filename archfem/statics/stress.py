@@ -133,13 +133,13 @@ def strength_use_over(model: Model, run: xr.Dataset) -> xr.Dataset:
 def joint_stress(structure: Structure, joints: xr.Dataset) -> xr.DataArray:
     """Compute the largest compression at the edge of each joint, from N and e, without tension.
 
-    With traction linear along the joint, over its whole depth while the resultant stays in the
-    middle third and over three times the distance to the nearer edge beyond it,
+    The traction is linear along the joint. It acts over the whole depth while the resultant stays
+    in the middle third. Beyond it, it acts over three times the distance to the nearer edge:
 
         σ = N / (w h) (1 + 6 |e|)   for |e| <= 1/6,   σ = 2 N / (3 w h (1/2 - |e|))   above.
 
-    In a ring it lies some per cent above the peak of a converged field, 5 % at |e| = 0.4, where a
-    field on 4 × 4 cells a stone is 20 % below. It grows without bound as |e| nears 0.5: a block
+    In a ring it lies some per cent above the peak of a converged field, 5 % at |e| = 0.4. A field
+    on 4 × 4 cells a stone is 20 % below there. It grows without bound as |e| nears 0.5: a block
     that turns about a line. In an open joint it is zero.
 
     Args:

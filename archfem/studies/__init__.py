@@ -7,7 +7,7 @@
     convergence      order, limit and error bar; accuracy of a case
     ensemble         histories under many motions, scales and properties, reduced
     evaluators       functions from a case to a flat table
-    fork_server      loads what workers share
+    fork_server      modules that workers share
     fragility        fragility functions
     ida              incremental dynamic analysis
     joint_stiffness  influence of joint stiffness on findings

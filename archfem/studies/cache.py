@@ -1,8 +1,8 @@
 """Cache of one process between points of a study: models, damping, modes, motions.
 
-The points of a study often differ in few keys. Everything that a later point shares with an earlier
-one, by the contents of its case and files, is taken from here, and has the same bits as if it were
-computed anew.
+The points of a study often differ in few keys. The cache returns everything that a later point
+shares with an earlier one, by the contents of its case and files. Its results have the same bits as
+if they were computed anew.
 """
 
 from collections.abc import Callable

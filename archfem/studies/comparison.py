@@ -35,9 +35,9 @@ class Finding:
         mass: mass ratio of this mode along x [-].
         roles: roles, "ring" or "pier", by part.
         dead: largest |e| under dead load by part [-].
-        runs: by pair the largest `eccentricity` and `friction` of each part [-], the kind and time
-            [s] of the first of the `mechanisms` by definition, how the run `ended`, this as a
-            sentence, `outcome`, and the state after a collapse, `fall`, for large displacements.
+        runs: by pair the largest `eccentricity` and `friction` of each part [-]; the kind and time
+            [s] of the first of the `mechanisms` by definition; the end of the run, `ended`, and as
+            a sentence, `outcome`; and for large displacements the state after a collapse, `fall`.
         scales: by pair and definition the smallest failing scale and the largest scale below it
             that survives [-]; infinite if none fails.
         search: options of the search for scales; None without a search.
@@ -77,11 +77,12 @@ def study_table(findings: Mapping[str, Finding]) -> str:
     """Return two tables with a line for each case.
 
     The first table is for the motions as the cases apply them. It has the first mode, the largest
-    |e| of rings and piers (median over the pairs), and the number of pairs with a mechanism, by
-    definition and by the classes of Demirel and Aldemir. For large displacements it has the number
-    of pairs in which blocks fall. Incomplete runs count with their part before the failure and are
-    listed below. The second table, if scales were searched, has the median and range over the pairs
-    of the scale of the whole motion at the first mechanism.
+    |e| of rings and piers (median over the pairs), and the number of pairs with a mechanism.
+    Mechanisms are counted by definition and by the classes of Demirel and Aldemir. For large
+    displacements it has the number of pairs in which blocks fall. Incomplete runs count with their
+    part before the failure and are listed below. The second table exists if scales were searched.
+    It has the median and range over the pairs of the scale of the whole motion at the first
+    mechanism.
 
     Args:
         findings: findings by name of the case.

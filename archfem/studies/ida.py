@@ -157,9 +157,10 @@ class Ida(ResultDisplay):
 
     Attributes:
         table: over `motion` the intensity measures of the unscaled motions, the `period` of the
-            first mode [s], and by limit state the smallest failing scale, with ", survives" the
-            largest surviving scale below it, and with ", survives above" the number of surviving
-            runs above it; over `motion` and `entry` the `scale` and the demands of each run.
+            first mode [s], and by limit state the smallest failing scale. Names with ", survives"
+            have the largest surviving scale below it; those with ", survives above" the number of
+            surviving runs above it. Over `motion` and `entry` the `scale` and the demands of each
+            run.
         doubts: reasons why scales of collapse may be wrong, each with its remedy.
     """
 

@@ -63,8 +63,8 @@ class Study:
             distribution of SciPy; or a list of such tables, one for each point. A path is that of a
             key in a case file, "motion.scale"; a keyword of `archfem.Analysis` stands for itself,
             "dt" for "analysis.dt". "suite.pair" varies the pair of the suite.
-        compute: "history", "scales", "dead load", "limit", "rating", a function of a case that
-            returns a flat table of numbers and texts, or a table of `name` and options; by default
+        compute: "history", "scales", "dead load", "limit" or "rating"; a function of a case that
+            returns a flat table of numbers and texts; or a table of `name` and options. By default
             "history", or "dead load" without a motion.
         motion: motion of an analysis, or in place of that of a case.
         samples: settings of the sampling, { "count": 64, "method": "sobol", "seed": 1 }.

@@ -106,8 +106,8 @@ def verdict_range(  # noqa: PLR0913  (one call, one argument for each thing that
 ) -> VerdictRange:
     """Run a structure under a motion with large displacements, for ranges of uncertain properties.
 
-    The run as given comes first, then each property at each of its values alone, then a Latin
-    hypercube over all (McKay, Beckman and Conover, 1979). By default these are varied:
+    The run as given is the first, followed by each property at each of its values alone. A Latin
+    hypercube over all is last (McKay, Beckman and Conover, 1979). By default these are varied:
 
     - "joint_rule": "exact" integration over each joint, "three points" (springs at its ends and
       middle), and "rigid" blocks in contact, without elastic joints or damping;
@@ -128,11 +128,11 @@ def verdict_range(  # noqa: PLR0913  (one call, one argument for each thing that
             "rigid" for a structure and in place of "auto".
         vary: values by name, for those of the default ranges: numbers are the ends of a range, and
             a single value holds a property there. Also "finish", some of "as given", "sawn",
-            "dressed", "hewn" and "weathered", whose usual law of closing all joints of stones then
-            have (`joint_stiffness`, by strength and modulus of the stone); "scale", factors on the
-            motion; and any other name with a mapping from labels to structures or to motions.
+            "dressed", "hewn" and "weathered"; all joints of stones then have its usual law of
+            closing (`joint_stiffness`, by strength and modulus of the stone); "scale", factors on
+            the motion; and any other name with a mapping from labels to structures or to motions.
         samples: number of runs of the Latin hypercube. The default takes less than a minute for a
-            ring of 17 stones over 8 s on two cores, and gives a share of 5 % to ± 3 %.
+            ring of 17 stones over 8 s on two cores. It gives a share of 5 % to ± 3 %.
         seed: seed of its random numbers.
         workers: number of processes.
         folder: folder that keeps finished runs, from which the same call continues.

@@ -151,7 +151,7 @@ def draw_rating(found: Rating) -> Figure:
 
     Returns:
         The figure: factors of both directions over the place of the vehicle's middle, up to four
-        times the least one, above the mechanism at the worst place with the axles as given, and
+        times the least one. Below is the mechanism at the worst place with the axles as given, and
         marks where the distributed load stands.
     """
     title = f"{found.vehicle.name}: factor {found.factor:.3g}, {found.outcome}"

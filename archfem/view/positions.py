@@ -35,9 +35,9 @@ def decisive_instant(run: History) -> float:
 def first_motion_instant(run: History) -> float:
     """Return the time of the first mechanism, else of the largest |e| of a joint [s].
 
-    Joints that are hinges at the start, such as a stone's on two others of unequal height, say
-    nothing of the motion, and do not count. No joint of a wall in bond counts: a wall alone has
-    the instant at which a joint is farthest open or has slid farthest.
+    Joints that are hinges at the start, such as a stone's on two others of unequal height, do not
+    count: they say nothing of the motion. No joint of a wall in bond counts: a wall alone has the
+    instant at which a joint is farthest open or has slid farthest.
     """
     # enough joints may fail while no block can move: a verified motion comes first
     verified = run.verified if run.structure is not None else None

@@ -115,8 +115,8 @@ def _write_force(force: float) -> str:
 def draw_modes(modes: Modes, numbers: Sequence[int] | None = None) -> Figure:
     """Draw mode shapes over the undeformed outline; soil is paler than stone.
 
-    A mode in which other parts, such as the ends of the fill, move more than twice as far as any
-    ring or pier is called local.
+    A mode is called local if other parts, such as ends of the fill, move over twice as far as any
+    ring or pier.
 
     Args:
         modes: result of `modes`.
@@ -338,8 +338,8 @@ def draw_pushover(
 ) -> Figure:
     """Draw pushover curves, load factor over displacement, with discs at the first hinges.
 
-    The discs of a single curve are numbered; the names of their joints and the faces in contact are
-    listed beside the curve, or, the first six of them, in the legend if they are long.
+    The discs of a single curve are numbered. The names of their joints and the faces in contact are
+    listed beside the curve. If they are long, the first six are in the legend instead.
 
     Args:
         pushes: a pushover analysis, or the label of each one and the analysis.

@@ -82,8 +82,8 @@ def draw_stress(
 
     Args:
         model: a model with a mesh, of any fidelity but "rigid".
-        q: an equilibrium, or coordinates (n,) of a model that contains the initial gaps of its
-            joints, for example those of a dead load in construction stages.
+        q: an equilibrium, or coordinates (n,) of a model with the initial gaps of its joints, such
+            as those of a dead load in construction stages.
         parts: parts whose blocks are shaded, for example ["backfill"]; by default all but
             soil, and soil too where no stone has stress, since all are rigid.
         axes: matplotlib axes; by default those of a new figure.

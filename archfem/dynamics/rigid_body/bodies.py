@@ -1,8 +1,8 @@
 """Rigid bodies of a structure's blocks: convex pieces, masses, friction, poses and velocities.
 
 Contact detection works on convex polygons. Outlines are cut into triangles by ears (Meisters,
-American Mathematical Monthly 82 (1975) 648), and triangles are merged while the union is convex
-(Hertel and Mehlhorn 1983), which gives at most four times the smallest number of pieces.
+American Mathematical Monthly 82 (1975) 648). Triangles are merged while the union is convex (Hertel
+and Mehlhorn 1983), which gives at most four times the smallest number of pieces.
 """
 
 from collections.abc import Mapping

@@ -7,8 +7,8 @@ its length, and up to two points remain. Where that is a cut between two pieces 
 piece bears, and this pair has no contact: what overlaps it has come through the cut. (Separating
 axes: Gottschalk, Lin and Manocha, SIGGRAPH 1996.)
 
-Impulses of a step are stored by the pair of pieces in a hash table, as initial guess of the next.
-Rows of relative velocity, effective masses and the residual of impulses belong to contacts too.
+A hash table stores the impulses of a step by the pair of pieces, as initial guess of the next. Rows
+of relative velocity, effective masses and the residual of impulses belong to contacts too.
 """
 
 from typing import NamedTuple

@@ -82,14 +82,13 @@ class RigidBlockSimulation:
         level: height of the ground [m]; None takes the lowest point of the fixed blocks.
         rocking_ratio: angular velocity after over that before, where a face that turns about one
             end closes at the other: of all faces, or by names of joints [-]. None, and joints not
-            named, take that of an impact at the closing end alone (Housner's of one block), the
-            least that contact without tension keeps. A smaller ratio, as measured on rubber, is
+            named, take that of an impact at the closing end alone (Housner's of one block). It is
+            the least that contact without tension keeps. A smaller ratio, as measured on rubber, is
             kept by a couple between the two blocks of the joint, which takes energy.
 
     Raises:
-        InvalidInput: a number is out of range, there is no coefficient of
-            friction, a joint has a bond or a law of its own, or the ground lies above the foot of a
-            free block.
+        InvalidInput: a number is out of range; there is no coefficient of friction; a joint has a
+            bond or a law of its own; or the ground lies above the foot of a free block.
     """
 
     structure: Structure

@@ -1,24 +1,23 @@
 """Moreau-Jean time stepping of free rigid blocks with impacts and friction, until they rest.
 
-With θ = ½ and H the rows of normal and tangential relative velocity at the contacts found at the
-middle of the step, q + ½ Δt v,
+H has the rows of normal and tangential relative velocity at the contacts found at the middle of the
+step, q + ½ Δt v. With θ = ½,
 
     M (v₁ - v₀) = Δt p + Hᵀ P,   0 <= u_N1 + e u_N0 ⊥ P_N >= 0,   q₁ = q₀ + ½ Δt (v₀ + v₁),
 
-|P_T| <= μ P_N + Δt c A with A half of the common area at each point of two faces, and P_T opposes
-u_T1 where that is not zero (Moreau, in: Nonsmooth Mechanics and Applications, 1988; Jean, Comput.
+|P_T| <= μ P_N + Δt c A with A half of the common area at each point of two faces. P_T opposes u_T1
+where that is not zero (Moreau, in: Nonsmooth Mechanics and Applications, 1988; Jean, Comput.
 Methods Appl. Mech. Eng. 177 (1999) 235). Sweeps over the faces, each with both of its points at
-once, solve for the impulses P, from those of the step before. They
-have momentum with restart (Nesterov, Soviet Math. Dokl. 27 (1983) 372; O'Donoghue and Candès,
-Found. Comput. Math. 15 (2015) 715), and end once no contact violates its conditions by more than a
-stated speed. Rebounds are reduced where they would add energy. Overlaps are corrected in
-positions. Points that would pass each other by the end of the step are contacts too, except beside
-faces with a rocking ratio. There a couple C between the two blocks, the same on both, bounds the
-rate at which the old end opens,
+once, solve for the impulses P, from those of the step before. They have momentum with restart
+(Nesterov, Soviet Math. Dokl. 27 (1983) 372; O'Donoghue and Candès, Found. Comput. Math. 15 (2015)
+715), and end once no contact violates its conditions by more than a stated speed. Rebounds are
+reduced where they would add energy. Overlaps are corrected in positions. Points that would pass
+each other by the end of the step are contacts too, except beside faces with a rocking ratio. There
+a couple C between the two blocks, the same on both, bounds the rate at which the old end opens:
 
-    0 <= C ⊥ r |Δu_N0| - Δu_N1 >= 0   with Δu_N the difference of u_N at both ends,
+    0 <= C ⊥ r |Δu_N0| - Δu_N1 >= 0   with Δu_N the difference of u_N at both ends.
 
-so that its work -C Δu_N1 is never positive.
+Its work -C Δu_N1 is therefore never positive.
 """
 
 from typing import NamedTuple

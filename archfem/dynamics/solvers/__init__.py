@@ -1,8 +1,8 @@
 """Solvers of a time step: "snes" by PETSc; "newton" and "compliance", compiled, give its results.
 
 `equation` is the equation of motion; `snes` solves it step by step. `integrator` takes many steps
-at a time in the compiled loop of `base` by one of two solvers, which `selection` selects by a rule,
-and SNES takes the steps at which they fail.
+at a time in the compiled loop of `base` by one of two solvers, which `selection` selects by a rule.
+SNES takes the steps at which they fail.
 
     equation           equation of motion, its damping and time discretisation
     snes               every scheme, step by step by PETSc's SNES

@@ -2,9 +2,10 @@
 
 Rows whose λ is zero are there for their gaps alone, which press on joints that slide; they are as
 many as the others. A column is added once its λ is not zero, and stays to the end of the problem.
-Few rows and columns change from one problem to the next, and F of a whole structure is too large
-for the cache of the processor. So entries stay in place: the last row or column replaces one that
-is removed, and only new ones are copied. Without that, steps of a bridge take half as long again.
+Few rows and columns change from one problem to the next. F of a whole structure is too large for
+the cache of the processor. Entries therefore stay in place: the last row or column replaces one
+that is removed, and only new ones are copied. Without that, steps of a bridge take half as long
+again.
 """
 
 from typing import Any, NamedTuple

@@ -9,10 +9,10 @@ gradient of an energy, and the problem is not symmetric. Iterations solve
 
     (1 - λ′ F) μ = λ(z̄ + F λ) - λ
 
-for the correction μ of λ, by a dense factor where the rows are few, else by generalised minimal
-residuals in single precision (Saad and Schultz, SIAM J. Sci. Stat. Comput. 7 (1986) 856): an
-iteration only leads to the next one. Rows are active where joints open or slide, and where openings
-press on those. They are predicted before the step, and checked at the gaps that result.
+for the correction μ of λ, by a dense factor where the rows are few. Else they take generalised
+minimal residuals in single precision (Saad and Schultz, SIAM J. Sci. Stat. Comput. 7 (1986) 856):
+an iteration only leads to the next one. Rows are active where joints open or slide, and where
+openings press on those. They are predicted before the step, and checked at the gaps that result.
 """
 
 import numpy as np

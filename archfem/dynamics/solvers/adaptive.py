@@ -53,7 +53,7 @@ class AdaptiveStepper:
         """Yield the steps from a state to a time [s], some hundred at a time."""
         pending: list[Batch] = []
         try:
-            for batch in self._controlled_batches(start, end):
+            for batch in self._yield_batches(start, end):
                 if batch.fallback or batch.q is None:
                     yield from self._join_pending(pending)
                     yield batch
@@ -73,7 +73,7 @@ class AdaptiveStepper:
             pending.clear()
             yield batch.with_readings(self.stepper.equation.model.observer())
 
-    def _controlled_batches(self, start: State, end: float) -> Iterator[Batch]:
+    def _yield_batches(self, start: State, end: float) -> Iterator[Batch]:
         """Yield the steps from a state to a time [s], between two checks of their errors."""
         sample = self.stepper.equation.motion.dt
         shortest, longest = 1e-4, 2e-2  # not halved, and not doubled, any more [s]

@@ -4,9 +4,9 @@ The effective matrix with all joints closed and stuck is factorised once for a l
 
     (K + μ M + ν R) w = r + Gᵀ λ,    z = G w + z₀,    λ = λ(z).
 
-Multiplied by G, this is a dense problem in the rows that open or slide (`active_rows`), with their
-compliance F = G (K + μ M + ν R)⁻¹ Gᵀ. Rows of F are computed once they become active. The result is
-checked against the gaps of the whole structure.
+Multiplied by G, this is a dense problem in the rows that open or slide (`active_rows`). Their
+compliance is F = G (K + μ M + ν R)⁻¹ Gᵀ. Rows of F are computed once they become active. The result
+is checked against the gaps of the whole structure.
 """
 
 from typing import Any, ClassVar, NamedTuple, Self

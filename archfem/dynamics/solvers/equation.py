@@ -1,12 +1,12 @@
 """The equation of motion, its damping, and its loads over a step.
 
-With u the displacements relative to the ground, at every step
+The displacements u are relative to the ground. At every step
 
     M a + C v + f(u + β v) = p - M r a_g,
 
-f the internal forces of blocks and joints, p the self-weight. Newmark's method and HHT write it at
-an instant, the conserving scheme for the means over a step. Stiffness-proportional damping is
-written as f(u + β v), so that the joint's dashpot acts only where the joint is closed,
+with f the internal forces of blocks and joints, and p the self-weight. Newmark's method and HHT
+write it at an instant, the conserving scheme for the means over a step. Stiffness-proportional
+damping is written as f(u + β v), so that the joint's dashpot acts only where the joint is closed,
 t_n = k_n <g + β ġ>_-: a continuous law, whose energy stays convex. Damping on a constant matrix
 (the initial stiffness, or that of the blocks alone) enters through C = α M + R.
 """

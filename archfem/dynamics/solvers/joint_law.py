@@ -7,8 +7,8 @@ their forces K z would be linear. The law returns the rest,
     λ = K z - f̄(z),
 
 the released forces: zero where a joint stays closed and sticks. With the conserving scheme z lies
-in the middle of the path of the gaps over a step and f̄ is the mean over that path. With Newmark's
-method and HHT the path has no length, and f̄ is the force at an instant.
+in the middle of the path of the gaps over a step, and f̄ is the mean over it. With Newmark's method
+and HHT the path has no length, and f̄ is the force at an instant.
 """
 
 from functools import lru_cache
@@ -232,7 +232,7 @@ def _point_records(points: JointPoints, gaps: GapRows, area: Array, facets: bool
         gaps.group,
         points.joint,
         gaps.share,
-        *_closed_forces(stiffness, gaps.share, facets).T,
+        *_normal_derivatives(stiffness, gaps.share, facets).T,
         area,
         points.shear_spring,
         0.0,
@@ -259,7 +259,7 @@ def _row_stiffness(gaps: GapRows, stiffness: Array, shear: Array) -> Array:
     return np.append(largest, np.bincount(group, shear[follows], len(gaps.sizes)))
 
 
-def _closed_forces(stiffness: Array, share: Array, facets: bool) -> Array:
+def _normal_derivatives(stiffness: Array, share: Array, facets: bool) -> Array:
     """Return derivatives of closed normal forces by openings at the segment's ends (p, 2)."""
     ends = np.stack([1.0 - share, share], axis=1)
     if facets:  # ∫ φ_i φ_j over a facet: 1/3 at its own end, 1/6 at the other

@@ -1,12 +1,13 @@
 """A step of a structure that is linear but for its joints: small displacements.
 
-With w = u + β v the contact displacement where the equation of a step is written, C = α M + R,
+The equation of a step is written at the contact displacement w = u + β v. With C = α M + R,
 
     (K + μ M + ν R) w = p + M y + R x + Gᵀ λ,    z = G w + z₀,    λ = λ(z),
 
-K with all joints closed and stuck, y and x from the state before, λ the released forces
-(`joint_law`). A solver overloads `solve_contact`. The rest is common to all: images of the state
-under M, K and R follow by Newmark's formulas and give energies without further products.
+K is that with all joints closed and stuck, y and x follow from the state before, and λ are the
+released forces (`joint_law`). A solver overloads `solve_contact`. The rest is common to all: images
+of the state under M, K and R follow by Newmark's formulas and give energies without further
+products.
 """
 
 import itertools
@@ -260,7 +261,7 @@ def _evaluate_linear_step(system, step, states, ground, results, memory):  # typ
     _sum_resultants(law, linear.shear, work.contact, resultants)
     loads = linear.weight, linear.body[0], linear.body[1]
     damping = linear.numbers.drag, linear.numbers.lag
-    _closed_energies(states, images, loads, damping, ground, energy)
+    _energies_if_closed(states, images, loads, damping, ground, energy)
     if law.gain == 0.0:
         _instant_energies(law, linear.numbers.lag, work, energy)
     else:
@@ -302,7 +303,7 @@ def _sum_resultants(law, shear, contact, resultants):  # type: ignore
 
 
 @summing_kernel
-def _closed_energies(states, images, loads, damping, ground, energy):  # type: ignore
+def _energies_if_closed(states, images, loads, damping, ground, energy):  # type: ignore
     """Evaluate energies of a step as if all joints were closed and stuck, from the images."""
     (old, new), (weight, across, up), (drag, lag) = images, loads, damping
     before, u, v = states[0, 0], states[1, 0], states[1, 1]
@@ -380,7 +381,7 @@ def _open_damping(law, gap):  # type: ignore
         stiffens = points[part.begin].closing_rate > 0.0
         if not stiffens:
             lost -= moved[0] * state.near + moved[1] * state.far
-        late = _lagged(first + last, law.damping_lag)
+        late = _shift_by_lag(first + last, law.damping_lag)
         if max(first + last) <= 0.0 and not (stiffens and max(late) > 0.0):
             continue
         # ... less that of the same forces without lag
@@ -389,7 +390,7 @@ def _open_damping(law, gap):  # type: ignore
             ends = gaps_between(first, last, a, b)
             taken = linear_means(point, ends, 0.0, 0.0, law.facets)[1]
             if stiffens:  # ... of the linear part, as the excess over it has no lag
-                late = _lagged(ends, law.damping_lag)
+                late = _shift_by_lag(ends, law.damping_lag)
                 more = linear_means(point, late, 0.0, 0.0, law.facets)[1]
                 taken = taken[0] - more[0], taken[1] - more[1]
             lost += point.area * (between(moved, a) * taken[0] + between(moved, b) * taken[1])
@@ -397,7 +398,7 @@ def _open_damping(law, gap):  # type: ignore
 
 
 @inlined_kernel
-def _lagged(ends, lag):  # type: ignore
+def _shift_by_lag(ends, lag):  # type: ignore
     """Shift the gaps of a facet at start and end of a step by the lag of damping."""
     first, last = lag * (ends[2] - ends[0]), lag * (ends[3] - ends[1])
     return ends[0] + first, ends[1] + last, ends[2] + first, ends[3] + last

@@ -7,7 +7,7 @@ reverse their slip held once, and a line search. The factor of the tangent is th
     (K + μ M + ν R - Gᵀ λ′ G) w = r + Gᵀ (λ - λ′ (z - z₀));
 
 the residual is the difference of λ(z) from the λ that w is in balance with. Large displacements
-solve for Δq, with f̄ the mean force of the joints over the step (`joints.large`),
+solve for Δq. With f̄ the mean force of the joints over the step (`joints.large`),
 
     (2 M/Δt² + C/Δt + (½ + β/Δt) K) Δq - 2 M v/Δt + K q + f̄(q, q + Δq) = p - M r a_g.
 """

@@ -42,9 +42,8 @@ def _make_solver(method: str, equation: Equation) -> StepSolver | None:
             f"method '{method}' does not apply to this model of fidelity "
             f"'{equation.model.fidelity}': compliance needs small displacements, and joints that "
             "do not stiffen as they close; both need joints that neither dilate, nor resist "
-            "tension, nor have a law of their own, and, with Newmark's method or HHT, whose "
-            "supports have not moved; neither applies to monolithic models; use method='auto' or "
-            "'snes'"
+            "tension, nor have a law of their own; with Newmark's method or HHT both need supports "
+            "that have not moved; neither applies to monolithic models; use method='auto' or 'snes'"
         )
     return solver
 
@@ -52,10 +51,10 @@ def _make_solver(method: str, equation: Equation) -> StepSolver | None:
 def select_solver(equation: Equation) -> StepSolver | None:
     """Return the solver of a run, or None where only SNES applies.
 
-    Newton's method on the whole structure takes large displacements, and small ones where the
-    tangent is a narrow band, as of a chain of rigid stones, or a band with many rows of gaps.
-    Its time grows with the square of the width; that of the compliance method with the square of
-    the number of rows that open and slide, and tenfold where minimal residuals fail.
+    Newton's method on the whole structure takes large displacements. It takes small ones where the
+    tangent is a narrow band, as of rigid stones in a chain, or one with many rows of gaps. Its time
+    grows with the square of the width; that of the compliance method with the square of the number
+    of rows that open and slide, and tenfold where minimal residuals fail.
     """
     newton, joints = NewtonSolver.of(equation), equation.joints
     if newton is None:

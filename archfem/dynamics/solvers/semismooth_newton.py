@@ -112,9 +112,9 @@ def newton_driver(evaluate_residual: Any, correction: Correction) -> Any:
         """Iterate until the residual vanishes; returns evaluations, negative if it does not.
 
         A point that the first correction takes from sliding one way to sliding the other is held in
-        the second, as no derivative sees the range in which it sticks. `limits` are the number of
-        iterations, that of the first ones with whole corrections, after which a line search is
-        used, and whether the first may use an earlier step's factor.
+        the second: no derivative sees the range in which it sticks. `limits` are the number of
+        iterations; that of the first ones with whole corrections, after which a line search is
+        used; and whether the first may use an earlier step's factor.
         """
         max_iterations, full_steps, reusable = limits
         error, reverses = evaluate_residual(system, work, 0)

@@ -2,7 +2,7 @@
 
 The stones of an arch and its piers form chains, or trees where rings share a pier: joints link each
 stone to at most one that is eliminated later. The tangent then has blocks of three by three, D_i on
-the diagonal, U_i to the right of it and L_i below it, and its factor has no others:
+the diagonal, U_i to the right of it and L_i below it. Its factor has no others:
 
     F_i = L_i D_i⁻¹,   D_p ← D_p - F_i U_i,
 

@@ -10,15 +10,15 @@ follows its tangent. The excess over the linear law is
 
     σ_e = σ - k_n δ,   Φ_e = ∫ σ_e dδ,   Ψ_e = ∫ Φ_e dδ.
 
-Where a closing changes linearly from u to v, along a facet or in time, means have a closed form,
-piece by piece where the path opens or leaves the hyperbola. With the distance from δ_m over δ_m,
-y = 1 - δ/δ_m = ȳ (1 + z τ), τ from -1 to 1, σ_e/p_0 = 1/y - 2 + y. Means of 1/(1 + z τ) and
-1/(1 + z τ)², times powers of τ, follow from two functions of z,
+Where a closing changes linearly from u to v, along a facet or in time, means have a closed form. It
+is piecewise where the path opens or leaves the hyperbola. The distance from δ_m over δ_m is
+y = 1 - δ/δ_m = ȳ (1 + z τ), τ from -1 to 1, and σ_e/p_0 = 1/y - 2 + y. Means of 1/(1 + z τ) and
+1/(1 + z τ)², times powers of τ, follow from two functions of z:
 
-    S = (atanh z / z - 1) / z² = 1/3 + z² T,   B = 1 / (1 - z²),
+    S = (atanh z / z - 1) / z² = 1/3 + z² T,   B = 1 / (1 - z²).
 
-and no terms cancel. With E the mean of Φ_e, E_u and E_v are the means of σ_e times the linear
-functions of both ends, E_uu, E_uv and E_vv those of the tangent.
+No terms cancel. E is the mean of Φ_e. E_u and E_v are the means of σ_e times the linear functions
+of both ends, and E_uu, E_uv and E_vv those of the tangent.
 
 Kernels take numbers, or eight at a time (`lanes`).
 """

@@ -1,8 +1,8 @@
 """Poses of block faces, and gap, slip and rotation between them, at large rotations, compiled.
 
-A block has the displacement (x, y) of its centroid, its rotation θ, and, where it is elastic, modal
-coordinates ξ in the frame that rotates with it. A face with its middle at r from the centroid has
-the pose
+A block has the displacement (x, y) of its centroid and its rotation θ. An elastic block also has
+modal coordinates ξ in the frame that rotates with it. A face with its middle at r from the centroid
+has the pose
 
     p = (x, y) + R(θ)(r + U ξ) - r,   θ + Θ ξ.
 
@@ -10,21 +10,21 @@ These are displacements, not positions: the difference of two large numbers woul
 that stiff joints need. A block without a frame, such as fill, moves its faces by shapes alone, to
 which the same formulas apply with θ = 0. Where nodes slide apart on a face it gets longer, by E ξ.
 
-With d the displacement of the middle of the higher face relative to that of the lower, n and t the
-normal and the tangent of the joint rotated by the mean of both faces' angles, and δ the difference
-of the angles, the measures of a joint are
+The middle of the higher face has the displacement d relative to that of the lower one. The normal n
+and the tangent t of the joint are rotated by the mean of both faces' angles; δ is the difference of
+the angles. The measures of a joint are
 
     g = n·d,   s = t·d,   σ = 2 sin(δ/2).
 
-The gap of two places of the faces that touched at a distance a from the middle is g - a σ, and all
-slip by the same s. For small motions they are those of `operator`; no angle is assumed small.
+Two places of the faces that touched at a distance a from the middle have the gap g - a σ. All slip
+by the same s. For small motions they are those of `operator`; no angle is assumed small.
 
-Over a step the discrete derivative D maps the change of the poses exactly to that of the measures,
-so that forces Dᵀ f do the work that f does on the measures (Gonzalez, J. Nonlinear Sci. 6 (1996)
+Over a step the discrete derivative D maps the change of the poses exactly to that of the measures.
+Forces Dᵀ f therefore do the work that f does on the measures (Gonzalez, J. Nonlinear Sci. 6 (1996)
 449, here in closed form). Both blocks move a joint by one jump, so derivatives have four columns:
 by the jump's x and y, and by the angles of the lower and of the higher face. Sines of angles at the
-end of a step follow from those at its start by addition theorems, with short series for the
-rotation during the step.
+end of a step follow from those at its start by addition theorems. The rotation during the step
+takes short series.
 """
 
 from typing import Any, NamedTuple
@@ -249,9 +249,9 @@ def face_pose(sides, joint, side, q):  # type: ignore
 def step_poses(sides, joint, side, before, after):  # type: ignore
     """Return the poses of a face over a step, the rotation of its block, and pose derivatives.
 
-    Poses are at the start and at the end. A derivative is cosine and sine of the rotation, a factor
-    of the shapes, and the derivative of the face's middle by the angle of the block; one is that of
-    the mean over the step, the other that at its end.
+    Poses are at the start and at the end. A derivative has cosine and sine of the rotation, a
+    factor of the shapes, and the derivative of the face's middle by the block's angle. One is that
+    of the mean over the step, the other that at its end.
     """
     rx, ry = sides.arm[joint, side, 0], sides.arm[joint, side, 1]
     if not sides.has_frame[joint, side]:
@@ -313,8 +313,9 @@ def gather_face_forces(sides, joint, side, rate, push, forces):  # type: ignore
 def rotation_stiffness(rotation, push):  # type: ignore
     """Return the derivative of generalised forces by the coordinates at a constant force on a face.
 
-    With shapes u and v of a coordinate k, and the five numbers a to e returned, the moment changes
-    with the block's angle by a and with k by d u + e v, the force on k with the angle by b u + c v.
+    The coordinate k has the shapes u and v, and a to e are the five numbers returned. The moment
+    changes with the block's angle by a, and with k by d u + e v. The force on k changes with the
+    angle by b u + c v.
     """
     (c, s), (x, y), (mean, sine, shrunk, shrunk_rate) = rotation
     # the force in the block's frame

@@ -1,7 +1,7 @@
 """The contact law on the overlap of two faces, over a step, compiled.
 
-Each end of the overlap is that of the face which ends first. With s^- and s^+ the slips at which
-both faces end together, R(s) = |s|, and a along the mean line from the mean middle of the joint,
+Each end of the overlap is that of the face which ends first. Both faces end together at the slips
+s^- and s^+. With R(s) = |s|, and a along the mean line from the mean middle of the joint,
 
     a^± = ±h/2 ∓ ½ (R(s - s^±) - R(s^±)),   ℓ = a^+ - a^-,   c = ½ (a^+ + a^-).
 
@@ -9,13 +9,13 @@ Faces as long as the joint have s^± = 0: they overlap on ℓ = h - |s| around c
 longer face has ℓ = h, c = ±s/2, until it slides over the end of that. The gap is linear on the
 overlap, g' - x ℓ σ with g' = g - c σ and x from -½ to ½. The traction of `point_law` is integrated
 exactly over facets, or by springs at the points of a rule. With Φ the mean energy on an area the
-joint stores w ℓ Φ, and the mean forces over a step are those whose work is the change of that:
+joint stores w ℓ Φ. The mean forces over a step are those whose work is the change of that energy:
 
     F_g = w ℓ̄ Σ t̄_i,   F'_σ = -w ℓ̄² Σ x_i t̄_i,
-    F'_s = w Δℓ/Δs (Φ̄ - ℓ̄ σ̄ Σ x_i t̄_i) + Σ τ̄_i,
+    F'_s = w Δℓ/Δs (Φ̄ - ℓ̄ σ̄ Σ x_i t̄_i) + Σ τ̄_i.
 
-with t̄_i the means of ∫φ_i t_n dx, or of W_i t_n, for gaps linear in time, and bars for means
-of both ends. As Δg' = Δg - c̄ Δσ - σ̄ Δc, they do that work on g, σ and s with
+Here t̄_i are the means of ∫φ_i t_n dx, or of W_i t_n, for gaps linear in time. Other bars are
+means of both ends. As Δg' = Δg - c̄ Δσ - σ̄ Δc, they do that work on g, σ and s with
 
     F_σ = F'_σ - c̄ F_g,   F_s = F'_s - σ̄ Δc/Δs F_g.
 
@@ -23,10 +23,10 @@ The shear τ̄_i of a point is that of a spring in series with a slider, as in
 `contact_law.shear_over_step`.
 
 Where faces stretch, points slip by s + x η, with η the elongation of the higher face less that of
-the lower one, and the forces that do the work on η are Σ x_i τ̄_i.
+the lower one. The forces that do the work on η are Σ x_i τ̄_i.
 
 A point that slips one way in one iteration and the other way in the next has passed the state in
-which it sticks, and Newton's method would alternate. The derivative for such a point is that of
+which it sticks. Newton's method would alternate. The derivative for such a point is that of
 sticking, and the difference of its force from sticking is returned separately.
 """
 
@@ -72,7 +72,7 @@ class FaceLaw(NamedTuple):
 
 
 @inlined_kernel
-def _rounded_size(bend, slip):  # type: ignore
+def _smooth_size(bend, slip):  # type: ignore
     """Return R(s), the size of a slip, and its derivative; rounded below a slip `bend`."""
     # The force that pushes a face off an edge would jump where the slip changes its sign, and
     # Newton's method would alternate there.
@@ -88,8 +88,8 @@ def _rounded_size(bend, slip):  # type: ignore
 def overlap_between(depth, ends, sizes, slip):  # type: ignore
     """Return `overlap` from the slips s^+ and s^- at which faces end together, and R of them."""
     bend = ROUNDED_SLIP * depth
-    right, right_rate = _rounded_size(bend, slip - ends[0])
-    left, left_rate = _rounded_size(bend, slip - ends[1])
+    right, right_rate = _smooth_size(bend, slip - ends[0])
+    left, left_rate = _smooth_size(bend, slip - ends[1])
     right, left = right - sizes[0], left - sizes[1]
     rest = depth - 0.5 * (right + left)
     is_left = rest > 0.0
@@ -105,7 +105,7 @@ def overlap(law, segment, slip):  # type: ignore
         return (depth, 0.0), (0.0, 0.0)
     ends = law.end_slip[segment, 0], law.end_slip[segment, 1]
     bend = ROUNDED_SLIP * depth
-    sizes = _rounded_size(bend, ends[0])[0], _rounded_size(bend, ends[1])[0]
+    sizes = _smooth_size(bend, ends[0])[0], _smooth_size(bend, ends[1])[0]
     return overlap_between(depth, ends, sizes, slip)
 
 
@@ -129,7 +129,7 @@ def closing_energy(law, segment, length, opening, turn):  # type: ignore
 @inlined_kernel
 def _size_slope(bend, before, after):  # type: ignore
     """Return ΔR/Δs over a step, and its derivative by the slip at the end."""
-    (first, r0), (last, r1) = _rounded_size(bend, before), _rounded_size(bend, after)
+    (first, r0), (last, r1) = _smooth_size(bend, before), _smooth_size(bend, after)
     moved, is_small = after - before, greatest(abs(before), abs(after)) < bend
     slope = (last - first) / moved
     # beyond, on one side of zero slip, or without slip, it is the derivative

@@ -93,11 +93,11 @@ def _facet_means(contact, ends, first, second):  # type: ignore
     """Return `joint_means` along a facet."""
     if max(ends) <= 0.0 or min(ends) > 0.0:
         return _uniform_means(contact, ends, 0.5 * (first + second))
-    return _divided_means(contact, ends, first, second)
+    return _means_by_parts(contact, ends, first, second)
 
 
 @kernel
-def _divided_means(contact, ends, first, second):  # type: ignore
+def _means_by_parts(contact, ends, first, second):  # type: ignore
     """Return `joint_means` of a facet of which parts are open, or open or close in the step."""
     a, c, b, d = ends
     # Gauss's rule between the zero crossings, with sums for φ_0 and φ_1 and their products

@@ -1,8 +1,8 @@
 """Parts of a bridge: rings, piers, sidewalls, backfill and paving.
 
-The origin is at the left end of the deck (x) and at the springing level (y), where the centre
-lines of all rings intersect their springing joints. Gaps and lengths of piers and sidewalls end
-there too, however the rings are measured.
+The origin is at the left end of the deck (x) and at the springing level (y). At this level the
+centre lines of all rings intersect their springing joints. Gaps and lengths of piers and sidewalls
+end there too, however the rings are measured.
 """
 
 from dataclasses import dataclass, field, replace

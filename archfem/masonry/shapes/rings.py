@@ -124,7 +124,7 @@ def circular_arch(  # noqa: PLR0913  (all are lengths and properties of one ring
         material: of the stones.
         contact: of the joints.
         chords: None for stones that are true sectors of the ring; or the number of straight pieces
-            of each face, where a stone is lighter than its sector by the fraction φ²/6, φ the
+            of each face. A stone is then lighter than its sector by the fraction φ²/6, with φ the
             angle of a piece.
         gravity: acceleration of gravity [m/s²].
 

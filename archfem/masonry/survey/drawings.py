@@ -389,8 +389,8 @@ def _walk_dxf(
 def _draw_arcs(entity: Entity, corners: Array, snap: float) -> list[tuple[float, ...]]:
     """Return the vertices of a polyline with chords of its arcs, which stray by half of snap.
 
-    An arc is divided at the corners of all outlines along it, then evenly between these, so that
-    outlines on both sides of it have the same vertices.
+    An arc is divided at the corners of all outlines along it, then evenly between these. Outlines
+    on both sides of it therefore have the same vertices.
     """
     points, bulges = entity.points, (*entity.bulges, *[0.0] * len(entity.points))
     drawn = list[tuple[float, ...]]()

@@ -2,19 +2,19 @@
 
 Find u in the broken space such that for all v
 
-    ∫ w ρ ü·v + ∫ w σ(u):ε(v) + Σ_joints ∫ w (t_n ⟦v⟧·n + t_s ⟦v⟧·t) = ∫ w ρ b·v
+    ∫ w ρ ü·v + ∫ w σ(u):ε(v) + Σ_joints ∫ w (t_n ⟦v⟧·n + t_s ⟦v⟧·t) = ∫ w ρ b·v.
 
-with plane stress σ and the tractions of `joints.contact_law`, of the gap g = ⟦u⟧·n and the slip
-s = ⟦u⟧·t:
+The stress σ is plane. The tractions are those of `joints.contact_law`. They follow from the gap
+g = ⟦u⟧·n and the slip s = ⟦u⟧·t:
 
-    t_n = k_n <g>_-,    t_s = k_s (s - s_p),    |t_s| ≤ μ |t_n| + c on the closed part of a joint,
+    t_n = k_n <g>_-,    t_s = k_s (s - s_p),    |t_s| ≤ μ |t_n| + c on the closed part of a joint.
 
-where s_p is the irreversible slip of each point, which grows where friction does not hold t_s.
+The irreversible slip s_p of each point grows where friction does not hold t_s.
 `models.reference` has the means over a step.
 
-With n the normal from one side of a facet to the other and ⟦u⟧ the jump along it, neither gap nor
-slip depends on which side comes first. Here t is ±n rotated to the left, with the sign that, for n
-from the lower to the higher block, lets t point to the extrados.
+The normal n is from one side of a facet to the other, and ⟦u⟧ is the jump along it. Neither gap nor
+slip depends on which side is first. Here t is ±n rotated to the left. Its sign lets t point to the
+extrados for n from the lower to the higher block.
 """
 
 from dataclasses import dataclass

@@ -3,9 +3,9 @@
 UFL integrates functions and has no point values. Quadrature elements, the idiom of DOLFINx for the
 history of a material, have the points of cells, not of facets between cells; nor does
 `fem.Expression` take both sides of a facet. A value at each point of a facet is therefore a
-function that is constant around the point, which a quadrature rule with the same points integrates
-exactly. The values of a facet are stored in the cells at its sides, under a colour of its own where
-a cell has several facets on joints. Integrals against such functions give values at the points.
+function that is constant around the point. A quadrature rule with the same points integrates it
+exactly. The values of a facet are stored in the cells at its sides. Where a cell has several facets
+on joints, each has a colour of its own. Integrals against such functions give values at the points.
 """
 
 from dataclasses import dataclass

@@ -7,10 +7,10 @@ are cached by the shapes of the structure, whatever its materials.
 The edges of blocks are divided into cells first. A block with corners is meshed from side to side,
 so its opposite sides need the same number of cells. Neighbours share edges, so the numbers depend
 on each other through the whole structure. They solve a small integer programme (Tam and Armstrong,
-International Journal for Numerical Methods in Engineering 36 (1993) 2581): the fewest cells with
-equal opposite sides, at least the required number on each edge, and, for quadrilaterals, an even
-number on each edge of a freely meshed block, without which it could not be filled. Even numbers are
-always feasible: any solution may be doubled.
+International Journal for Numerical Methods in Engineering 36 (1993) 2581). It gives the fewest
+cells with equal opposite sides and at least the required number on each edge. A freely meshed block
+of quadrilaterals needs an even number on each edge, as it could not be filled otherwise. Even
+numbers are always feasible: any solution may be doubled.
 
 Blocks without corners take the numbers of their neighbours; on their other edges, and inside, the
 cells grow with the distance from those.

@@ -93,8 +93,8 @@ def build_broken_space(mesh: Mesh, degree: int = 1) -> BrokenSpace:
 def build_joint_operator(space: BrokenSpace, rule: Quadrature) -> JointOperator:
     """Return opening and slip at the joint points in terms of the free nodal displacements.
 
-    Rows come from one-dimensional Lagrange polynomials on the facets, which are the trace of the
-    elements, so entries are exact and only nodes on the joint appear.
+    Rows are one-dimensional Lagrange polynomials on the facets, the trace of the elements. Entries
+    are therefore exact, and only nodes on the joint appear.
     """
     structure = space.mesh.structure
     facets, rules, entries = space.facets, [], []

@@ -4,7 +4,7 @@ Between faces that stay plane a joint is one segment, on the overlap of the whol
 blocks, which changes as they slide.
 Where faces bend, or belong to a fill, each facet of the mesh is a segment between the two pairs of
 nodes at its ends. Displacement and rotation of its faces are linear in the deformations of the
-blocks in their frames, so that a segment follows the equations of plane faces. Its places stay
+blocks in their frames. A segment therefore follows the equations of plane faces. Its places stay
 opposite as in the mesh.
 """
 

@@ -1,8 +1,8 @@
 """Rendering of a frame: structure, title, colour bar, legend and ground acceleration.
 
 Constant parts of a film are drawn once. Blocks and marks are drawn into a window of the image by
-matplotlib's Agg renderer, many shapes per call, or by a painter of another library; blocks are
-divided into triangles so fine that colours may vary linearly between their corners.
+matplotlib's Agg renderer, many shapes per call, or by another library's painter; blocks are divided
+into triangles so fine that colours may vary linearly between their corners.
 """
 
 from textwrap import shorten
