@@ -411,7 +411,7 @@ def read_listed(folder: Path, name: str) -> bytes:
 
 def check_listed(path: Path, content: bytes) -> None:
     """Refuse a file of a result folder that is not the one which archfem wrote there."""
-    for listed in _listed_digests(path):
+    for listed in _find_digests(path):
         if listed != hashlib.sha256(content).hexdigest():
             raise InvalidInput(
                 f"{path} is not the file that archfem wrote there, by the digest in "
@@ -421,7 +421,7 @@ def check_listed(path: Path, content: bytes) -> None:
 
 def refuse_listed(path: Path) -> None:
     """Refuse to replace a file of a result folder, which belongs to the others there."""
-    if path.is_file() and list(_listed_digests(path)):
+    if path.is_file() and list(_find_digests(path)):
         raise InvalidInput(
             f"{path} is a result of `archfem run` or a study, with others of the same folder: "
             "give another name, or delete that folder"
@@ -442,7 +442,7 @@ def refuse_unlisted(folder: Path, names: Iterable[str]) -> None:
             )
 
 
-def _listed_digests(path: Path) -> Iterator[str]:
+def _find_digests(path: Path) -> Iterator[str]:
     """Yield the digests that a file has in the lists of its folders."""
     path = path.absolute()
     # the history of a pair is in a folder within the result folder

@@ -24,7 +24,7 @@ def single_threaded(function: Function) -> Function:
     def wrapper(*args: Any, **options: Any) -> Any:
         if getattr(_thread, "is_limited", False):  # a caller has set the limit already
             return function(*args, **options)
-        with _loaded_libraries(len(sys.modules)).limit(limits=1, user_api="blas"):
+        with _find_libraries(len(sys.modules)).limit(limits=1, user_api="blas"):
             _thread.is_limited = True
             try:
                 return function(*args, **options)
@@ -35,6 +35,6 @@ def single_threaded(function: Function) -> Function:
 
 
 @lru_cache(maxsize=1)
-def _loaded_libraries(_: int) -> ThreadpoolController:
+def _find_libraries(_: int) -> ThreadpoolController:
     """Find the loaded BLAS libraries, again whenever the number of modules has changed (1 ms)."""
     return ThreadpoolController()

@@ -60,11 +60,11 @@ def declared_keys(declaration: Callable[..., Any], named: tuple[type, ...] = ())
     the field's `metadata={"unit": …}`; a dataclass or mapping a table; and objects of the classes
     `named` the name of a table. What no file can hold is left out.
     """
-    return dict(_declared_keys(inspect.unwrap(declaration), named))
+    return dict(_find_keys(inspect.unwrap(declaration), named))
 
 
 @cache
-def _declared_keys(declaration: Callable[..., Any], named: tuple[type, ...]) -> dict[str, Any]:
+def _find_keys(declaration: Callable[..., Any], named: tuple[type, ...]) -> dict[str, Any]:
     """Find the keys of a declaration once, which each case of a study needs."""
     hints = _hints(declaration, include_extras=True)
     units = dict.fromkeys(hints)

@@ -181,7 +181,7 @@ def load_extension(path: str | Path) -> ModuleType:
     return module
 
 
-def _installed_extensions() -> EntryPoints:
+def _find_extensions() -> EntryPoints:
     """Return the entry points by which installed packages add to archfem."""
     return entry_points(group="archfem.extensions")
 
@@ -191,15 +191,15 @@ def _package_versions(settings: Table) -> list[tuple[str, str]]:
     return [
         (name, entry.dist.version if entry.dist else "unknown")
         for name in map(str, settings.get("extensions", ()))
-        for entry in _installed_extensions().select(name=name)
+        for entry in _find_extensions().select(name=name)
     ]
 
 
 def _load_package(name: str) -> ModuleType:
     """Import the module of an installed extension, which adds to archfem."""
-    found = list(_installed_extensions().select(name=name))
+    found = list(_find_extensions().select(name=name))
     if len(found) != 1:
-        known = sorted(_installed_extensions().names)
+        known = sorted(_find_extensions().names)
         raise InvalidInput(
             f"extension '{name}' is that of {len(found)} installed packages: name one of {known}, "
             "or a file *.py"
@@ -214,7 +214,7 @@ def find_extensions(objects: Iterable[Any], folder: Path | None) -> list[str]:
     own = {str(getattr(each, "__module__", "")) for each in objects}
     modules = {name for name in own if name.partition(".")[0] not in ("", "archfem", "builtins")}
     # a search for installed packages takes 0.1 s
-    installed = _installed_extensions() if modules else ()
+    installed = _find_extensions() if modules else ()
     packages = [entry.name for entry in installed if entry.module in modules]
     files = [str(sys.modules[name].__file__) for name in sorted(modules & set(_loaded))]
     return [*packages, *(name_from(file, folder) for file in files)]

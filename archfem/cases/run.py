@@ -150,7 +150,7 @@ class DeadLoadResult:
         levels = {"rigid": "faces", "faces": "condensed", "condensed": "full"}
         if model.fidelity not in levels or model.prediction or find_spec("dolfinx") is None:
             return None
-        return self._changed(fidelity=levels[model.fidelity])
+        return self._change_analysis(fidelity=levels[model.fidelity])
 
     @cached_property
     def softened(self) -> tuple[Analysis, Equilibrium] | None:
@@ -163,9 +163,9 @@ class DeadLoadResult:
         stiffens = any(joint.contact.closure is not None for joint in structure.joints)
         if self.dead.model.fidelity != "rigid" or structure.has_own_laws or stiffens:
             return None
-        return self._changed(structure=soften_joints(structure))
+        return self._change_analysis(structure=soften_joints(structure))
 
-    def _changed(self, **changes: Any) -> tuple[Analysis, Equilibrium] | None:
+    def _change_analysis(self, **changes: Any) -> tuple[Analysis, Equilibrium] | None:
         """Return a changed analysis with its dead load; None if it does not exist."""
         try:
             other = replace(self.case.analysis, **changes)

@@ -63,7 +63,7 @@ def format_schema() -> str:
 
 def build_schema() -> Schema:
     """Return the schema (draft 7) of case and study files."""
-    study: Schema = {"cases": _named(_table(STUDIED_CASE_KEYS)), "columns": {"type": "object"}}
+    study: Schema = {"cases": _by_name(_table(STUDIED_CASE_KEYS)), "columns": {"type": "object"}}
     study["statements"] = {"type": "array", "items": _table_of(Statement)}
     top = {key: _value(kind) for key, kind in STUDY_KEYS.items()} | study
     top |= {"title": {"type": "string", "description": "title of the case, or of the study"}}
@@ -87,8 +87,8 @@ def _case_sections() -> dict[str, Schema]:
     analysis = _analysis_sections()
     return analysis | {
         "structure": _any([*map(_shape, structure_keys.list_shapes()), _partial_structure()]),
-        "materials": _named(_table_of(Material)),
-        "contacts": _named(
+        "materials": _by_name(_table_of(Material)),
+        "contacts": _by_name(
             _table(structure_keys.CONTACT_KEYS, Contact, finish=_choice(*CONDITIONS))
         ),
         "motion": _MOTION,
@@ -121,7 +121,7 @@ def _parts_of_structure(name: str) -> dict[str, Schema]:
     fill = _choice("elastic", "jointed")
     parts: dict[str, Schema] = {"fill": _table(structure_keys.fill_keys(), law=fill)}
     if name == "outlines":
-        parts |= {"layers": _named(_part(Layer)), "contacts": {"type": "object"}}
+        parts |= {"layers": _by_name(_part(Layer)), "contacts": {"type": "object"}}
     elif name == "bridge":
         for key, part in structure_keys.BRIDGE_PARTS.items():
             # common keys of all parts, and a table for each under its name
@@ -151,13 +151,13 @@ def _analysis_sections() -> dict[str, Schema]:
     """Return the schemas of [model] and [analysis]."""
     keys = analysis_tables.analysis_keys()
     kinds = (schemes.EffectiveDamping, schemes.StiffnessDamping, schemes.Rayleigh)
-    damping = _merged(kinds, modes=_choice("effective"))
+    damping = _merge_tables(kinds, modes=_choice("effective"))
     own: dict[str, Schema] = {
         "fidelity": _any([_choice(*MODEL_FIDELITIES, "auto"), {"type": "object"}]),
         "displacements": _choice("small", "large"),
         "damping": _any([_choice("effective"), damping]),
-        "scheme": _named_object(schemes.SCHEMES),
-        "until": _named_object(EVENTS, criteria=_CRITERIA),
+        "scheme": _object_by_name(schemes.SCHEMES),
+        "until": _object_by_name(EVENTS, criteria=_CRITERIA),
         "newton": _table_of(Newton),
     }
     return {
@@ -166,9 +166,9 @@ def _analysis_sections() -> dict[str, Schema]:
     }
 
 
-def _named_object(known: Mapping[str, type], **own: Schema) -> Schema:
+def _object_by_name(known: Mapping[str, type], **own: Schema) -> Schema:
     """Return the schema of a word, or a table with this word as its name."""
-    table = _merged(known.values(), name=_choice(*known), **own)
+    table = _merge_tables(known.values(), name=_choice(*known), **own)
     return _any([_choice(*known), table])
 
 
@@ -182,7 +182,7 @@ def _motion() -> Schema:
 
 def _suite() -> Schema:
     """Return the schema of [suite]."""
-    return _table(motion_keys.suite_keys(), Suite, pairs=_named(_MOTION), target=_SPECTRUM)
+    return _table(motion_keys.suite_keys(), Suite, pairs=_by_name(_MOTION), target=_SPECTRUM)
 
 
 def _list_own_spectra() -> list[str]:
@@ -212,7 +212,7 @@ def _limit() -> Schema:
 
 def _fill() -> Schema:
     """Return the schema of the strength of a fill."""
-    return _merged(analysis_keys.FILL_LAWS.values(), law=_choice(*analysis_keys.FILL_LAWS))
+    return _merge_tables(analysis_keys.FILL_LAWS.values(), law=_choice(*analysis_keys.FILL_LAWS))
 
 
 def _pushover() -> Schema:
@@ -251,7 +251,7 @@ def _assessment() -> Schema:
 def _risk() -> Schema:
     """Return the schema of [risk]."""
     hazard = _table(risk_keys.HAZARD_KEYS, measure=_choice(*MEASURES))
-    alternatives = _named(_table(risk_keys.ALTERNATIVE_KEYS))
+    alternatives = _by_name(_table(risk_keys.ALTERNATIVE_KEYS))
     return _table(risk_keys.RISK_KEYS, hazard=hazard, alternatives=alternatives)
 
 
@@ -266,7 +266,7 @@ def _table_of(declaration: Callable[..., Any]) -> Schema:
     return _table(declared_keys(declaration), declaration)
 
 
-def _merged(declarations: Iterable[Callable[..., Any]], **own: Schema) -> Schema:
+def _merge_tables(declarations: Iterable[Callable[..., Any]], **own: Schema) -> Schema:
     """Return the schema of a table that has the keys of one of several declarations."""
     merged = dict(own)
     for each in declarations:
@@ -333,7 +333,7 @@ def _strings() -> Schema:
     return {"type": "array", "items": {"type": "string"}}
 
 
-def _named(schema: Schema) -> Schema:
+def _by_name(schema: Schema) -> Schema:
     """Return the schema of a table of tables by name."""
     return {"type": "object", "additionalProperties": schema}
 

@@ -142,7 +142,7 @@ def simulate_fall(
     released = release_blocks(model, state)
     end = max(motion.duration, state.time) + 20.0
     find_lost = mark_lost(model.structure)
-    structure, fields = with_sliding_joints(model.structure), _deformed_bodies(model, state)
+    structure, fields = with_sliding_joints(model.structure), _interpolate_deformed(model, state)
     loose = loosen_fill(structure, released.start, fields)
     # grains are many, and where each of them goes depends on the step anyhow
     dt = None if whole and loose.structure is structure else TRIED_STEPS[0]
@@ -164,7 +164,7 @@ def simulate_fall(
     return dataset.assign_attrs(fall_failure=failure), frames
 
 
-def _deformed_bodies(model: Model, state: State) -> dict[int, Field]:
+def _interpolate_deformed(model: Model, state: State) -> dict[int, Field]:
     """Return the fields of bodies of fill that have deformed."""
     cells, fields = model.cells, dict[int, Field]()
     for number in find_yielding_blocks(model.structure):

@@ -207,10 +207,10 @@ class History(ResultDisplay):
         """
         lines = str(self.dataset.attrs.get("doubts", "")).splitlines()
         stored = [Doubt(cause, remedy) for cause, _, remedy in (x.partition("\t") for x in lines)]
-        return (*stored, *self._derived_doubts)
+        return (*stored, *self._doubts_of_run)
 
     @cached_property
-    def _derived_doubts(self) -> list[Doubt]:
+    def _doubts_of_run(self) -> list[Doubt]:
         """Doubts of a run broken off, and of joints that fail and, by roles, are not assessed."""
         joints, structure = self.joints, self.structure
         doubts = [] if structure is None else doubt_unassessed_joints(joints, structure)
@@ -225,7 +225,7 @@ class History(ResultDisplay):
         Args:
             doubts: doubts in place of those of the run; repeated ones count once.
         """
-        stored = [each for each in dict.fromkeys(doubts) if each not in self._derived_doubts]
+        stored = [each for each in dict.fromkeys(doubts) if each not in self._doubts_of_run]
         text = "\n".join(f"{doubt.cause}\t{doubt.remedy}" for doubt in stored)
         return History(self.dataset.assign_attrs(doubts=text), self.structure)
 

@@ -133,14 +133,14 @@ class Recorder:
                 self._rows["fields"].add(batch.state(k).q[None])
         self.monitor.check_run()
 
-    def _recorded(self, name: str) -> NDArray[Any]:
+    def _rows_of(self, name: str) -> NDArray[Any]:
         """Return all rows of a quantity, in order of the steps."""
         return self._rows[name].rows
 
     def build_history(self, motion: Motion, ending: Ending, outcome: str) -> History:
         """Return the record as a history."""
-        structure, resultants = self.model.structure, self._recorded("resultants")
-        times, faces = (self._recorded(name)[: len(resultants)] for name in ("times", "faces"))
+        structure, resultants = self.model.structure, self._rows_of("resultants")
+        times, faces = (self._rows_of(name)[: len(resultants)] for name in ("times", "faces"))
         moved = self.model.large_displacements
         variables, coordinates, attributes = joint_variables(
             structure, resultants, times, self.criteria, faces, moved
@@ -188,7 +188,7 @@ class Recorder:
     def _attributes(self, motion: Motion, ending: Ending, outcome: str) -> dict[str, Any]:
         """Return the scalar results and settings of the run."""
         structure, monitor = self.model.structure, self.monitor
-        smallest = self._recorded("smallest_step")
+        smallest = self._rows_of("smallest_step")
         stones = np.isin(monitor.displacements.blocks, list_stones(structure))
         attributes = {
             "title": f"{structure.name}: {motion.name or 'time history'}",
@@ -222,10 +222,10 @@ class Recorder:
 
     def _effort(self, records: int) -> dict[str, Any]:
         """Return iterations and smallest step since the previous record, and drift, by record."""
-        ends = self._recorded("numbers")[:records]
+        ends = self._rows_of("numbers")[:records]
         starts, recorded = np.append(0, ends[:-1] + 1), ends[-1] + 1
-        iterations = np.add.reduceat(self._recorded("iterations")[:recorded], starts)
-        smallest = np.minimum.reduceat(self._recorded("smallest_step")[:recorded], starts)
+        iterations = np.add.reduceat(self._rows_of("iterations")[:recorded], starts)
+        smallest = np.minimum.reduceat(self._rows_of("smallest_step")[:recorded], starts)
         since = "since the last record"
         passes = {"long_name": f"Newton iterations, or passes, {since}"}
         shortest = {"units": "s", "long_name": f"smallest step taken {since}"}
@@ -233,14 +233,14 @@ class Recorder:
         return {
             "iterations": ("time", iterations, passes),
             "smallest_step": ("time", smallest, shortest),
-            "energy_drift": ("time", self._recorded("drift")[ends], energy),
+            "energy_drift": ("time", self._rows_of("drift")[ends], energy),
         }
 
     def _add_coordinates(self, variables: dict[str, Any], coordinates: dict[str, Any]) -> None:
         """Add the recorded coordinates of the model and the state at the end to variables."""
         if "fields" in self._rows:
-            fields = self._recorded("fields")
-            times = self._recorded("frames")[: len(fields)]
+            fields = self._rows_of("fields")
+            times = self._rows_of("frames")[: len(fields)]
             coordinates["frame_time"] = "frame", times, {"units": "s"}
             variables["q"] = ("frame", "coordinate"), fields
             corners = corner_displacements(self.model, fields)

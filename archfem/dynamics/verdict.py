@@ -179,14 +179,14 @@ def total_duration_remark(joints: xr.Dataset) -> str:
     steps = step_lengths(flags["time"].values)
     total = float(steps[flags.transpose("joint", "time").values[0]].sum())
     longest = float(longest_duration(flags)[0])
-    required, word = Criteria.of(joints).failures, _assessed_word(joints)
+    required, word = Criteria.of(joints).failures, _adjective_of_joints(joints)
     subject = f"{required}{word} joints and more fail at once"
     if required == 1:
         subject = f"one{word} joint or more fails"
     return f"{subject} for {duration_text(total)} in all, {duration_text(longest)} at the longest"
 
 
-def _assessed_word(joints: xr.Dataset) -> str:
+def _adjective_of_joints(joints: xr.Dataset) -> str:
     """Return the adjective of joints that count, where others do not."""
     return "" if joints["judged"].values.all() else " assessed"
 
@@ -237,7 +237,7 @@ def extremes_remark(dataset: xr.Dataset) -> list[str]:
     if rotations.max() > 0.0:
         rotation = f"largest hinge rotation {_peak_text(joints, rotations, 1e-3, 'mrad')}"
     else:
-        rotation = f"no{_assessed_word(dataset)} joint hinges"
+        rotation = f"no{_adjective_of_joints(dataset)} joint hinges"
     number, part = _find_peak(slips)[1], ""
     if not joints["slide"].values[:, number].any():
         # what is elastic vanishes with the shear of the shaking

@@ -334,18 +334,18 @@ class Bonds:
     @cached_property
     def cohesion(self) -> Array:
         """Cohesion for gaps less `shift`: c - μ f_t of brittle bonds, 0 if broken (p,) [Pa]."""
-        bonded = np.where(self.intact & ~self.softens, self._lowered_cohesion, 0.0)
+        bonded = np.where(self.intact & ~self.softens, self._cohesion_at_shift, 0.0)
         return np.where(self._strength > 0.0, bonded, self.law.points.contact.cohesion)
 
     @cached_property
     def resistance(self) -> Array:
         """Shear limit of softening bonds for gaps less `shift`, also at their strength (p,) [N]."""
         points, share = self.law.points, 1.0 - self.damage
-        softening = share * self._lowered_cohesion * points.weight
+        softening = share * self._cohesion_at_shift * points.weight
         return np.where(self.softens & points.slides, softening, points.contact.resistance)
 
     @property
-    def _lowered_cohesion(self) -> Array:
+    def _cohesion_at_shift(self) -> Array:
         """Cohesion of whole bonds for gaps less `shift`, c - μ f_t (p,) [Pa]."""
         contact = self.law.points.contact
         return np.maximum(contact.cohesion - contact.friction * self._strength, 0.0)

@@ -109,7 +109,7 @@ class StepForces:
             return 0.0
         return self.end_opening if initial is None else self.end_opening - initial
 
-    def _lost_bond_energy(self, q: Array) -> float:
+    def _bond_energy_loss(self, q: Array) -> float:
         """Return the energy stored in what bonds lose at the end [J]."""
         operator = self.operator
         if operator.bonds is None:
@@ -130,7 +130,7 @@ class StepForces:
         if points.is_plain:
             return lost
         opened = np.sum(operator.add_bond_pull(normal) * self._opening_change())
-        return lost + float(opened) + self._lost_bond_energy(q)
+        return lost + float(opened) + self._bond_energy_loss(q)
 
     def stiffness(self, q: Array) -> Array:
         """Return the derivative of the mean force, for `JointOperator.tangent_map` (m,) [N/m]."""

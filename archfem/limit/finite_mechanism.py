@@ -259,9 +259,9 @@ class MechanismPath:
         """Factor [-], and displacement of the growing loads along themselves [m], over place."""
         loaded = [not self.blocks.structure.blocks[k].fixed for k, *_ in self.blocks.pulls]
         forces = np.array([force for *_, force in self.blocks.pulls])[loaded]
-        start, moved = self._pulled_points(self.blocks, loaded), np.zeros(len(self.factors))
+        start, moved = self._places_of_forces(self.blocks, loaded), np.zeros(len(self.factors))
         for number, displacement in enumerate(self.displacements):
-            travel = self._pulled_points(self.blocks.moved(displacement), loaded) - start
+            travel = self._places_of_forces(self.blocks.moved(displacement), loaded) - start
             moved[number] = np.sum(forces * travel) / np.linalg.norm(forces)
         values = {"factor": (self.factors, "1"), "displacement": (moved, "m")}
         return xr.Dataset(
@@ -269,7 +269,7 @@ class MechanismPath:
         )
 
     @staticmethod
-    def _pulled_points(blocks: PlacedBlocks, chosen: Sequence[bool]) -> Array:
+    def _places_of_forces(blocks: PlacedBlocks, chosen: Sequence[bool]) -> Array:
         """Return the present places of the chosen forces that grow (n, 2) [m]."""
         return np.array([place for _, place, _ in blocks.pulls])[chosen]
 

@@ -120,7 +120,7 @@ def _name_interruption(structure: Structure, moving: Sequence[int]) -> str:
     ends = [n for n in moving if len(near[n]) == 1 and not any(blocks[k].fixed for k in near[n])]
     named = [f"'{blocks[n].name}' at {say_place(as_point(blocks[n].centroid))}" for n in ends]
     for end, name in zip(ends, named, strict=True):
-        own = (end, *near[end], *_connected_supports(structure, near, [end]))
+        own = (end, *near[end], *_find_supports(structure, near, [end]))
         others = [n for n in near if n not in own]
         others = [n for n in others if blocks[n].fixed or len(near[n]) == 1]
         gaps = {n: blocks[end].distance_to(blocks[n]) for n in others}
@@ -137,13 +137,13 @@ def _name_interruption(structure: Structure, moving: Sequence[int]) -> str:
             )
     if not ends:
         return ""
-    held = _connected_supports(structure, near, ends)
+    held = _find_supports(structure, near, ends)
     only = f", and only '{blocks[held[0]].name}' holds the others" if len(held) == 1 else ""
     rest = f"{' and '.join(named[:2])} rest{'s' * (len(ends) == 1)} on nothing"
     return f"{rest}{only}: add a support, or the stones that are missing"
 
 
-def _connected_supports(
+def _find_supports(
     structure: Structure, near: Mapping[int, set[int]], starts: Sequence[int]
 ) -> list[int]:
     """Return the fixed blocks that blocks touch, themselves or through others that move."""

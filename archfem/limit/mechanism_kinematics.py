@@ -429,18 +429,18 @@ class LoopCheck:
         return np.where(np.abs(basis) > 1e-12, basis, 0.0)  # round-off: the joint is in no loop
 
     @cached_property
-    def _known(self) -> dict[bytes, bool]:
+    def _answer_cache(self) -> dict[bytes, bool]:
         """Answers of `permits_motion` by the freedoms: many histories share them."""
         return {}
 
     def permits_motion(self, freedoms: Array) -> bool:
         """Return whether the failed joints may permit a motion of the parts."""
         pattern = freedoms.tobytes()
-        if pattern not in self._known:
-            if len(self._known) >= MAX_KNOWN_PATTERNS:
-                self._known.clear()
-            self._known[pattern] = self._closes_any_loops(freedoms.reshape(3, -1))
-        return self._known[pattern]
+        if pattern not in self._answer_cache:
+            if len(self._answer_cache) >= MAX_KNOWN_PATTERNS:
+                self._answer_cache.clear()
+            self._answer_cache[pattern] = self._closes_any_loops(freedoms.reshape(3, -1))
+        return self._answer_cache[pattern]
 
     def _closes_any_loops(self, freedoms: Array, large: int = 200) -> bool:
         """Return `permits_motion`, by the loops between bodies.

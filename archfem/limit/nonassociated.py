@@ -323,7 +323,7 @@ def _search(
     with ProgressReport("limit analysis", len(FRICTION_SHARES) + number) as progress:
         followed, path = _follow_friction(programme, progress)
         starts = followed + _free_head_joints(programme)
-        starts += _relaxed_states(programme, start, number)
+        starts += _relax_starts(programme, start, number)
         solutions = _find_solutions(programme, starts, progress)
     normal = np.array([normal_forces(forces) for forces in starts])
     smallest = normal.reshape(-1, joints).min(axis=0, initial=np.inf)
@@ -408,7 +408,7 @@ def starting_forces(
     return forces if start is None else [start.forces, *forces]
 
 
-def _relaxed_states(programme: Programme, start: Optimum | None, number: int) -> list[Array]:
+def _relax_starts(programme: Programme, start: Optimum | None, number: int) -> list[Array]:
     """Return forces of the associated optimum and of random vertices, each and as it relaxes."""
     # Joints resist μ N of the state before, and sliding dilates less from one to the next
     # (Gilbert et al.): from such states most alternations end at a solution, from vertices few.

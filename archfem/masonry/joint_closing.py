@@ -330,7 +330,7 @@ def with_finish(structure: Structure, finish: str, contact: Contact | None = Non
     joints = list(structure.joints)
     for number, joint in enumerate(joints):
         if joint.contact == contact or (contact is None and _weaker_stone(structure, joint)):
-            law = finished_contact(structure, joint, finish)
+            law = contact_of_finish(structure, joint, finish)
             laws.setdefault(joint.contact, set()).add(law)
             joints[number] = replace(joint, contact=law)
     origin = structure.origin
@@ -341,7 +341,7 @@ def with_finish(structure: Structure, finish: str, contact: Contact | None = Non
     return replace(structure, joints=tuple(joints), origin=origin)
 
 
-def finished_contact(structure: Structure, joint: Joint, finish: str) -> Contact:
+def contact_of_finish(structure: Structure, joint: Joint, finish: str) -> Contact:
     """Return the contact of a joint of stones with the usual law of a finish."""
     stone = _weaker_stone(structure, joint)
     if stone is None:

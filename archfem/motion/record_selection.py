@@ -512,14 +512,14 @@ def _check_events(
 
 
 @lru_cache(maxsize=4000)
-def _cached_spectrum(motion: Motion, measure: Measure, periods: tuple[float, ...]) -> Array:
+def _spectrum_of_motion(motion: Motion, measure: Measure, periods: tuple[float, ...]) -> Array:
     """Compute the peak acceleration and the spectrum of a motion once (1 + m,) [m/s²]."""
     return _compute_spectrum(motion, measure, np.array([0.0, *periods]))
 
 
 def _compute_spectra(motions: Sequence[_Candidate], measure: Measure, periods: Array) -> Array:
     """Return peak acceleration and spectrum of each candidate (n, 1 + m) [m/s²]."""
-    return np.array([_cached_spectrum(each.motion, measure, tuple(periods)) for each in motions])
+    return np.array([_spectrum_of_motion(each.motion, measure, tuple(periods)) for each in motions])
 
 
 def _compute_spectrum(motion: Motion, measure: Measure, periods: Array) -> Array:

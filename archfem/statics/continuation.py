@@ -324,7 +324,7 @@ def _solve_bordered(
 ) -> Array | None:
     """Solve for steps of q and λ; None where their matrix is exactly singular."""
     try:
-        matrix = _bordered(tangent, load, row)
+        matrix = _border(tangent, load, row)
         if isinstance(matrix, np.ndarray):
             return np.asarray(np.linalg.solve(matrix, right))
         return np.asarray(splu(matrix).solve(right))
@@ -332,7 +332,7 @@ def _solve_bordered(
         return None
 
 
-def _bordered(tangent: sparse.csr_matrix, load: Array, row: Array) -> Array | sparse.csc_matrix:
+def _border(tangent: sparse.csr_matrix, load: Array, row: Array) -> Array | sparse.csc_matrix:
     """Return the matrix of the steps of q and λ; dense up to where LAPACK is faster."""
     size = len(load)
     if size < 400:
@@ -346,7 +346,7 @@ def _bordered(tangent: sparse.csr_matrix, load: Array, row: Array) -> Array | sp
 
 def _determinant_sign(tangent: sparse.csr_matrix, load: Array, row: Array) -> float:
     """Return the sign of the determinant of the matrix of steps; 0 where it is singular."""
-    matrix, places = _bordered(tangent, load, row), np.arange(len(row))
+    matrix, places = _border(tangent, load, row), np.arange(len(row))
     # Solutions x of A x = b and y of A' y = c, for right sides of the size of A and no symmetry
     magnitude, wave = abs(matrix), np.cos(places**2)
     b, c = wave * (magnitude @ np.ones(len(row))), wave * (magnitude.T @ np.ones(len(row)))

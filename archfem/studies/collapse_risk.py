@@ -479,7 +479,7 @@ class CollapseRisk(ResultDisplay):
         return unscaled * rows["lower"].values, unscaled * rows["upper"].values
 
     @cached_property
-    def _known_curves(self) -> dict[str, Fragility]:
+    def _curve_cache(self) -> dict[str, Fragility]:
         """Fragility curves that were fitted, by intensity measure."""
         return {}
 
@@ -495,10 +495,10 @@ class CollapseRisk(ResultDisplay):
         """
         self.check_answered()
         name = measure or self.hazard.measure
-        if name not in self._known_curves:
+        if name not in self._curve_cache:
             low, high = self.capacities(name)
-            self._known_curves[name] = fragility(high, low)
-        return self._known_curves[name]
+            self._curve_cache[name] = fragility(high, low)
+        return self._curve_cache[name]
 
     @cached_property
     def best_measure(self) -> str:
@@ -511,7 +511,7 @@ class CollapseRisk(ResultDisplay):
             return np.log(np.array(self.capacities(measure)))[:, None, :]
 
     @cached_property
-    def _resampled(self) -> Any:
+    def _bootstrap_samples(self) -> Any:
         """Answered samples of the bootstrap, whole records at a time (RESAMPLES, n)."""
         random, records = np.random.default_rng(0), self._of_answered("record_number")
         members = [np.flatnonzero(records == record) for record in np.unique(records)]
@@ -538,7 +538,7 @@ class CollapseRisk(ResultDisplay):
         return fit_brackets(self._log_brackets()[:, 0, drawn], group[drawn])
 
     @cached_property
-    def _known_rates(self) -> dict[str | None, Rate]:
+    def _rate_cache(self) -> dict[str | None, Rate]:
         """Rates that were computed, by alternative; None is all."""
         return {}
 
@@ -562,8 +562,8 @@ class CollapseRisk(ResultDisplay):
             DidNotConverge: fewer than 8 samples have an answer.
         """
         self.check_answered()
-        if alternative in self._known_rates:
-            return self._known_rates[alternative]
+        if alternative in self._rate_cache:
+            return self._rate_cache[alternative]
         labels = self._of_answered("alternative")
         own = np.full(len(labels), True) if alternative is None else labels == alternative
         if own.sum() < FIRST_ROUND:
@@ -572,7 +572,7 @@ class CollapseRisk(ResultDisplay):
                 f"{sorted(set(labels))} with at least {FIRST_ROUND}, or take more samples"
             )
         groups = self._groups if alternative is None else [own]
-        drawn = np.vstack([np.arange(len(labels)), self._resampled])
+        drawn = np.vstack([np.arange(len(labels)), self._bootstrap_samples])
         drawn = drawn[np.all([group[drawn].any(axis=1) for group in groups], axis=0)]
         rates = self._integrate(drawn, groups)
         # Quantiles of the bootstrap are too narrow where records are few: with 7 they contain the
@@ -581,7 +581,7 @@ class CollapseRisk(ResultDisplay):
         error = float(np.log(rates[1:]).std()) * sqrt(1.0 + 1.0 / freedom)
         factor, mean = exp(float(stats.t.ppf(0.95, freedom)) * error), float(rates[0])
         rate = Rate(mean, mean / factor, mean * factor)
-        self._known_rates[alternative] = rate
+        self._rate_cache[alternative] = rate
         return rate
 
     def dispersions(self) -> dict[str, float]:
