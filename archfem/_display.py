@@ -82,8 +82,8 @@ class ResultDisplay:
         """Draw the result with the function of `archfem.view` for its class.
 
         Args:
-            options: of that function: `draw_structure`, `draw_dead_load`, `draw_joints` for a
-                history, `draw_pushover`, `draw_collapse`, `draw_modes`, `draw_motion` or
+            options: options of that function: `draw_structure`, `draw_dead_load`, `draw_joints` for
+                a history, `draw_pushover`, `draw_collapse`, `draw_modes`, `draw_motion` or
                 `draw_selection`; of an IDA `measure` and `demand` as for `Ida.curves`.
 
         Returns:
@@ -134,7 +134,7 @@ class ProgressReport:
         self._bar.close()
 
     def show(self, text: str, done: int = 0) -> None:
-        """Show a text, and count what is done since the last one."""
+        """Show a text, and count the steps done since the last one."""
         self._bar.update(done)
         self._bar.set_postfix_str(text)
         self._text, first = text, (*self._open, self)[0]

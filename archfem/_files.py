@@ -354,7 +354,7 @@ def read_sealed_json(path: Path, what: str) -> Any:
 
 
 def hash_json(content: Any) -> str:
-    """Return the SHA-256 of what JSON can represent."""
+    """Return the SHA-256 of a value that JSON can represent."""
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 
@@ -483,7 +483,7 @@ def start_draft(folder: Path, command: str) -> Path:
 
 
 def remove_leftovers(folder: Path) -> None:
-    """Remove what killed commands have left in a folder, which is locked."""
+    """Remove the remains of killed commands from a folder, which is locked."""
     complete_publication(folder)
     for leftover in folder.glob(f"{DRAFT_PREFIX}*"):
         path_inside(folder, leftover.name)
@@ -527,7 +527,7 @@ def complete_publication(folder: Path) -> None:
 
 
 def _move_finished(finished: Path, folder: Path) -> None:
-    """Move finished results to their places, and delete what they replace."""
+    """Move finished results to their places, and delete the earlier ones."""
     listed = {name for group in read_file_list(finished).values() for name in group.files}
     earlier = {name for group in intact_file_list(folder).values() for name in group.files}
     # all places are checked before the first change

@@ -58,7 +58,7 @@ def declared_keys(declaration: Callable[..., Any], named: tuple[type, ...] = ())
 
     Each has the kind of its value for `check_table`: an annotation such as `Metres` its unit, or
     the field's `metadata={"unit": …}`; a dataclass or mapping a table; and objects of the classes
-    `named` the name of a table. What no file can hold is left out.
+    `named` the name of a table. Values that no file can hold are left out.
     """
     return dict(_find_keys(inspect.unwrap(declaration), named))
 
@@ -87,7 +87,7 @@ def given_fields(instance: Any) -> dict[str, Any]:
 
 @cache
 def _kind_of(hint: Any, named: tuple[type, ...]) -> Any:
-    """Return the kind of a key with an annotation; None for what no file can hold."""
+    """Return the kind of a key with an annotation; None for values that no file can hold."""
     kind, inner = get_origin(hint) or hint, get_args(hint)
     plain = {float: "1", int: int, str: str, bool: bool, np.ndarray: ["1"]}
     plain |= dict.fromkeys(named, str)

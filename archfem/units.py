@@ -53,7 +53,7 @@ def in_unit(value: Any, unit: str, key: str) -> float:
     Args:
         value: 2.95, "2.95 m", "1.48 MPa/mm"; a bare number is in `unit` already. For an
             acceleration "0.3 g" is 0.3 times standard gravity.
-        unit: of the result, "1" for a pure number.
+        unit: unit of the result, "1" for a pure number.
         key: name of the value in an error.
 
     Returns:

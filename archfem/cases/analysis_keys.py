@@ -67,7 +67,7 @@ class LimitAnalysis:
         return {"friction": self.friction, "strength": self.strength, "fill": self.fill}
 
     def check(self, structure: Structure) -> None:
-        """Refuse what `solve` refuses, or a rating, before other results are computed.
+        """Refuse all that `solve` or a rating refuses, before other results are computed.
 
         Args:
             structure: structure of the case.

@@ -1,4 +1,4 @@
-"""Values of a case that decide and that none of its tables gives: results mark them as defaults."""
+"""Deciding values that no table of a case gives: results mark them as defaults."""
 
 from collections.abc import Iterator
 from itertools import groupby
@@ -212,7 +212,7 @@ def _has_default_vertical(case: Case) -> bool:
 
 
 def describe_friction_margin(case: Case, structure: Structure) -> list[str]:
-    """Describe from which friction rigid blocks stand, with a note where that is left open."""
+    """Describe from which friction rigid blocks stand, with a note if that is left open."""
     if not (sentence := describe_friction(structure)):
         return []
     least = least_friction(structure) or 0.0

@@ -421,7 +421,7 @@ def describe_thickness(case: Case, ring: Ring) -> tuple[str, str, list[str]]:
 def compare_with_site(case: Case, found: Collapse) -> tuple[str, str]:
     """Return the site's ground acceleration, and its multiple at collapse; both empty if unknown.
 
-    The multiple is that of a push by the weight, over what is assumed of a fill.
+    The multiple is that of a push by the weight, over the assumptions on a fill.
     """
     if not found.push or found.outcome is not Outcome.COLLAPSES:
         return "", ""

@@ -546,7 +546,7 @@ def _warn_of_another_case(case: Case, folder: Path) -> None:
 
 
 def case_files(case: Case) -> dict[str, str]:
-    """Return the case, and what was read from its drawing, whose blocks the case has."""
+    """Return the case, and the report on its drawing, whose blocks the case has."""
     files = {CASE_FILE: case.text().rstrip("\n")}
     if (survey := read_survey(case.settings, case.folder)) is not None:
         table = case.settings["structure"]

@@ -354,7 +354,7 @@ def rate(options: argparse.Namespace) -> int:
 def _vary(
     case: Case, table: Mapping[str, Any], first: Rating, out: str | None
 ) -> tuple[result_text.ResultTable, list[str], list[str]]:
-    """Return table and sentences of the variations of a rating, and what Ctrl-C left out."""
+    """Return table and sentences of the variations of a rating, and those that Ctrl-C left out."""
     from archfem.studies.variations import vary_rating
 
     folder = None if out is None else path_inside(Path(out), "rating_variations")

@@ -142,7 +142,7 @@ class Analysis:
 
     @cached_property
     def fingerprint(self) -> str:
-        """Digest of all values, to the last bit; equal for a case file and what it describes."""
+        """Digest of all values, to the last bit; equal for a case file and its analysis."""
         return hash_value({each.name: getattr(self, each.name) for each in fields(self)})
 
     @property

@@ -173,7 +173,7 @@ def effective_damping(
         start: state to linearise at: an equilibrium of this model; None for its dead load, which
             is computed first; "closed" for all joints closed.
         kind: "stiffness", or "rayleigh" for a mass part too.
-        joints: what the stiffness part acts on, as in `Rayleigh`.
+        joints: bodies on which the stiffness part acts, as in `Rayleigh`.
         mass_share: with "rayleigh", share of the mass that can move along x of the modes up to the
             last effective one [-].
 

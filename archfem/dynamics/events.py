@@ -176,7 +176,7 @@ def register_criterion(name: str, criterion: Callable[[Structure, Array], str | 
     In Python `time_history(…, until=criterion)` needs no registration.
 
     Args:
-        name: of the criterion.
+        name: name of the criterion.
         criterion: function of the structure and of N, V, M of all joints at a step (n_joints, 3)
             [N, N, N m]; it returns the reason to end the run, or None.
 

@@ -209,7 +209,7 @@ def _fall_dataset(
 def _doubt_joints(structure: Structure, motion: Motion, start: float) -> Iterator[Doubt]:
     """Yield a doubt of a fall if rigid blocks, from where they were built, lose none.
 
-    Only what falls without them is compared: no cohesion, no soft bodies and no laws of the user.
+    Only falls without them are compared: no cohesion, no soft bodies and no laws of the user.
     """
     is_rigid = not (structure.cohesion.any() or structure.tension.any() or structure.has_own_laws)
     is_rigid = is_rigid and not find_yielding_blocks(structure)

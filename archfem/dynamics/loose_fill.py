@@ -2,7 +2,7 @@
 
 Fill in one piece has deformed with the stones below, and pieces may be in each other where they
 have no joint. As rigid bodies of their shapes as built they would overlap with stones. Grains are
-parts of the fill as it has deformed, and what is in a stone or in another grain is cut off.
+parts of the fill as it has deformed. Their overlaps with stones and other grains are cut off.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -108,7 +108,7 @@ def loosen_fill(structure: Structure, start: LooseBlocks, fields: Mapping[int, F
 
     Args:
         structure: with fill in one piece, or in pieces.
-        start: of its blocks.
+        start: state of its blocks.
         fields: places and velocities of bodies that have deformed; others are rigid.
     """
     judged = list_stones(structure)
@@ -213,7 +213,7 @@ def _place_stones(bodies: Bodies, stones: Sequence[int], poses: Array) -> Iterat
 
 
 def _trim(grains: Sequence[_Grain], stones: Iterable[Convex], level: float) -> None:
-    """Cut off what grains have in the ground and in stones, and half of what two have in common."""
+    """Cut off the overlaps of grains with ground and stones, and half of those of two grains."""
     for grain in grains:
         grain.points = _cut_by_line(grain.points, np.array([0.0, -1.0]), -level)
     for points, outer in stones:

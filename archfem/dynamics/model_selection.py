@@ -70,8 +70,8 @@ def build(  # noqa: PLR0913  (keywords of a discretisation, and of the selection
         cells: minimum number of cells through the thickness (facets on a joint) and along each
             block.
         cell: "quadrilateral" or "triangle".
-        max_cell_size: of cells inside blocks without corners, such as backfill [m]; by default half
-            of the block's mean thickness.
+        max_cell_size: largest size of cells inside blocks without corners, such as backfill [m]; by
+            default half of the block's mean thickness.
         degree: degree of the elements, 1 or 2.
         quadrature: rule on each joint facet, "exact", "lobatto", "trapezoidal", "nodal" (springs at
             mesh nodes) or "gauss"; by default "exact", or "lobatto" with a number of points or

@@ -264,7 +264,7 @@ def _say_scale(scale: float, pga: float | None) -> str:
 
 
 def _say_bracket(state: str, lower: float, pga: float | None, met: str) -> str:
-    """Return a bracket in words, from the state at its lower bound to what is met above it."""
+    """Return a bracket in words, from the state at its lower bound to the event above it."""
     if not lower:  # the smaller ones, if any were run, have no answer
         return f"{met}; no smaller scale is known to survive"
     return f"{state} at {_say_scale(lower, pga)}, {met}"
@@ -275,7 +275,7 @@ def _doubts_of_searches(
 ) -> tuple[str, ...]:
     """Return reasons why brackets may be wrong: runs broken off, not monotonic, or in doubt.
 
-    Searches are by their settings in words. What differs in numbers alone is stated once.
+    Searches are by their settings in words. Doubts that differ in numbers alone are stated once.
     """
     doubts, of_runs = list[str](), dict[str, tuple[str, list[str]]]()
     for settings, scales in searches.items():
@@ -409,8 +409,8 @@ class CollapseScale:
     """Scales of a motion between which a structure falls, searched with several time steps.
 
     A structure has fallen once its `CollapseState` is "partly fallen" or "fallen". A run that is
-    broken off counts neither as a fall nor as standing, and no bracket rests on it. Of a step whose
-    search was interrupted only falls count, unless no step has a finished search. The response
+    broken off counts neither as a fall nor as standing, and no bracket rests on it. Only falls
+    count of a step whose search was interrupted, unless no step has a finished search. The response
     need not be monotonic: it may survive a motion stronger than one that brought it down, and fall
     at a scale between two at which it stood.
 
@@ -596,7 +596,7 @@ class CollapseScale:
         return call_late_bound("CollapseScale.verdict_range", self, structure, motion, **options)
 
     def rows(self) -> tuple[list[str], list[list[str]]]:
-        """Return titles and cells of a row per run: what was varied and not, state, residual."""
+        """Return titles and cells of a row per run: varied and fixed values, state, residual."""
         rows = [
             [
                 f"{1e3 * dt:g} ms",
@@ -678,12 +678,12 @@ def collapse_scale(
     """Search the smallest scale of a motion at which a structure falls, among those it runs.
 
     Scales are searched as by `mechanism_scales`, once for each time step: a fall under a record is
-    sensitive to all parameters, and a result on which two steps disagree is not reliable. One that
-    stands where another one falls is run at the scales around that fall, too. Whether a structure
-    falls need not be monotonic in the scale. Hence gaps between scales are filled to a ratio of 1.1
-    from half of the smallest fall on, and of 1.05 from 0.7 of it. The ratio is `precision` where
-    that is larger. The search continues below a fall found there. A window of falls narrower than a
-    gap is found by chance only: for a check at one scale, run that scale.
+    sensitive to all parameters, and a result on which two steps disagree is not reliable. A step
+    that stands where another one falls is run at the scales around that fall, too. Whether a
+    structure falls need not be monotonic in the scale. Hence gaps between scales are filled to a
+    ratio of 1.1 from half of the smallest fall on, and of 1.05 from 0.7 of it. The ratio is
+    `precision` where that is larger. The search continues below a fall found there. A window of
+    falls narrower than a gap is found by chance only: for a check at one scale, run that scale.
 
     Args:
         model: model of large displacements, `build(…, displacements="large")`, or such an

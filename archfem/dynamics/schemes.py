@@ -87,9 +87,9 @@ class StiffnessDamping:
     Attributes:
         ratio: damping ratio at the frequency, ζ [-].
         frequency: frequency at which damping has the ratio [Hz].
-        joints: what it acts on besides the blocks, as in `Rayleigh`; only with "closed", the
-            default, are open joints undamped.
-        restitution: of rocking blocks, with which loose blocks go on after such damping, see
+        joints: joints on which it acts besides the blocks, as in `Rayleigh`; only with "closed",
+            the default, are open joints undamped.
+        restitution: ratio of rocking blocks, with which loose blocks go on after such damping, see
             `restitution_damping`; None is that of rigid impacts [-].
 
     Example:
@@ -130,7 +130,7 @@ class EffectiveDamping:
         ratio: damping ratio at the first mode effective along x, and with kind "rayleigh" at the
             last one too [-].
         kind: "stiffness", or "rayleigh" for a mass part too.
-        joints: what the stiffness part acts on, as in `Rayleigh`.
+        joints: bodies on which the stiffness part acts, as in `Rayleigh`.
         mass_share: with "rayleigh", share of the mass that can move along x of the modes up to the
             last effective one [-].
     """

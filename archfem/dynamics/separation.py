@@ -42,7 +42,7 @@ class LooseningMonitor:
 
     @classmethod
     def of(cls, model: Model, start: State) -> Self:
-        """Return the monitor of a run; runs from one state share what it computes once."""
+        """Return the monitor of a run; runs from one state share it."""
         derived, key = model.derived, start.q.tobytes()
         if derived.get("loosening", (b"",))[0] != key:
             derived["loosening"] = key, cls(SeparationMonitor(model), MeetingMonitor(model, start))

@@ -108,7 +108,7 @@ class SlipError:
         self._end = float(batch.times[-1])
 
     def _scale_shears(self, batch: Batch) -> Array:
-        """Return V/N of the joints, and what it lacks to its limit (steps, 2, j)."""
+        """Return V/N of the joints, and its distance from the limit (steps, 2, j)."""
         friction, cohesion, least = self._law
         normal, shear = (batch.resultants[:, self.joints, k] for k in range(2))
         pressed, limit = np.maximum(normal, least), friction * np.maximum(normal, 0.0) + cohesion

@@ -96,7 +96,7 @@ class Verdict:
 
     @property
     def _outcome_text(self) -> str:
-        """Outcome with the definitions by which there is a mechanism, or with what fell."""
+        """Outcome with the definitions by which there is a mechanism, or with the fallen blocks."""
         if self.fall is not None:
             return self.fall.text
         if self.outcome != "mechanism":

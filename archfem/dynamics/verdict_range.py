@@ -317,7 +317,7 @@ class VerdictRange(ResultDisplay):
         return cls(read_dataset(path, "file of a verdict's range"))
 
     def table(self) -> str:
-        """Return falls, or else dislocations, by value, and what each property explains of them."""
+        """Return falls, or else dislocations, by value, and the share that a property explains."""
         decisive, rows = self.decisive[self.answered], []
         data = self.answers
         for name, share in self.importance().items():
@@ -425,7 +425,7 @@ def _find_condition(
 def _separation(members: Array, falls: NDArray[np.bool_]) -> Array:
     """Return the gain of log-likelihood if the members have their own share of falls (conditions,).
 
-    By it, unlike by the share alone, one run that falls separates less than a rule does. It is zero
+    Unlike by the share alone, one run that falls then separates less than a rule does. It is zero
     where members fall less often than the others.
     """
     sizes, inside = members.sum(axis=1), members @ falls

@@ -164,7 +164,7 @@ class Criteria:
 
 
 def check_criteria(criteria: object) -> None:
-    """Refuse what is neither criteria nor None."""
+    """Refuse values that are neither criteria nor None."""
     if criteria is not None:
         check_type(criteria, Criteria, "criteria", "give Criteria(hinge=…, failures=…)")
 

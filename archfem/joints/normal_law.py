@@ -18,8 +18,8 @@ the true traction, μ |t_n| + c. The law of dry joints therefore holds, also ave
 with a shifted gap, a constant pull and another cohesion. Along a facet between an intact and a
 broken end the bond decreases linearly.
 
-Of a softening bond with the damage D both strengths are 1 - D of these, and it pulls from its
-irreversible opening κ on:
+A softening bond with the damage D has 1 - D of both strengths. It pulls from its irreversible
+opening κ on:
 
     t_n = k_n (<g>_- - <g - κ>_- + <g - κ - g_t>_-) + (1 - D) f_t,    g_t = (1 - D) f_t / k_n.
 

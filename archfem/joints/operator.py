@@ -360,8 +360,8 @@ class JointOperator:
     def updated_memory(self, q: Array) -> Array:
         """Return the memory once the joints are at rest at q, as `memory`.
 
-        Of brittle bonds beyond their strength, those at the largest gap of each joint break first:
-        their force goes to the others, which may carry it.
+        The brittle bonds that break first are those at the largest gap of each joint, of all beyond
+        their strength. The others may carry their force.
 
         Args:
             q: coordinates (n,).

@@ -6,7 +6,7 @@ rule, each on its own, in models of small displacements.
 Over a time step opening and slip are linear in time, and tractions are means along this path, as in
 `contact_law`. Simpson's rule takes the means, on parts of the step until these change nothing, so
 that kinks of a law are found. The work on a law without history is then the change of its energy;
-what is lost otherwise is the work less this change.
+other losses are the work less this change.
 """
 
 from collections.abc import Callable
@@ -32,7 +32,7 @@ from archfem.masonry.structure import Structure
 
 
 class JointLaw(Protocol):
-    """A joint law: tractions as functions of opening and slip, and of what happened before.
+    """A joint law: tractions as functions of opening and slip, and of their history.
 
     Values are arrays over p joint points. The opening is positive where the joint is open, the
     slip is that of the higher block, positive toward the extrados. A normal traction is positive
@@ -53,8 +53,8 @@ class JointLaw(Protocol):
         """Return the response to an opening and a slip.
 
         Args:
-            opening: of each point (p,) [m].
-            slip: of each point (p,) [m].
+            opening: opening of each point (p,) [m].
+            slip: slip of each point (p,) [m].
             memory: before (memory_size, p).
 
         Returns:
@@ -67,8 +67,8 @@ class JointLaw(Protocol):
         """Return the energy stored for each area (p,) [J/m²].
 
         Args:
-            opening: of each point (p,) [m].
-            slip: of each point (p,) [m].
+            opening: opening of each point (p,) [m].
+            slip: slip of each point (p,) [m].
             memory: after the response to them (memory_size, p).
         """
 
@@ -124,7 +124,7 @@ def register_joint_law(name: str, law: type) -> None:
     In Python a law needs no registration: `Contact(…, law=…)`.
 
     Args:
-        name: of the law.
+        name: name of the law.
         law: frozen dataclass with the methods of `JointLaw`. Its fields are numbers, whole numbers
             and texts, the keys of a case; a number with a unit has it in its annotation,
             `Annotated[float, "Pa/m"]`, or its metadata, `field(metadata={"unit": "Pa/m"})`.

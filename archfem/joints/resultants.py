@@ -241,7 +241,7 @@ def select_joint(joints: xr.Dataset, joint: str | int) -> xr.Dataset:
     """Return the variables of one joint, at one instant or over time.
 
     Args:
-        joints: of all joints, as made by `joint_dataset`.
+        joints: results of all joints, as made by `joint_dataset`.
         joint: name or number.
 
     Raises:

@@ -7,7 +7,8 @@ With dilatancy the opening of a point grows linearly over the step, to the value
 slip at its end. It follows from fixed-point iteration: a step is solved with one value, and
 `with_dilatancy` returns the step with the next. The normal force acts on the gap less the dilatancy
 opening; friction dissipates μ N |s| less the work N tan ψ |s| of opening, which is not negative.
-Bonds break or soften at the end of a step; the energy stored in what they lose is then lost.
+Bonds break or soften at the end of a step; the energy stored in the part that they lose is then
+lost.
 """
 
 from dataclasses import dataclass, replace
@@ -110,7 +111,7 @@ class StepForces:
         return self.end_opening if initial is None else self.end_opening - initial
 
     def _bond_energy_loss(self, q: Array) -> float:
-        """Return the energy stored in what bonds lose at the end [J]."""
+        """Return the energy that bonds lose at the end of the step [J]."""
         operator = self.operator
         if operator.bonds is None:
             return 0.0

@@ -6,7 +6,7 @@
     displaced_blocks      limit analysis of blocks at displaced places
     fill_bounds           bounds of the factor with a plastic fill
     fill_mesh             triangles of a fill
-    fill_range            range of a result over what is assumed of a fill
+    fill_range            range of a result over the assumptions on a fill
     fill_strength         strength of a fill, by pressure or plastic
     finite_mechanism      finite motion of a mechanism, load factor along its path
     instability           why a structure does not stand

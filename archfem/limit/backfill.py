@@ -263,7 +263,7 @@ def _find_facing(faces: Sequence[Face], fixed: Sequence[Face], heights: Array) -
     """Return pairs of faces, left and right, with only fill between them at one of some heights.
 
     Args:
-        faces: of free stones.
+        faces: faces of free stones.
         fixed: faces of fixed stones, which are in no pair and may be between two others.
         heights: at which to look, any number [m].
     """

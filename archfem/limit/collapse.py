@@ -87,8 +87,9 @@ class Collapse(ResultDisplay):
             pressure along x; of a `PlasticFill` pressure and shear at both ends; None without fill.
         fill_motion: velocities of a `PlasticFill` by triangle, and strain rates over the largest;
             else None.
-        upper: what no state of equilibrium exceeds: the factor itself, with a `PlasticFill` the
-            bound from above. `factor` is the bound from below then, and `lower` another name of it.
+        upper: bound that no state of equilibrium exceeds: the factor itself, with a `PlasticFill`
+            the bound from above. `factor` is the bound from below then, and `lower` another name of
+            it.
         over_fill: factors over all assumptions on a `Fill` that is pushed sideways; else None.
         strength: compressive strength at which joints crush [Pa]; infinite where they do not.
         live: the growing actions, or the settlement.
@@ -181,7 +182,7 @@ class Collapse(ResultDisplay):
         return f"{self.outcome.sentence}: {name}" if name else self.outcome.sentence
 
     def _name_load(self) -> str:
-        """Return the unit of the factor and what the load is, in words."""
+        """Return the unit of the factor and the kind of the load, in words."""
         points = [action for action in self.live if isinstance(action, PointLoad)]
         if self.push:
             return f" g, pushed to the {'right' if self.push > 0.0 else 'left'}"
@@ -280,7 +281,7 @@ def collapse_factor(
         fill: strength of blocks softer than their joints. These and the blocks on them become
             weight and pressures on the stones (`Fill`), or a plastic continuum with two bounds of
             the result (`PlasticFill`). None where there are none, or where they are cut into pieces
-            (`jointed_fill`), whose joints have that strength.
+            (`jointed_fill`): the joints of these have that strength.
         dead: loads that act beside self-weight and do not grow, such as that of a press.
 
     Returns:

@@ -60,7 +60,7 @@ def solve_cones(
     """Minimise a cost over x with right - A x in a product of cones; None without convergence.
 
     Args:
-        cost: of the unknowns (n,).
+        cost: costs of the unknowns (n,).
         matrix: A (m, n).
         right: right sides (m,).
         cones: kind and size of each cone: "zero", "positive" or "second order".

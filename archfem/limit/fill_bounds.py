@@ -65,7 +65,7 @@ class Bound:
 
 @dataclass(frozen=True, eq=False)
 class FilledBlocks:
-    """Rigid stones and the fill between them, with what loads both."""
+    """Rigid stones and the fill between them, with the loads on both."""
 
     blocks: RigidBlocks
     mesh: FillMesh
@@ -491,7 +491,7 @@ def refine_bounds(
     Args:
         structure: structure with its fill.
         live: actions that grow together.
-        friction: of the joints, "coulomb" or None.
+        friction: friction of the joints, "coulomb" or None.
         strength: as for `collapse_factor` [Pa].
         fill: strength of the fill.
         dead: actions beside self-weight that do not grow.

@@ -1,4 +1,4 @@
-"""Triangles of a fill between stones, and what the edges along its outline touch.
+"""Triangular mesh of a fill between stones, and the contacts of the edges along its outline.
 
 Points of the outline are equally far apart between its corners and the ends of its joints. Points
 inside are those of equilateral triangles. Delaunay's triangulation of both has every edge of the
@@ -154,7 +154,7 @@ def mesh_fill(
     Args:
         structure: structure with its fill.
         fill: numbers of the blocks of fill.
-        size: of the triangles, about [m].
+        size: size of the triangles, about [m].
         holds_ends: whether more fill holds vertical ends without a block beside them.
 
     Raises:

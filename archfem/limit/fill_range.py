@@ -1,9 +1,9 @@
-"""Range of a result over what nobody measures of a fill: where its inertia acts, passive pressure.
+"""Range of a result over unmeasured properties of a fill: place of its inertia, passive pressure.
 
 Horizontal forces on a fill act at the feet of its columns or at their centroids. From the feet,
 shear carries their moment to ends that hold; at the centroids the stones below carry all of it. Its
-passive pressure needs movement to develop. Both are assumed; a result that holds must hold whatever
-they are.
+passive pressure needs movement to develop. Both are assumed, so a result must hold for all of their
+values.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -81,7 +81,7 @@ class FillRange:
         """Return both ends as text, or one where they do not differ.
 
         Args:
-            unit: by which the values are multiplied, such as a push in g.
+            unit: unit by which the values are multiplied, such as a push in g.
             digits: significant ones.
         """
         low, high = (f"{value * unit:.{digits}g}" for value in self.ends)
@@ -91,9 +91,9 @@ class FillRange:
         """Return both ends as text, each with its assumption.
 
         Args:
-            unit: by which the values are multiplied, such as a push in g.
+            unit: unit by which the values are multiplied, such as a push in g.
             digits: significant ones.
-            name: of the unit, behind each value.
+            name: name of the unit, behind each value.
         """
         if " to " not in (both := self.format_ends(unit, digits)):
             return f"{both}{name} whatever is assumed of the fill"

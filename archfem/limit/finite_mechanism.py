@@ -236,7 +236,7 @@ class MechanismPath:
     Attributes:
         blocks: the blocks at rest, with their loads.
         factors: factor α of the growing forces at each place (n,) [-].
-        displacements: of centroids, and rotations (n, n_blocks, 3) [m, m, rad].
+        displacements: displacements of centroids, and rotations (n, n_blocks, 3) [m, m, rad].
         velocity: velocities at rest, the fastest corner at 1 m/s (n_blocks, 3).
         mechanisms: mechanisms, one after the other.
         events: changes of the mechanism, each with the number of its place and its text.

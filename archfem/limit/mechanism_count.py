@@ -142,7 +142,7 @@ def counted_mechanism(
 def _find_counted(
     joints: xr.Dataset, failures: "Failures", kinds: Sequence[str]
 ) -> Mechanism | None:
-    """Return what `counted_mechanism` does, from joints with their flags."""
+    """Return the result of `counted_mechanism`, from joints with their flags."""
     limits, roles, flags, counts = failures
 
     enough = np.flatnonzero(sum(counts.values()) >= limits.failures)
@@ -229,7 +229,7 @@ def mechanism_over_record(joints: xr.Dataset, criteria: Criteria | None = None) 
 
 
 def _find_over_record(joints: xr.Dataset, failures: "Failures") -> Mechanism | None:
-    """Return what `mechanism_over_record` does, from joints with their flags."""
+    """Return the result of `mechanism_over_record`, from joints with their flags."""
     limits, roles, each, _ = failures
     failed = np.logical_or.accumulate(
         lasting_flags(each.values, each["time"].values, limits.duration), axis=0

@@ -255,7 +255,7 @@ class Verifier:
         """Search for a motion at one instant, as `verified_mechanism` does.
 
         Args:
-            joints: of the whole structure, as made by `joint_dataset`, with their flags.
+            joints: results of all joints, as made by `joint_dataset`, with their flags.
 
         Returns:
             The motion and its class, beside the count.
@@ -314,7 +314,7 @@ class Verifier:
         """Return the freedoms of each joint of the rigid regions: to open at its ends, and to slip.
 
         Args:
-            joints: of the whole structure, as made by `joint_dataset`, with their flags.
+            joints: results of all joints, as made by `joint_dataset`, with their flags.
 
         Returns:
             (…, 3 n_joints), intrados ends first, then extrados ends, then slips: 1 where an end

@@ -286,7 +286,7 @@ def search_nonassociated(
 
 
 def _find_mirror(programme: Programme) -> tuple[sparse.csr_matrix, sparse.csr_matrix] | None:
-    """Return what mirrors motions and forces, where a symmetric structure is pushed to the left."""
+    """Return mirror maps of motions and forces of a symmetric structure pushed to the left."""
     balance, columns, load = programme.blocks.balance, programme.columns, programme.load
     if programme.limits or programme.force_cost is not None or columns is None:
         return None

@@ -145,7 +145,7 @@ def largest_movement(
 
     Args:
         structure: supports are its fixed blocks.
-        settlement: of a support; its motion is the direction, and the full movement.
+        settlement: settlement of a support; its motion is the direction, and the full movement.
         friction: "coulomb" ends where equilibrium needs |V| > c A + μ N in a joint, as for
             `collapse_factor`; None never slides.
         tolerance: width of the last step, as a share of the movement [-].

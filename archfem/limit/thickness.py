@@ -22,8 +22,9 @@ def minimum_thickness(
 ) -> float:
     """Find the least thickness at which a family of structures stands, by bisection [m].
 
-    The search doubles a very small thickness until one stands, and then halves the bracket. One so
-    thin that it cannot be built, as unequal stones that no longer touch, does not stand.
+    The search doubles a very small thickness until one stands, and then halves the bracket. A
+    structure so thin that it cannot be built does not stand, such as unequal stones that no longer
+    touch.
 
     Args:
         build: function from a thickness [m] to the structure.

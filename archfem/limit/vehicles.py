@@ -55,11 +55,11 @@ class Vehicle:
     """A vehicle of a code, or one's own.
 
     Attributes:
-        name: in tables and pictures.
+        name: name in tables and pictures.
         axles: weight of each axle, from the front [N].
         spacings: distances between the axles, one fewer [m].
         live: partial factor of the code on its weight [-]; None where it is not given, and 1.
-        source: code and clause of the axles, and what of the code's load is left out.
+        source: code and clause of the axles, and the part of the code's load that is left out.
         grade: "read" where weights and spacings were read in the code's table or in a text that
             quotes it, "from memory" otherwise.
         live_source: code and clause of the partial factor, and its grade.
@@ -72,7 +72,7 @@ class Vehicle:
         wheels: width between the outer faces of the wheels, at the road [m].
         lane: width of a lane, beyond which a vehicle does not spread [m].
         width_source: code and clause of wheels and lane, and their grade.
-        left_out: what of the code's load acts at the same time and is left out; else empty.
+        left_out: part of the code's load that acts at the same time and is left out; else empty.
     """
 
     name: str
@@ -195,7 +195,7 @@ class Vehicle:
         return min(self.wheels + depth, self.lane, structure.width)
 
     def describe_width(self, structure: Structure, width: float) -> str:
-        """Describe of what a width that carries one vehicle consists.
+        """Describe the parts of a width that carries one vehicle.
 
         Args:
             structure: the bridge.
@@ -212,7 +212,7 @@ class Vehicle:
 
 
 def _read_vehicles() -> dict[str, Vehicle]:
-    """Return the vehicles of codes, with what those of a code share."""
+    """Return the vehicles of codes, with the properties that those of a code share."""
     text = Path(__file__).with_name("vehicles.toml").read_text(encoding="utf-8")
     vehicles = {}
     for shared in tomllib.loads(text).values():

@@ -45,12 +45,12 @@ def assembled(
 
     Args:
         blocks: in the order of their numbers. Missing roles are inferred from the names of parts.
-        contact: of the new joints, or a function of the two blocks.
+        contact: contact of the new joints, or a function of the two blocks.
         joints: existing ones; their pairs of blocks get no further joint, and joints of their parts
             are not numbered.
         width: out of plane [m].
         gravity: acceleration of gravity [m/s²].
-        name: of the structure.
+        name: name of the structure.
 
     Raises:
         InvalidStructure: blocks are not connected, or roles contradict one another.

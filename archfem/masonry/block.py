@@ -139,8 +139,8 @@ class Block:
 
     Attributes:
         outline: vertices in anticlockwise order [m].
-        material: of the block.
-        name: in tables and messages.
+        material: material of the block.
+        name: name in tables and messages.
         fixed: whether it is an abutment or foundation, which moves by settlement only.
         corners: numbers of the four vertices between which a structured mesh is spanned, or None
             for an unstructured one. Cells *along* lie on the first and third of the four sides so
@@ -148,7 +148,7 @@ class Block:
         part: the part of the structure it belongs to, e.g. "arch" or "north pier".
         centre: where given, the first and third sides of the four-sided outline are arcs about
             this point, and the other two are radial: an annular sector.
-        role: of its part: "ring" or "pier", which are assessed, or "other", which follows its
+        role: role of its part: "ring" or "pier", which are assessed, or "other", which follows its
             support. By default the structure derives it from words of the part's name, with a
             warning where these are ambiguous; a part without a name is a ring.
         grain: whether it is one of many pieces that model a deformable body with joints, as
@@ -230,7 +230,7 @@ class Block:
         """Return the largest y at which a vertical meets the outline, arcs as arcs [m].
 
         Args:
-            x: of the vertical [m].
+            x: place of the vertical [m].
 
         Returns:
             The height, or None where the vertical misses the block.

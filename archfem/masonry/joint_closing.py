@@ -1,4 +1,4 @@
-"""How dry joints close: their stiffness and largest closing, by the finish of faces or by a test.
+"""Closing of dry joints: stiffness and largest closing, by the finish of faces or by a test.
 
 Faces touch at their asperities. Joints are therefore softer than stone, and stiffen as they close:
 
@@ -7,8 +7,8 @@ Faces touch at their asperities. Joints are therefore softer than stone, and sti
 the law of `Contact` with a `closure`. k_i and δ_m follow from the roughness and strength of the
 faces by relations of mated rock joints. Faces of voussoirs are cut separately and do not mate. Such
 a joint closes further by one factor at any stress: k_i is divided by it, δ_m multiplied, and p_0 is
-that of mated faces. By walls of sawn granite the factor is 1, by those of sandstone 3 to 4; Bandis,
-Lumsden and Barton have about 2. The range here is from 1 to 4.
+that of mated faces. The factor is 1 by walls of sawn granite, and 3 to 4 by those of sandstone;
+Bandis, Lumsden and Barton have about 2. The range here is from 1 to 4.
 
 Judgements, not taken from publications on masonry, are roughness and strength of the faces for each
 finish. Measurements are to be preferred: `fit_closing` takes them.

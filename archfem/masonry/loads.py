@@ -132,7 +132,7 @@ class Settlement:
 
     Attributes:
         block: number or name of a fixed block.
-        motion: of its centroid along x and y, and anticlockwise about it (3,) [m, m, rad].
+        motion: motion of its centroid along x and y, and anticlockwise about it (3,) [m, m, rad].
     """
 
     block: int | str

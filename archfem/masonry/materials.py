@@ -36,10 +36,10 @@ class Material:
         poisson: Poisson's ratio [-].
         unit_weight: weight per volume [N/m³].
         strength: compressive strength [Pa], or None where unknown.
-        name: in tables and files.
-        stands_for: what a block of it stands for besides itself, such as "press" for a beam with
-            the weight of its load, or "floor"; then it may weigh more than any material, or, as of
-            a course less broad than the width, less.
+        name: name in tables and files.
+        stands_for: thing that a block of it stands for besides itself, such as "press" for a beam
+            with the weight of its load, or "floor"; then it may weigh more than any material, or,
+            as of a course less broad than the width, less.
     """
 
     young: Pascals
@@ -104,7 +104,7 @@ class Contact:
         friction: Coulomb's coefficient μ: the joint slides where |t_s| reaches μ |t_n| + c, and
             its slip is irreversible. None, stored as infinity, never slides: its shear is elastic
             in open and closed joints, as in Demirel and Aldemir (2021).
-        name: in tables and files.
+        name: name in tables and files.
         cohesion: c, over the closed part of the joint; without tension it persists as the joint
             slides, with tension it belongs to the bond, and is lost with it [Pa].
         dilatancy: tan ψ of the saw teeth, from 0 to μ; 0 slides flat [-].

@@ -134,9 +134,9 @@ class Joint:
         intrados: its end on the inner face [m].
         extrados: its end on the outer face [m]; eccentricity is positive toward it.
         contact: stiffness and friction.
-        name: in tables and messages.
+        name: name in tables and messages.
         part: the part of the structure it belongs to; mechanisms are counted by part.
-        role: of that part: "ring" or "pier", which are assessed, or "other". By default the
+        role: role of that part: "ring" or "pier", which are assessed, or "other". By default the
             structure derives it, as for a block.
     """
 
@@ -196,7 +196,7 @@ class Structure(ResultDisplay):
         joints: the contacts between them.
         width: out-of-plane width w [m].
         gravity: acceleration of gravity, along -y [m/s²].
-        name: in titles and files.
+        name: name in titles and files.
         origin: name and arguments of the shape function that made it, or None; not compared, and
             of a changed copy still that of the original.
     """
@@ -324,7 +324,7 @@ class Structure(ResultDisplay):
         """Return length and middle of the overlap of both faces of joints that have slid.
 
         Args:
-            slip: of the higher block, positive toward the extrados (…, n_joints) [m].
+            slip: slip of the higher block, positive toward the extrados (…, n_joints) [m].
 
         Returns:
             Length of the overlap, at least 0, and its middle (…, n_joints) [m]. The middle is

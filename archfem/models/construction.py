@@ -1,4 +1,4 @@
-"""Partly built structures: blocks that are not there yet, and blocks on centring."""
+"""Partly built structures: blocks that are not yet placed, and blocks on centring."""
 
 from collections.abc import Iterable
 
@@ -63,7 +63,7 @@ class PartialStructure(LinearBlockModel):
         return (self.standing & ~self.centred)[self.cells.coordinate_owner]
 
     def assemble_tangent(self, block_factor: float, stiffness: Array) -> sparse.csr_matrix:
-        """Return the tangent of what stands; held coordinates have a stiffness of their own."""
+        """Return the tangent of the placed blocks; held coordinates have their own stiffness."""
         active, free = self._active_points, self._free
         pairs = active[self.operator.law.coupling_pairs[0]]
         parts = [pairs, active, *([pairs] if self.operator.slides else [])]
@@ -75,7 +75,7 @@ class PartialStructure(LinearBlockModel):
         return matrix
 
     def force(self, q: Array) -> Array:
-        """Return the internal forces of what stands (n,)."""
+        """Return the internal forces of the placed blocks (n,)."""
         of_joints = self.operator.generalised_force(*self._point_forces(q))
         forces = self.block_stiffness @ q + of_joints
         return np.where(self._free, forces, self._held_stiffness * q)
@@ -87,7 +87,7 @@ class PartialStructure(LinearBlockModel):
         return np.where(active, normal, 0.0), np.where(active, shear, 0.0)
 
     def energy(self, q: Array) -> float:
-        """Return the potential energy of what stands without further slip [J]."""
+        """Return the potential energy of the placed blocks without further slip [J]."""
         in_joints = self.operator.point_energies(q)[self._active_points]
         return 0.5 * float(q @ (self.block_stiffness @ q)) + float(in_joints.sum())
 

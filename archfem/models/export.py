@@ -191,8 +191,8 @@ def write_state(model: Model, q: Array, path: str | Path, *, magnification: floa
     Args:
         model: model of the structure.
         q: coordinates (n,), e.g. `dead.q`.
-        path: of the file; its suffix determines the format.
-        magnification: of displacements in a drawing [-].
+        path: path of the file; its suffix determines the format.
+        magnification: magnification of displacements in a drawing [-].
 
     Returns:
         The file.

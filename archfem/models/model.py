@@ -112,7 +112,7 @@ class Cells:
         return sparse.csr_matrix(weights) @ self.shapes_at(edge)
 
     def edge_weights(self, block: int, point: Array) -> tuple[Numbers, Array]:
-        """Return the edge of a block nearest to a point, and what moves the point with its ends.
+        """Return the edge of a block nearest to a point, and the map from its ends to the point.
 
         The point's offset from the edge turns with the edge, by any rotation.
 
@@ -343,7 +343,7 @@ class Model(Protocol):
 
         Args:
             q: coordinates (n,).
-            motion: of the fixed blocks, zero for the others (n_blocks, 3) [m, m, rad].
+            motion: motion of the fixed blocks, zero for the others (n_blocks, 3) [m, m, rad].
         """
 
     def closed_tangent(self) -> sparse.csr_matrix:
@@ -401,7 +401,7 @@ class Model(Protocol):
         """Return the model with supports displaced from where they were built.
 
         Args:
-            motion: of the fixed blocks, zero for the others (n_blocks, 3) [m, m, rad].
+            motion: motion of the fixed blocks, zero for the others (n_blocks, 3) [m, m, rad].
         """
 
     def with_initial_gaps(self, gaps: Array) -> Self:

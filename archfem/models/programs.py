@@ -32,7 +32,7 @@ def write_model(structure: Structure, path: str | Path, *, points: int = 5) -> P
 
     Args:
         structure: dry, with joints that close linearly.
-        path: of the file, .py, .3ddat or .dat.
+        path: path of the file, .py, .3ddat or .dat.
         points: springs of each joint for OpenSees, at Lobatto's points, 2 to 16.
 
     Returns:

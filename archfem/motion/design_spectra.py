@@ -534,7 +534,7 @@ def register_spectrum(name: str, spectrum: type) -> None:
     In Python an object with `horizontal` and `vertical` needs no registration.
 
     Args:
-        name: of the code.
+        name: name of the code.
         spectrum: dataclass whose fields are numbers, whole numbers and texts, the keys of a case;
             with the methods of `DesignSpectrum`, in g.
 

@@ -65,9 +65,9 @@ def peak_ground_acceleration(
         distance: distance from the site [m].
         v_s30: mean shear wave velocity of the upper 30 m of the ground [m/s].
         model: one of `GROUND_MOTION_MODELS`.
-        mechanism: of the fault.
+        mechanism: mechanism of the fault.
         region: such as "turkey" with BSSA14; None takes the model's own default.
-        depth: of the hypocentre [m]; of these models CB14 and DBC14 use it.
+        depth: depth of the hypocentre [m]; of these models CB14 and DBC14 use it.
 
     Returns:
         Median and scatter.

@@ -52,7 +52,7 @@ class Hazard:
         measure: "pga", "pgv", "sa" at `period`, or "sa_avg". The last is the geometric mean of Sa
             over periods from 0.2 to 3 times that of the structure (Eads, Miranda and Lignos,
             Earthq. Eng. Struct. Dyn. 44 (2015) 2057-2073).
-        period: of "sa" [s]; None takes that of the structure.
+        period: period of "sa" [s]; None takes that of the structure.
         source: where the curve is from, such as a map with its edition; "" if that is not known.
 
     Raises:

@@ -71,10 +71,10 @@ def matched(
     of the ground is taken out as drift; a warning has its size, and PGV and PGD before and after.
 
     Args:
-        motion: of at least twice the longest period.
+        motion: motion of at least twice the longest period.
         spectrum: the target; its values are in g.
         band: shortest and longest period to match [s].
-        damping: of the target spectrum [-].
+        damping: damping of the target spectrum [-].
         tolerance: accepted root mean square of the relative misfit [-]; the iteration stops at
             half of it.
 

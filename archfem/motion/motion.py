@@ -24,18 +24,19 @@ COMPONENTS = "horizontal", "vertical", "transverse"
 class Motion(ResultDisplay):
     """The acceleration of the ground in up to three directions, which begin together.
 
-    Components keep their own lengths, zero before and after; what changes one returns a new motion.
-    Components of one file or several that state when they begin are shifted, by whole steps.
+    Components keep their own lengths, zero before and after; a method that changes one returns a
+    new motion. Components of one file or several that state when they begin are shifted, by whole
+    steps.
 
     Args:
         horizontal: accelerations along the arch (n,) [m/s²]; of the ground to the right above 0,
             which pushes stones to the left.
         dt: time between samples [s].
         vertical: accelerations upwards (m,) [m/s²], or None.
-        name: what to call it.
+        name: name of the motion.
         transverse: the other horizontal (k,) [m/s²], or None; only `rotated` makes use of it.
-        start_time: of the first sample on the clock of its file [s], since 1970 where that has a
-            date; None where nothing states it, and components added begin with this motion.
+        start_time: time of the first sample on the clock of its file [s], since 1970 where that has
+            a date; None where nothing states it, and components added begin with this motion.
 
     Raises:
         InvalidInput: a component is no row of finite numbers up to 5 g; or dt is no positive
@@ -82,8 +83,8 @@ class Motion(ResultDisplay):
     ) -> "Motion":
         """Return the motion of a record; the format is found by the content of the file.
 
-        A single component is the horizontal, whatever its direction. Of several, the first level
-        one is the horizontal, the second the transverse; the vertical is turned up.
+        A single component is the horizontal, whatever its direction. If there are several, the
+        first level one is the horizontal, the second the transverse; the vertical is turned up.
 
         Args:
             path: PEER AT2, AFAD, ESM/ITACA, COSMOS, CSMIP/CDMG, USC, RENADIC, BHRC, GeoNet, USGS
@@ -92,12 +93,12 @@ class Motion(ResultDisplay):
                 states neither is read by itself, and added by `with_vertical`.
             transverse: another file, that holds the other horizontal, likewise.
             column: take this component or plain column of `path` only, counted from 1.
-            units: of the plain columns, miniSEED or SAC of `path`: g, m/s2, cm/s2 or gal.
+            units: units of the plain columns, miniSEED or SAC of `path`: g, m/s2, cm/s2 or gal.
             dt: time between samples of the plain columns of `path` [s].
             response: StationXML of the instrument whose counts `path` has, in miniSEED or SAC.
 
         Raises:
-            InvalidInput: what cannot be read without doubt, with file and line.
+            InvalidInput: part of the file cannot be read without doubt; with file and line.
             NotInstalled: miniSEED and SAC need ObsPy.
         """
         channels = read_components(path, column=column, units=units, dt=dt, response=response)
@@ -199,8 +200,8 @@ class Motion(ResultDisplay):
         """Return the horizontal and vertical acceleration at any times (n, 2) [m/s²].
 
         Args:
-            times: of any shape (n in all) [s], `InvalidInput` where one is nan; straight between
-                samples, zero outside the record.
+            times: times of any shape (n in all) [s], `InvalidInput` where one is nan; straight
+                between samples, zero outside the record.
         """
         moments, up = signal_processing.count_in_samples(times, self.dt), self.vertical
         rows = self.horizontal, np.zeros(1) if up is None else up
@@ -211,7 +212,7 @@ class Motion(ResultDisplay):
         """Return the motion with all components multiplied by a factor.
 
         Args:
-            factor: what to multiply by [-]; a negative one turns the motion round.
+            factor: multiple [-]; a negative one turns the motion round.
         """
         return self._map_components(lambda samples: factor * samples)
 
@@ -294,7 +295,7 @@ class Motion(ResultDisplay):
         """Return the motion without drift, as by `signal_processing.correct_baseline`.
 
         Args:
-            degree: of the polynomial taken out of the displacement, at least 3.
+            degree: degree of the polynomial taken out of the displacement, at least 3.
 
         Raises:
             InvalidInput: the degree is below 3, or not below the number of samples.
@@ -307,7 +308,7 @@ class Motion(ResultDisplay):
         Args:
             low: lowest frequency kept [Hz].
             high: highest frequency kept [Hz].
-            order: of the filter, which runs forwards and backwards.
+            order: order of the filter, which runs forwards and backwards.
 
         Raises:
             InvalidInput: not 0 < low < high < half the sampling frequency, or the order below 1.
@@ -318,7 +319,7 @@ class Motion(ResultDisplay):
         """Return the motion in horizontal axes rotated by an angle, from horizontal to transverse.
 
         Args:
-            angle: by which the axes turn [degrees]; a small one with its unit, "5 degree".
+            angle: angle by which the axes turn [degrees]; a small one with its unit, "5 degree".
 
         Raises:
             InvalidInput: there is no transverse, or the angle looks like radians.

@@ -47,7 +47,7 @@ class SelectionRule:
     with the fundamental period T₁ of the structure.
 
     Attributes:
-        name: of the code.
+        name: name of the code.
         lower: least mean spectrum over the design spectrum [-].
         upper: largest mean spectrum over the design spectrum [-].
         zero_period: least mean peak acceleration over the spectrum at period zero [-]; 0 for none.
@@ -144,7 +144,7 @@ class RecordSelection(ResultDisplay):
     """Records and scales whose mean spectrum follows a design spectrum by a code's rule.
 
     Attributes:
-        rule: of the code.
+        rule: rule of the code.
         measure: spectral measure of a record.
         band: first and last period that are checked [s].
         scales: least and largest scale that were allowed [-].
@@ -212,7 +212,7 @@ class RecordSelection(ResultDisplay):
         """Return the scaled records as a suite, for time histories and incremental analyses.
 
         Args:
-            name: of the suite.
+            name: name of the suite.
         """
         return Suite(name, tuple(each.motion.scaled(each.scale) for each in self.records))
 

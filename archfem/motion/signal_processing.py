@@ -1,4 +1,4 @@
-"""Sampled accelerations: integration, filters, baseline, resampling, energy, artificial ones."""
+"""Sampled accelerations: integration, filters, baseline, resampling, energy, synthetic noise."""
 
 from collections.abc import Mapping
 from typing import Any

@@ -20,7 +20,7 @@ class Suite:
     """A named set of motions, each with its vertical, with one scale and reduction factor.
 
     Args:
-        name: of the suite.
+        name: name of the suite.
         pairs: motions as read or matched, before scale and reduction.
         scale: factor on all of them [-].
         reduction: reduction factor R of the elastic demand by the code [-].
@@ -60,7 +60,7 @@ class Suite:
         """Combine horizontal and vertical motions; fewer verticals serve several horizontals each.
 
         Args:
-            name: of the suite.
+            name: name of the suite.
             horizontals: motions, one for each pair.
             verticals: motions whose vertical is taken, or the only component they have.
             scale: factor on all of them [-].
@@ -98,7 +98,7 @@ class Suite:
             horizontals: how many pairs there are.
             verticals: how many different verticals they share, at most one each.
             seed: the same seed gives the same suite.
-            duration: of each motion [s].
+            duration: duration of each motion [s].
             reduction: factor R [-].
 
         Raises:

@@ -34,7 +34,7 @@ class LimitState:
     d_T = secant_share d_u*, and the demand is the displacement spectrum up to T.
 
     Attributes:
-        name: of the code and limit state.
+        name: name of the code and limit state.
         share: capacity as a share of d₀* [-].
         period_factor: factor of the period, in multiples of π; 2 is the secant period [-].
         secant_share: displacement of the period as a share of d_u* [-].
@@ -64,7 +64,7 @@ class LimitState:
         """Return the doubt about a check of NTC against a spectrum of another code, if it is one.
 
         Args:
-            spectrum: of the demand; a table and a motion are of no code.
+            spectrum: spectrum of the demand; a table and a motion are of no code.
         """
         codes = [name for name, kind in registered_spectra.items() if kind is type(spectrum)]
         if not self.name.startswith("NTC") or {*codes} <= {"NTC-2018", "table"}:
@@ -95,12 +95,13 @@ class AssessmentCheck:
     """One check: capacity against demand.
 
     Attributes:
-        name: of the check.
+        name: name of the check.
         capacity: acceleration [m/s²] or displacement [m] that is allowed.
-        demand: of the spectrum, in the same unit.
+        demand: demand of the spectrum, in the same unit.
         unit: "m/s²" or "m".
         ratio: factor on the spectrum at which the check is just passed [-].
-        period: of the equivalent oscillator [s]; undefined (NaN) where accelerations are checked.
+        period: period of the equivalent oscillator [s]; undefined (NaN) where accelerations are
+            checked.
         source: clause of the code.
         over_fill: ratios over all assumptions on a fill; None without one.
     """
@@ -116,7 +117,7 @@ class AssessmentCheck:
 
     @property
     def passes(self) -> bool:
-        """Whether the spectrum as given is withstood, whatever is assumed of a fill."""
+        """Whether the spectrum as given is withstood under every assumption on a fill."""
         return self.outcome == "passes"
 
     @property

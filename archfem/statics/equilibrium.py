@@ -82,7 +82,7 @@ class Equilibrium(ResultDisplay):
         """Return a model with the initial gaps and the memory of the joints of this equilibrium.
 
         Args:
-            model: of the same fidelity and the same structure.
+            model: model of the same fidelity and the same structure.
 
         Raises:
             InvalidInput: it is another one.
@@ -137,7 +137,7 @@ def self_weight(model: Model) -> Array:
     """Return the generalised forces of gravity (n,) [N, N m].
 
     Args:
-        model: of any fidelity.
+        model: model of any fidelity.
     """
     return model.load(BodyForce(0.0, -1.0))
 
@@ -189,8 +189,8 @@ def dead_load(
     as `start=` to continue from it; to continue from `last_state(run)`, use this model.
 
     Args:
-        model: of any fidelity; in stages not "monolithic"; or an `archfem.Analysis`, which has
-            settings and stages of its own.
+        model: model of any fidelity; in stages not "monolithic"; or an `archfem.Analysis`, which
+            has settings and stages of its own.
         newton: settings of the solves.
         stages: stages of construction, e.g. `usual_stages(structure)`; by default in one go.
 
@@ -325,7 +325,7 @@ def equilibrium_under(model: Model, load: Array, newton: Newton | None = None) -
     that order.
 
     Args:
-        model: of any fidelity.
+        model: model of any fidelity.
         load: generalised forces (n,).
         newton: settings of the solves.
 

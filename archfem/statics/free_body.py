@@ -69,7 +69,7 @@ def forces_on(
         structure: structure of the block.
         joints: as made by `joint_dataset`, at one instant.
         block: its number or name; it must not be fixed.
-        cells: of a model with a mesh, for the weight as meshed: there the arcs of sectors are
+        cells: cells of a model with a mesh, for the weight as meshed: there the arcs of sectors are
             chords, which makes them lighter. By default that of the true outline.
 
     Returns:

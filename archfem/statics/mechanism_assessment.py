@@ -101,7 +101,7 @@ class KinematicAssessment(ResultDisplay):
         confidence_factor: FC, by which accelerations of the curve are divided in both checks [-].
         control: name of the block whose centroid is the control point.
         path: finite motion of the mechanism; None where nothing moves.
-        notes: what the result assumes, or leaves out on the safe side.
+        notes: assumptions of the result, and omissions on the safe side.
         doubts: why a ratio may be too high, by how much is not known, each with a remedy.
         least: that under the assumption on a fill that has the least ratio; None without a fill.
         of_bodies: the same with one weight for each body that moves as one, at its centroid, which
@@ -157,7 +157,7 @@ class KinematicAssessment(ResultDisplay):
     def passes(self) -> bool:
         """Whether the displacement check passes, or without it the linear one.
 
-        It must pass whatever is assumed of a fill: `checks[-1].over_fill` has the range.
+        It must pass under every assumption on a fill: `checks[-1].over_fill` has the range.
         """
         return self.checks[-1].passes
 
@@ -550,7 +550,7 @@ class _Oscillator:
         return xr.Dataset({key: ("place", values[key], {"units": units[key]}) for key in values})
 
     def notes(self, factor: float) -> list[str]:
-        """Return what the curve assumes, or leaves out on the safe side."""
+        """Return the assumptions of the curve, and its omissions on the safe side."""
         if self.path is None:
             return []
         found, collapse = [], self.path.mechanisms[0].factor

@@ -1,4 +1,4 @@
-"""Modal analysis about a state, with joints as open or closed as they are there.
+"""Modal analysis about a state, with its open and closed joints.
 
 K x = ω² M x is solved by shift-and-invert and the Lanczos method of ARPACK, for many of all modes
 by LAPACK. By Sylvester's law of inertia the number of negative pivots of K - σ M equals the number
@@ -105,7 +105,7 @@ def modes(model: Model | Subject, count: int, start: Start = None) -> Modes:
     component of at least half the largest one is positive.
 
     Args:
-        model: of any fidelity, or an `archfem.Analysis`; damping plays no part.
+        model: model of any fidelity, or an `archfem.Analysis`; damping plays no part.
         count: number of modes, from 1 to the number of coordinates.
         start: the state: an equilibrium of this model; by default its dead load; or "closed" for
             all joints closed.

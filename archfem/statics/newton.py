@@ -47,8 +47,8 @@ class Newton:
     Attributes:
         tolerance: largest residual, relative to the load [-].
         petsc: further options for PETSc, without a prefix, e.g. {"snes_monitor": ""}. The first
-            solve refuses what PETSc does not read, and methods for symmetric matrices where joints
-            slide, since tangents then are not.
+            solve refuses options that PETSc does not read, and methods for symmetric matrices where
+            joints slide, since tangents then are not.
     """
 
     tolerance: float = 1e-10

@@ -161,12 +161,12 @@ def pushover(
     Bonds break or soften between steps, so that with them the curve does fall; follow it by
     displacement.
 
-    A *settlement* moves a support instead, under the dead load alone. The force with which the
-    structure holds it back changes, and tends to that of the limit state which resists the
-    settlement least: spreading supports bring an arch to its least thrust.
+    A *settlement* moves a support instead, under the dead load alone. The force of the structure on
+    it changes, and tends to that of the limit state with the least resistance to the settlement.
+    Spreading supports bring an arch to its least thrust.
 
     Args:
-        model: of any fidelity, or an `archfem.Analysis`.
+        model: model of any fidelity, or an `archfem.Analysis`.
         live: one action, or several that grow together; a `Settlement` stands alone.
         control: "displacement", "arc length", "path" or "force"; "path" continues normal to the
             last step in all coordinates, and so follows snap-back where displacements are large.

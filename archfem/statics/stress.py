@@ -40,7 +40,7 @@ def principal_stresses(model: Model, q: Array) -> xr.Dataset:
     """Compute the principal stresses at the centres of all cells.
 
     Args:
-        model: of any fidelity with a mesh.
+        model: model of any fidelity with a mesh.
         q: coordinates (n,).
 
     Returns:
@@ -83,7 +83,7 @@ def strength_use(model: Model, q: Array) -> xr.Dataset:
     """Compute the largest compression and tension in each block, and the use of its strength.
 
     Args:
-        model: of any fidelity with a mesh.
+        model: model of any fidelity with a mesh.
         q: coordinates (n,).
 
     Returns:
@@ -309,7 +309,7 @@ def _block_label(block: xr.Dataset) -> str:
 def _peak_stresses(model: Model, fields: Array) -> Array:
     """Return the largest compression and tension of free blocks, at least 0 (frames, 2, blocks).
 
-    Those of rigid blocks beside meshed ones are NaN.
+    Stresses of rigid blocks beside meshed ones are NaN.
     """
     cells, free = model.cells, model.structure.free
     operator = corner_stress_operator(cells)

@@ -182,7 +182,7 @@ def collapse_risk(  # noqa: PLR0913  (one call, one argument for each thing that
         analysis: settings of all runs, which have large displacements; or a structure, of rigid
             stones with 5 % of damping.
         motions: records; their own scales do not matter.
-        hazard: of the site.
+        hazard: hazard of the site.
         samples: number of samples, at least 8. With a larger one than that of `out` the samples
             kept there stay, and a further hypercube is added.
         vary: as for `verdict_range`, of properties alone; by default "k_n", "k_s", "friction" and
@@ -191,7 +191,7 @@ def collapse_risk(  # noqa: PLR0913  (one call, one argument for each thing that
             finish or another thickness, in place of `analysis`; weights need not add up to 1.
         precision: relative width of the brackets [-].
         between: smallest and largest scale; no ground motion may exceed 5 g.
-        seed: of the random numbers.
+        seed: seed of the random numbers.
         workers: number of processes.
         out: file that keeps the samples so far; a call with the same arguments continues it, also
             with another hazard, on which no run depends.
@@ -248,7 +248,7 @@ def collapse_risk(  # noqa: PLR0913  (one call, one argument for each thing that
 
 
 def _size_blocks(out: str | Path | None, samples: int) -> list[tuple[int, int]]:
-    """Return beginning and size of each hypercube: those of a file, and one of what is added."""
+    """Return beginning and size of each hypercube: those of a file, and one of added samples."""
     sizes = [samples]
     if out is not None and Path(out).exists():
         kept = read_dataset(out, "file of a risk")
@@ -296,7 +296,7 @@ def _doubt_hazard(hazard: Hazard, target: DesignSpectrum) -> list[Doubt]:
 
 
 def _check_varied(vary: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the ranges of properties, or refuse what is none of the structure."""
+    """Return the ranges of properties, or refuse those that the structure does not have."""
     ranges = check_ranges({name: DEFAULT_RANGES[name] for name in VARIED} | dict(vary))
     for name, values in ranges.items():
         if name in ("scale", "sign") or isinstance(values, Mapping):
@@ -613,7 +613,7 @@ class CollapseRisk(ResultDisplay):
     def disaggregation(self, bins: int = 12) -> tuple[Array, Array]:
         """Return the edges of bins of intensity (bins + 1,), and the share of the rate in each.
 
-        What is left of the rate lies above the last edge, where all structures fall.
+        The rest of the rate lies above the last edge, where all structures fall.
 
         Args:
             bins: number of bins.
@@ -675,7 +675,7 @@ class CollapseRisk(ResultDisplay):
 
     @property
     def sentence(self) -> str:
-        """The rate, and what it rests on."""
+        """The rate, and its basis."""
         curve, parts = self.fragility(), self.dispersions()
         records = len(np.unique(self._of_answered("record_number")))
         times = curve.median / float(self.hazard.intensity_of(DESIGN_PERIOD))

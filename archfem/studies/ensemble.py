@@ -1,7 +1,7 @@
 """Histories of one structure under many motions, scales and properties, reduced to findings.
 
 Model, dead load and compiled system are those of a change of properties, and are built once for all
-its motions and scales. Of each history the largest values, the first mechanisms and the outcome are
+its motions and scales. The largest values, the first mechanisms and the outcome of each history are
 kept. It is computed by `time_history`, so that its answers are those of a run on its own.
 """
 
@@ -196,7 +196,7 @@ def ensemble(
 
 
 def _list_motions(motions: Motion | Suite | Iterable[Motion]) -> list[Motion]:
-    """Return the motions, or refuse what is none."""
+    """Return the motions, or refuse other values."""
     given = [motions] if isinstance(motions, Motion) else motions
     listed = list(given.motions if isinstance(given, Suite) else given)
     for motion in listed:

@@ -121,11 +121,11 @@ def of_history(run: History, mechanisms: Mapping[str, Mechanism | None] | None =
     Returns:
         The largest values over time and the joints of rings and piers: `eccentricity`, |e| [-], 0.5
         for an open joint; `friction`, |V| / N [-]; `rotation` [rad], `opening` [m], `slip` [m].
-        The `largest_displacement` and `residual_displacement` of a block [m]. By definition of a
-        mechanism the time of the first one [s], infinite if there is none, and its class. How the
-        run `ended`. `fall`, the state after a collapse, "" for small displacements. `energy_drift`,
-        the largest energy error at any step over the exchanged energy [-]. `assessed`, which
-        joints count, if not all do. `doubts`, the number of warnings.
+        The `largest_displacement` and `residual_displacement` of a block [m]. The time of the first
+        mechanism by each definition [s], infinite if there is none, and its class. How the run
+        `ended`. `fall`, the state after a collapse, "" for small displacements. `energy_drift`, the
+        largest energy error at any step over the exchanged energy [-]. `assessed`, which joints
+        count, if not all do. `doubts`, the number of warnings.
     """
     findings: Findings = {**largest_values(run), "outcome": classify_outcome(run)}
     for definition, first in (mechanisms or first_mechanisms(run)).items():
@@ -293,7 +293,7 @@ def register_finding(name: str, find: Callable[..., Findings]) -> None:
     """Add a function that studies can name in `compute`.
 
     Args:
-        name: of the function, without a colon.
+        name: name of the function, without a colon.
         find: function of a `Case`, and of options as keywords, to a flat table of numbers and
             texts; at the top of a module, so that worker processes find it.
 

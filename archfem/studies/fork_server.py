@@ -1,4 +1,4 @@
-"""What all workers share: the fork server of `multiprocessing` imports this module once.
+"""Modules that all workers share: the fork server of `multiprocessing` imports this one once.
 
 Importing it changes the process, so no other module may import it. Neither threads nor MPI may be
 started here, since they do not survive a fork; PETSc is left to the workers that need it.

@@ -146,7 +146,7 @@ class Fragility:
         """Return the annual rate of the limit state, with its 90 % interval.
 
         Args:
-            hazard: of the site, for the intensity of this curve.
+            hazard: hazard of the site, for the intensity of this curve.
 
         References:
             Cornell, Jalayer, Hamburger and Foutch, J. Struct. Eng. 128 (2002) 526-533.

@@ -49,7 +49,7 @@ class Store:
 
     @contextmanager
     def lock(self) -> Iterator[None]:
-        """Refuse other drivers while this one runs, and remove what a killed one has left."""
+        """Refuse other drivers while this one runs, and remove the remains of a killed one."""
         with _files.lock_folder(self.folder):
             for place in filter(Path.is_dir, (self._points, self.shared)):
                 for path in _files.list_files(place):
@@ -122,7 +122,7 @@ class Store:
                     _write_sheet(quoted, part)
 
     def read_rates(self) -> dict[str, float]:
-        """Read what the latest driver knew of its speed; nothing if unknown."""
+        """Read the speed that the latest driver measured; nothing if unknown."""
         try:
             progress = _files.read_sealed_json(self._progress, "progress")
         except InvalidInput:  # missing, damaged or another file

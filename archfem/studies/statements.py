@@ -1,4 +1,4 @@
-"""What a publication states of some cases, beside the findings of a comparison, row by row.
+"""Statements of a publication on some cases, beside the findings of a comparison, row by row.
 
 A study file names of each statement the case that it is about and the finding that answers it.
 Columns are changes that all cases get, such as another law of the joints.
@@ -38,11 +38,11 @@ class Statement:
     Attributes:
         where: section, figure or table.
         words: the statement.
-        published: what is printed.
+        published: value as printed.
         case: name of the case in the study file.
         finding: one of `FINDINGS`.
-        definition: of mechanisms.
-        pair: of motions; the first one by default.
+        definition: definition of mechanisms.
+        pair: pair of motions; the first one by default.
         joint: name, for the finding "joint"; of `output.joints` of the case.
     """
 
@@ -82,7 +82,7 @@ def column_label(case: str, column: str) -> str:
 def statement_table(
     statements: Sequence[Statement], columns: Sequence[str], rows: Mapping[str, Rows]
 ) -> str:
-    """Return a table with a line for each statement: what is published, and what columns find.
+    """Return a table with a line for each statement: the published value, and those of the columns.
 
     Args:
         statements: statements of the study.
@@ -97,7 +97,7 @@ def statement_table(
 
 
 def _answer(statement: Statement, rows: Mapping[str, Rows], column: str) -> str:
-    """Return what a case says to a statement; a dash where one of its points has failed."""
+    """Return the finding of a case on a statement; a dash where one of its points has failed."""
     own = rows.get(column_label(statement.case, column))
     return FINDINGS[statement.finding](own, statement) if own else "-"
 

@@ -1,7 +1,7 @@
 """`Study`: evaluates one function at all points, on processes of this machine or a cluster.
 
-A study file has the same parts whatever it computes: one case or several, what varies, and what is
-computed of each. `Comparison` is the study of cases under the pairs of their suites.
+All study files have the same parts: one case or several, the values that vary, and the results to
+compute for each. `Comparison` is the study of cases under the pairs of their suites.
 """
 
 from collections.abc import Generator, Mapping, Sequence
@@ -139,7 +139,7 @@ class Study:
 
     @classmethod
     def read(cls, path: str | Path, changes: Sequence[str] = (), *, own_code: bool = False) -> Self:
-        """Read a study from a TOML file: its cases, what varies, and what is computed.
+        """Read a study from a TOML file: its cases, varied values and computed results.
 
         Args:
             path: path of a file with `case`, the file of a case, or with tables [cases."name"] of
@@ -155,7 +155,7 @@ class Study:
                 may not, since the file may come from anywhere and the module would run.
 
         Returns:
-            The study; a `Comparison` if that is what is computed.
+            The study; a `Comparison` if the file computes one.
 
         Raises:
             InvalidInput: the file or one of its cases is invalid; the message names the file.
@@ -324,7 +324,7 @@ class Comparison(Study):
         return build_findings(self._labels, self.points, table, self.scales)
 
     def answers(self, table: xr.Dataset) -> str:
-        """Return the table of the statements, each beside what every column finds.
+        """Return the table of the statements, each beside the finding of every column.
 
         Args:
             table: table that `run` returned.
@@ -399,7 +399,7 @@ def _read_study(
 
 
 def _parse_evaluator(settings: Mapping[str, Any], own_code: bool) -> Evaluator:
-    """Return what a study file computes."""
+    """Return the function that a study file computes."""
     find = settings.get("compute", "comparison" if "cases" in settings else "history")
     if not own_code:
         refuse_code(find)

@@ -474,8 +474,8 @@ def vary_rating(
         folder: folder that keeps finished variations, from which the same call continues.
 
     Returns:
-        Table of properties and factors, the worst first; the range, and what to measure first, in
-        words; and how many variations are left after Ctrl-C.
+        Table of properties and factors, the worst first; the range, and the first quantity to
+        measure, in words; and how many variations are left after Ctrl-C.
 
     Raises:
         InvalidInput: the fill is a plastic one.
@@ -514,7 +514,7 @@ def _merge_worst(listed: Sequence[Change], known: Mapping[str, float]) -> dict[s
 
 
 def _say_spreads(listed: Sequence[Change], known: Mapping[str, float], late: int) -> list[str]:
-    """Return the range of single changes, all at once, and what to measure first, in words."""
+    """Return the range of single changes, all at once, and the first quantity to measure."""
     given = known["the values of the case"]
     single = {k: x for k, x in known.items() if k != ALL_AT_ONCE and np.isfinite(x)}
     least, most = min(single, key=single.__getitem__), max(single, key=single.__getitem__)
@@ -554,7 +554,7 @@ def _rate_changed(
 
 
 def _list_rating_changes(case: Case, found: Rating) -> Iterator[Change]:
-    """Yield what is varied beside a rating, its value in words, and keys of the case with it."""
+    """Yield properties varied beside a rating, values in words, and keys of the case with them."""
     yield from _list_changed_lengths(case, found)
     fixed = _list_keys(case.settings["structure"], ("state",))
     if free := {path: "free" for path, state in fixed if state == "fixed"}:

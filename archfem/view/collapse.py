@@ -161,7 +161,7 @@ def draw_rating(found: Rating) -> Figure:
 
 
 def _take_axles_as_given(found: Rating) -> tuple[Collapse, str, list[PointLoad]]:
-    """Return the worst collapse under axles as given, what multiplies them, and strips of load."""
+    """Return the worst collapse under axles as given, their factor in words, and strips of load."""
     # an impact on one axle is drawn with that axle
     code = found.live * (found.impact if found.vehicle.impact_on == "all axles" else 1.0)
     # on the vehicle's part of the width and without factors
@@ -176,7 +176,7 @@ def draw_ratings(ratings: Sequence[Rating]) -> Figure:
     """Draw the factors of several vehicles along a bridge.
 
     Args:
-        ratings: of one bridge; the first six are drawn.
+        ratings: ratings of one bridge; the first six are drawn.
 
     Returns:
         The figure: the lesser factor of both directions over the place of each vehicle's middle, up
@@ -208,7 +208,7 @@ def draw_worst_places(ratings: Sequence[Rating]) -> Figure:
     """Draw each of several vehicles at its worst place on a bridge, with the mechanism.
 
     Args:
-        ratings: of one bridge, in the order of the panels; the first six are drawn.
+        ratings: ratings of one bridge, in the order of the panels; the first six are drawn.
 
     Returns:
         The figure, with two panels a row.

@@ -197,7 +197,7 @@ class PartPanel:
     def select(self, joints: xr.Dataset) -> tuple[Array, xr.Dataset]:
         """Return the joints of the part, and their places along the axis (n,).
 
-        Of each bed of a wall it is the joint of the largest |e|: hundreds are unreadable.
+        A bed of a wall is shown by its joint of the largest |e|: hundreds are unreadable.
         """
         own = _joints_of_part(assessed_joints(joints), self.part)
         if self.is_wall:

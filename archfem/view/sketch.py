@@ -1,4 +1,4 @@
-"""Figure of a drawing as it was read, with what keeps it from being a structure."""
+"""Figure of a drawing as it was read, with the faults that keep it from being a structure."""
 
 from collections.abc import Collection, Sequence
 from pathlib import Path

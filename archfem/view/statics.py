@@ -120,7 +120,7 @@ def draw_modes(modes: Modes, numbers: Sequence[int] | None = None) -> Figure:
 
     Args:
         modes: result of `modes`.
-        numbers: of the modes, counted from 1; by default all.
+        numbers: numbers of the modes, counted from 1; by default all.
 
     Returns:
         The figure, with a panel for each mode.
@@ -202,7 +202,7 @@ def draw_free_body(
         structure: the structure.
         joints: as made by `joint_dataset`, at one instant.
         block: number or name of the block.
-        cells: of a model with a mesh, for the weight of the mesh.
+        cells: cells of a model with a mesh, for the weight of the mesh.
 
     Returns:
         The figure: the block, the polygon, and a legend that lists the forces.

@@ -353,7 +353,7 @@ def draw_names(structure: Structure) -> Figure:
     Joints of rings and piers are named, or all joints of a structure that has neither; where they
     are too near to one another on a page, every second or third; long names are numbered. The name
     of a ring stands above it, or in its opening below a deck, that of another part below: "5" in
-    "main arch" is "main arch, joint 5". Of a wall in bond the stones are numbered instead, as in
+    "main arch" is "main arch, joint 5". The stones of a wall in bond are numbered instead, as in
     `structure.blocks`.
 
     Args:
@@ -458,8 +458,8 @@ def draw_displaced(
         q: an equilibrium, or coordinates (n,).
         joints: at that instant, e.g. `run.joints.sel(time=…)`; by default computed by the model.
         criteria: failure criteria; by default those of `joints`, or else the default ones.
-        magnification: of displacements [-]; by default they are true to scale, so that those of
-            stiff joints cannot be seen.
+        magnification: magnification of displacements [-]; by default they are true to scale, so
+            that those of stiff joints cannot be seen.
         axes: matplotlib axes; by default those of a new figure.
 
     Returns:

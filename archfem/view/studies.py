@@ -61,7 +61,7 @@ class RiskCurves(Protocol):
 
     @property
     def sentence(self) -> str:
-        """The rate, and what it rests on."""
+        """The rate, and its basis."""
 
     def fragility(self, measure: str | None = None) -> Any:
         """Return the fragility over an intensity, by default that of the hazard."""
@@ -240,7 +240,7 @@ def draw_study(
         factors: by name of the case and definition of a mechanism, the least scale at which it
             begins, for each pair (pairs,) [-]; infinite where it does not.
         reduction: reduction factor R; a line is drawn at 1 / R unless it is 1.
-        title: of the figure.
+        title: title of the figure.
 
     Returns:
         The figure.
@@ -635,7 +635,7 @@ def draw_convergence(
 
     Args:
         paths: by name of the refinement, sizes relative to the finest (n,), results (n,), the limit
-            at size zero, and the error bar of the finest; or what `mesh_sensitivity` returns.
+            at size zero, and the error bar of the finest; or a result of `mesh_sensitivity`.
         quantity: name and unit of the result.
 
     Returns:

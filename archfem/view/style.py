@@ -328,7 +328,7 @@ def save(figure: Figure, path: str | Path) -> Path:
 
     Args:
         figure: the figure.
-        path: of the file; missing folders are created.
+        path: path of the file; missing folders are created.
 
     Returns:
         The path of the file.

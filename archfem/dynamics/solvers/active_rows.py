@@ -139,7 +139,7 @@ def _add_active(law, active, gap, near, everywhere):  # type: ignore
 
 @kernel
 def subtract_released(active, force, gap):  # type: ignore
-    """Subtract from gaps of the rows what released forces contribute, z̄ = z - F λ."""
+    """Subtract the share of released forces from the gaps of the rows, z̄ = z - F λ."""
     for k in range(active.sizes[0]):
         active.force[k], active.gap[k] = force[active.numbers[k]], 0.0
     add_columns(active, active.force, 0)

@@ -1,12 +1,12 @@
 """Steps of adaptive length, controlled by errors in the eccentricity and the slip of the joints.
 
-The mean force over a step is its value at the middle, but for ¹/₂₄ Δt² of its curvature in time. So
-the second difference of the resultants from step to step estimates the error, at no cost. It is
-taken of M / (N h), with N at least half of that under dead load; the worst joint of rings and piers
-counts. The slip may err in a step by a share of the joint's depth (`dynamics.slip_error`). Steps
-with too large an error are repeated at half the length; where the error is small the length is
-doubled. Lengths are those of the record, halved or doubled: steps end between two samples only if
-they are shorter than these are apart.
+The mean force over a step is its value at the middle, but for ¹/₂₄ Δt² of its curvature in time.
+The second difference of the resultants from step to step therefore estimates the error, at no cost.
+It is taken of M / (N h), with N at least half of that under dead load; the worst joint of rings and
+piers counts. The slip may err in a step by a share of the joint's depth (`dynamics.slip_error`).
+Steps with too large an error are repeated at half the length; where the error is small the length
+is doubled. Lengths are those of the record, halved or doubled: steps end between two samples only
+if they are shorter than these are apart.
 """
 
 from collections.abc import Iterator

@@ -38,8 +38,8 @@ class Equation:
     """Equation of motion of a model under a ground motion, with damping and time discretisation.
 
     Attributes:
-        model: of any fidelity.
-        motion: of the ground.
+        model: model of any fidelity.
+        motion: motion of the ground.
         damping: None is undamped.
         scheme: conserving, Newmark's or HHT-α.
 
@@ -173,7 +173,7 @@ class Equation:
         """Return a state with the acceleration that its forces cause.
 
         Args:
-            state: of the structure; its acceleration is ignored.
+            state: state of the structure; its acceleration is ignored.
         """
         forces = (
             self.load(state.time)
@@ -189,7 +189,7 @@ class Equation:
         """Return the model with the joints' memory of a state.
 
         Args:
-            state: of the structure.
+            state: state of the structure.
         """
         return self.model if state.memory is None else self.model.with_memory(state.memory)
 
@@ -197,7 +197,7 @@ class Equation:
         """Return the contact displacement of the joint law, u + β v (n,).
 
         Args:
-            state: of the structure.
+            state: state of the structure.
         """
         return state.q + self.lag * state.velocity
 
@@ -205,7 +205,7 @@ class Equation:
         """Return kinetic and potential energy of a state, and two zeros (4,) [J].
 
         Args:
-            state: of the structure.
+            state: state of the structure.
         """
         kinetic = 0.5 * float(state.velocity @ (self.model.mass @ state.velocity))
         potential = self.with_memory(state).energy(state.q) - float(self.weight @ state.q)

@@ -1,4 +1,4 @@
-"""The stepper: many steps at a time by a solver, and SNES or shorter steps where that gives up.
+"""Time integrator: many steps at a time by a solver, with fall-back to SNES or shorter steps.
 
 A step that a solver gives up is taken by SNES, so that all solvers give one history. Where many
 points stick and slide in turn SNES may not converge either, while halves of the step do. The solver
@@ -25,7 +25,7 @@ class Stepper:
     """Steps an equation of motion by a solver, and by SNES where that gives up.
 
     Args:
-        equation: of motion.
+        equation: equation of motion.
         solver: takes the steps; without one SNES takes them all.
         exact: takes those that the solver gives up; by default `SnesSolver` of the equation.
         advance: the loop over steps that a solver converges in.

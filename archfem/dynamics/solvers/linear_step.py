@@ -341,8 +341,8 @@ def _instant_energies(law, lag, work, energy):  # type: ignore
 def _path_energies(law, gap, energy, memory):  # type: ignore
     """Add dissipation of the joints over their path, and go to the start of the next step.
 
-    Energies are as if joints held tension and were stuck: what open ones do not damp is subtracted,
-    and what friction dissipates is added.
+    Energies are as if joints held tension and were stuck: the damping of open ones is subtracted,
+    and the dissipation of friction is added.
     """
     start, speed, gain = law.start, law.speed, law.gain
     if law.damping_lag > 0.0:

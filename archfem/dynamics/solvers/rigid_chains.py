@@ -550,7 +550,7 @@ def _evaluate_chain_step(system, step, states, ground, results, memory):  # type
 
 @inlined_kernel
 def _joint_energies(system, at, lag):  # type: ignore
-    """Return the energy that joints lose in a step, and what they store at its end."""
+    """Return the energy that joints lose in a step, and the energy stored at its end."""
     law, rows, end = system.law, system.start, system.end
     g1, slip, turn = load(end, 0, at), load(end, 1, at), load(end, 2, at)
     (length, _), (middle, _) = lane_overlap(law, at, slip)

@@ -33,7 +33,7 @@ class SnesSolver:
     """Steps an equation of motion, each step solved by SNES.
 
     Args:
-        equation: of motion.
+        equation: equation of motion.
         newton: settings of the solves.
         attempts: solves a step as a whole; by default by the formulas of the scheme. Where it
             raises `DidNotConverge` the step is halved.
@@ -235,7 +235,7 @@ class SnesSolver:
         return rounding * stiffness * structure.width / structure.weight
 
     def _remedy(self) -> str:
-        """Return what may help where steps fail: damping by the scheme only where it applies."""
+        """Return a remedy where steps fail: damping by the scheme only where it applies."""
         model, scheme = self.equation.model, HHT()
         stiffest, admissible = self._rounding_share(), 1e-6
         if stiffest > admissible:

@@ -3,10 +3,10 @@
 The order is one of minimum degree (George and Liu, SIAM Review 31, 1989). Columns of the factor
 with the same fill form a group, and so does a branch of the elimination tree with few columns.
 
-The pattern is symmetric, the matrix need not be. Of each group the rows from the diagonal on are
-one dense block, and the columns below them another. Groups form a tree, and what a group subtracts
-from its ancestors is stored. So where few entries change, only their groups and ancestors are
-eliminated again; solves of a symmetric pattern may keep to branches of the tree, too.
+The pattern is symmetric, the matrix need not be. The rows of each group from the diagonal on are
+one dense block, and the columns below them another. Groups form a tree, and the update of a group
+to its ancestors is stored. Where few entries change, only their groups and ancestors are eliminated
+again; solves of a symmetric pattern may keep to branches of the tree, too.
 """
 
 from dataclasses import dataclass

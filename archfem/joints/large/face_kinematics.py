@@ -250,8 +250,8 @@ def step_poses(sides, joint, side, before, after):  # type: ignore
     """Return the poses of a face over a step, the rotation of its block, and pose derivatives.
 
     Poses are at the start and at the end. A derivative has cosine and sine of the rotation, a
-    factor of the shapes, and the derivative of the face's middle by the block's angle. One is that
-    of the mean over the step, the other that at its end.
+    factor of the shapes, and the derivative of the face's middle by the block's angle. The first
+    derivative is that of the mean over the step, the second that at its end.
     """
     rx, ry = sides.arm[joint, side, 0], sides.arm[joint, side, 1]
     if not sides.has_frame[joint, side]:

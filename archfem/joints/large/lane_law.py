@@ -134,7 +134,7 @@ def _press_apart(law, point, at, ends, lag):  # type: ignore
 def _press_facet(law, point, at, ends, lag, tractions):  # type: ignore
     """Return means of the traction, and Coulomb's limits, each with derivatives.
 
-    Those of the linear law, on which damping depends, are stored.
+    The values of the linear law, on which damping depends, are stored.
     """
     # the gaps, shifted by the lag
     a, c, b, d = ends

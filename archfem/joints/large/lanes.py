@@ -78,7 +78,7 @@ def _declare(function: Any, argument: VectorType, result: VectorType, lower: Any
 
 
 def _register(function: Any, find_signature: Callable[[Any], Any]) -> None:
-    """Register what finds the signature of a call of a function."""
+    """Register the typing of a function, which finds the signature of a call."""
     contents = {
         "key": function,
         # numba tries what is for this target before its own, which takes half the time
@@ -91,7 +91,7 @@ def _register(function: Any, find_signature: Callable[[Any], Any]) -> None:
 def _lane_function(
     result: Any, *arguments: Any, takes_numbers: bool = False
 ) -> Callable[[Any], Any]:
-    """Return a decorator of what lowers a function, with types; None stands for any type."""
+    """Return a decorator of code that lowers a function, with types; None is any type."""
     of_number = {LANES: types.float64, MASK: types.boolean}
 
     def declare(function: Any) -> Any:

@@ -159,7 +159,7 @@ def _uniform_means(contact, ends, rate):  # type: ignore
 def mean_tractions(contact, ends, lag, facet):  # type: ignore
     """Return means of the traction as `linear_means`, and their derivatives by gaps at the end.
 
-    Gaps are shifted by the lag; what a joint presses beyond the linear law has none.
+    Gaps are shifted by the lag; the excess over the linear law has none.
     """
     stiffness = contact.normal_stiffness
     if facet:
@@ -256,7 +256,7 @@ def _add_crossing(stiffness, ends, lag, part, sums):  # type: ignore
 
 @inlined_kernel
 def damping_tractions(contact, ends, lag, facet):  # type: ignore
-    """Return means of what the lag of damping adds to the traction, from gaps without it."""
+    """Return means of the traction that the lag of damping adds, from gaps without it."""
     a, c, b, d = ends
     p, q = lag * (b - a), lag * (d - c)
     stiffness, lagged = contact.normal_stiffness, (a + p, c + q, b + p, d + q)
@@ -363,7 +363,7 @@ def _clip(x, limit):  # type: ignore
 
 @inlined_kernel
 def shear_means(first, change, lag, limit):  # type: ignore
-    """Return mean shear over a step, what slip loses of it, derivatives by change and limit, loss.
+    """Return mean shear over a step, its loss by slip, derivatives by change and limit, loss.
 
     The loss is an energy times the shear stiffness. A point that sticks during the whole step has
     the derivatives 1/2 + lag and 0.

@@ -16,7 +16,7 @@ from archfem.joints.large.face_kinematics import FaceKinematics, shape_rates
 
 
 class JointRates(NamedTuple):
-    """What the derivative of the forces of all joint segments is assembled from."""
+    """Data from which the derivative of the forces of all joint segments is assembled."""
 
     # derivative of the forces on the jump (x, y), on both angles and on the elongation, by their
     # values at the end (j, 5, 5)
@@ -95,7 +95,7 @@ def add_rates(sides, joint, rates, factor, workspace, places, entries):  # type:
 
 @kernel
 def copy_rates(source, target, joint):  # type: ignore
-    """Copy what the derivatives of a joint segment are assembled from."""
+    """Copy the data from which the derivatives of a joint segment are assembled."""
     for row in range(5):
         for column in range(5):
             target.law[joint, row, column] = source.law[joint, row, column]

@@ -27,10 +27,10 @@ class Arch:
         span: clear span between its springings [m].
         embrace: subtended angle [degrees], a small one with its unit, "5 degree"; or
         rise: clear rise of the intrados above its springings [m].
-        thickness: of the ring [m].
+        thickness: thickness of the ring [m].
         voussoirs: number of stones.
         measured: "intrados"; or "centre line", along which span and rise are measured then.
-        name: of the part.
+        name: name of the part.
     """
 
     role: ClassVar[str] = "ring"
@@ -97,12 +97,12 @@ class Pier:
     Its top course is one skewback between the two springing joints, or behind the only one.
 
     Attributes:
-        breadth: of the courses, between the clear spans beside them [m]; or
+        breadth: breadth of the courses, between the clear spans beside them [m]; or
         gap: between the springings of the neighbouring centre lines, or from that of the only
             one to the outer face [m]. Half a springing joint at each end stands on more.
-        height: from foundation to springing level [m].
+        height: height from foundation to springing level [m].
         course: height of a course, about; courses of a pier are equally high [m].
-        name: of the part.
+        name: name of the part.
     """
 
     role: ClassVar[str] = "pier"
@@ -135,13 +135,14 @@ class Sidewall:
     """Stone courses behind an outer springing, which support it and the parts above.
 
     Attributes:
-        length: from the springing outwards [m].
-        height: from foundation to springing level [m].
+        length: length from the springing outwards [m].
+        height: height from foundation to springing level [m].
         course: height of a course, about [m].
         above: height of the courses above the springing, an abutment to the fill [m].
-        setback: of those courses, and so the depth of the skewback, behind the extrados [m].
+        setback: setback of those courses, and so the depth of the skewback, behind the extrados
+            [m].
         state: "free" courses; "retained" by a fixed wall at their outer end; or "fixed".
-        name: of the part.
+        name: name of the part.
     """
 
     role: ClassVar[str] = "other"
@@ -174,7 +175,7 @@ class Backfill:
         hump: this distance to either side of the highest crown [m].
         spandrels: total thickness of the two spandrel walls, whose weight replaces that of the
             fill [m].
-        material: of the fill.
+        material: material of the fill.
         contact: with stone.
     """
 
@@ -211,8 +212,8 @@ class Backfill:
         """Return the fill material with the weight of the spandrels, averaged over the width.
 
         Args:
-            width: of the bridge, out of plane [m].
-            stone: of the spandrels.
+            width: width of the bridge, out of plane [m].
+            stone: stone of the spandrels.
 
         Raises:
             InvalidStructure: the spandrels are as wide as the bridge.
@@ -231,8 +232,8 @@ class Paving:
     """Paving stones on the fill.
 
     Attributes:
-        thickness: of the stones [m].
-        length: of a stone, about [m].
+        thickness: thickness of the stones [m].
+        length: length of a stone, about [m].
     """
 
     thickness: Metres

@@ -72,7 +72,7 @@ def bridge(  # noqa: PLR0913  (the parts a bridge may have, and what they are ma
         backfill: or None.
         paving: or None; it rests on the backfill.
         width: out of plane [m].
-        material: of all stones.
+        material: material of all stones.
         contact: between stones.
         chords: straight pieces of each face of a voussoir.
         gravity: acceleration of gravity [m/s²].
@@ -172,18 +172,18 @@ def buttressed_arch(  # noqa: PLR0913  (all are lengths and properties of one st
 
     Args:
         span: clear span between the springings [m].
-        thickness: of the ring [m].
+        thickness: thickness of the ring [m].
         voussoirs: number of stones.
-        breadth: of each buttress [m].
-        height: of the buttresses, from foundation to springing level [m].
+        breadth: breadth of each buttress [m].
+        height: height of the buttresses, from foundation to springing level [m].
         rise: clear rise of the intrados above its springings [m]; or
         embrace: angle subtended by the ring [degrees].
         measured: "intrados"; or "centre line", along which span and rise are measured then.
         course: height of a course, about [m].
         chords: straight pieces of each face of a voussoir.
         width: out of plane [m].
-        material: of all blocks.
-        contact: of all joints.
+        material: material of all blocks.
+        contact: contact of all joints.
         gravity: acceleration of gravity [m/s²].
 
     Raises:
@@ -222,9 +222,9 @@ def arcade(  # noqa: PLR0913  (all are lengths and properties of one structure)
 
     Args:
         spans: clear spans of the arches between their springings [m].
-        heights: of the piers, one more than arches, from foundation to springing level [m].
-        breadths: of the piers [m].
-        thicknesses: of the rings [m].
+        heights: heights of the piers, one more than arches, from foundation to springing level [m].
+        breadths: breadths of the piers [m].
+        thicknesses: thicknesses of the rings [m].
         voussoirs: numbers of stones.
         rises: clear rises of the intrados above their springings [m]; or
         embraces: angles subtended by the rings [degrees].
@@ -232,8 +232,8 @@ def arcade(  # noqa: PLR0913  (all are lengths and properties of one structure)
         course: height of a course, about [m].
         chords: straight pieces of each face of a voussoir.
         width: out of plane [m].
-        material: of all blocks.
-        contact: of all joints.
+        material: material of all blocks.
+        contact: contact of all joints.
         gravity: acceleration of gravity [m/s²].
 
     Raises:

@@ -115,14 +115,14 @@ def circular_arch(  # noqa: PLR0913  (all are lengths and properties of one ring
     Args:
         thickness: ring depth t, from intrados to extrados [m].
         voussoirs: number of stones.
-        radius: of the centre line [m]; together with `embrace`.
+        radius: radius of the centre line [m]; together with `embrace`.
         embrace: angle between the springing joints [degrees]; a small one with its unit,
             "5 degree".
         span: clear span, at the intrados [m]; together with `rise` or `embrace`.
         rise: clear rise, at the intrados, at most half the span [m].
         width: out of plane [m].
-        material: of the stones.
-        contact: of the joints.
+        material: material of the stones.
+        contact: contact of the joints.
         chords: None for stones that are true sectors of the ring; or the number of straight pieces
             of each face. A stone is then lighter than its sector by the fraction φ²/6, with φ the
             angle of a piece.
@@ -183,11 +183,11 @@ def column(
     eccentricity is positive to the right. The base's mid-point is the origin.
 
     Args:
-        breadth: of all blocks [m].
-        heights: of the blocks, from below [m].
+        breadth: breadth of all blocks [m].
+        heights: heights of the blocks, from below [m].
         width: out of plane [m].
-        material: of the blocks.
-        contact: of the joints.
+        material: material of the blocks.
+        contact: contact of the joints.
         gravity: acceleration of gravity [m/s²].
 
     Raises:
@@ -233,14 +233,14 @@ def arch_on_piers(  # noqa: PLR0913  (all are lengths and properties of one stru
     springings belong to the arch.
 
     Args:
-        radius: of the ring's centre line, which is centred on the origin [m].
-        thickness: of the ring [m].
+        radius: radius of the ring's centre line, which is centred on the origin [m].
+        thickness: thickness of the ring [m].
         voussoirs: number of stones in the ring.
-        pier_breadth: of both piers, at least the thickness of the ring [m].
+        pier_breadth: breadth of both piers, at least the thickness of the ring [m].
         courses: heights of the courses of each pier, from below [m].
         width: out of plane [m].
-        material: of all blocks.
-        contact: of all joints.
+        material: material of all blocks.
+        contact: contact of all joints.
         chords: as for `circular_arch`.
         gravity: acceleration of gravity [m/s²].
 
@@ -359,12 +359,13 @@ def pointed_arch(  # noqa: PLR0913  (all are lengths and properties of one ring)
     Args:
         span: clear, at the intrados [m].
         rise: clear, at the intrados, at least half the span [m].
-        thickness: of the ring, along its joints except that at the crown, which is longer [m].
+        thickness: thickness of the ring, along its joints except that at the crown, which is longer
+            [m].
         voussoirs: number of stones.
         chords: straight pieces of each face of a stone.
         width: out of plane [m].
-        material: of the stones.
-        contact: of the joints.
+        material: material of the stones.
+        contact: contact of the joints.
         gravity: acceleration of gravity [m/s²].
 
     Raises:
@@ -414,12 +415,12 @@ def elliptical_arch(  # noqa: PLR0913  (all are lengths and properties of one ri
     Args:
         span: clear, at the intrados [m].
         rise: clear, at the intrados; half the span makes a semicircle [m].
-        thickness: of the ring, at right angles to the intrados [m].
+        thickness: thickness of the ring, at right angles to the intrados [m].
         voussoirs: number of stones.
         chords: straight pieces of each face of a stone.
         width: out of plane [m].
-        material: of the stones.
-        contact: of the joints.
+        material: material of the stones.
+        contact: contact of the joints.
         gravity: acceleration of gravity [m/s²].
 
     Raises:
@@ -466,8 +467,8 @@ def flat_arch(
         voussoirs: number of stones.
         skewback: angle of the springing joints from the vertical [degrees].
         width: out of plane [m].
-        material: of the stones.
-        contact: of the joints.
+        material: material of the stones.
+        contact: contact of the joints.
         gravity: acceleration of gravity [m/s²].
 
     Raises:
@@ -506,12 +507,12 @@ def arch_along(
     Args:
         intrados: points from one springing to the other, connected by straight lines (n, 2) [m];
             normals are computed from three neighbours, so the points must resolve the curvature.
-        thickness: of the ring, at right angles to the intrados [m].
+        thickness: thickness of the ring, at right angles to the intrados [m].
         voussoirs: number of stones.
         chords: straight pieces of each face of a stone.
         width: out of plane [m].
-        material: of the stones.
-        contact: of the joints.
+        material: material of the stones.
+        contact: contact of the joints.
         gravity: acceleration of gravity [m/s²].
 
     Raises:

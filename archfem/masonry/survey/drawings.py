@@ -110,7 +110,7 @@ def read_drawing(
 def read_polylines(
     path: Path, unit: str | None, ignored: Counter[str], snap: float
 ) -> tuple[list[Outline], list[Outline]]:
-    """Read what can be drawn of a DXF file that is in error: closed outlines, and open lines."""
+    """Read the curves of a DXF file that is in error: closed outlines, and open lines."""
     with _foreign_reader("ezdxf", "DXF drawing"):
         read, frame = _load_dxf(path, ignored)
     frame = (frame or Frame(1.0, "units")) if unit is None else _read_unit(unit)
@@ -272,7 +272,7 @@ def _check_properties(data: dict[str, Any], name: str) -> None:
 
 @dataclass(frozen=True, eq=False)
 class Entity:
-    """What a DXF file says of a polyline, a text or another curve."""
+    """Entity of a DXF file: a polyline, a text or another curve."""
 
     kind: str
     layer: str

@@ -1,4 +1,4 @@
-"""Drawings that are no structure: what can be drawn of them, and where outlines do not fit."""
+"""Drawings that are no structure: their outlines, and the places where these do not fit."""
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
@@ -15,7 +15,7 @@ from archfem.masonry.survey.outlines import AMBIGUOUS_GAP_RATIO
 def sketch_drawing(
     path: str | Path, unit: str | None, ignored: Iterable[str], snap: float
 ) -> tuple[list[Outline], list[Outline]]:
-    """Read what can be drawn of a file: closed outlines, and open lines."""
+    """Read the curves of a drawing in error: closed outlines, and open lines."""
     path, layers = Path(path), Counter(dict.fromkeys(ignored, 0))
     try:
         return read_drawing(path, unit, layers, snap), []

@@ -373,7 +373,7 @@ def _closes_all(outlines: list[Outline], snap: float) -> bool:
 
 
 def _close_gaps(outlines: list[Outline], snap: float) -> Closed:
-    """Close the gaps between outlines; refuse what remains ambiguous."""
+    """Close the gaps between outlines; refuse gaps that remain ambiguous."""
     names, frame = [outline.name for outline in outlines], outlines[0].frame
     place, near = frame.place, frame.length(snap)
     # all outlines anticlockwise

@@ -116,7 +116,7 @@ class ContactFaces:
         return normal, clip_to_friction(self._trial_shear(u), self._limit(u) + reserve)
 
     def _is_closed(self, u: Any) -> Any:
-        """One where the joint is closed, else zero [-]."""
+        """Closed part of the joint: one where it is closed, else zero [-]."""
         return ufl.conditional(ufl.lt(self._gap(u), 0.0), 1.0, 0.0)
 
     def _limit(self, u: Any) -> Any:
@@ -157,7 +157,7 @@ class ContactFaces:
         return self._law.mean_normal_traction(*self._gap_path(step, lag)), self._shear(step, lag)[0]
 
     def _shear(self, step: Fields, lag: Any) -> Fields:
-        """Mean traction along the joint over a step, and what is lost by slip [Pa]."""
+        """Mean traction along the joint over a step, and its loss by slip [Pa]."""
         return shear_over_step(*self._shear_path(step), lag, self._mean_limit(step, lag))
 
     def slip_after_step(self, step: Fields, lag: Any) -> Any:

@@ -366,7 +366,7 @@ def write_mesh(
 
     Args:
         structure: structure to mesh.
-        path: of the file, *.msh.
+        path: path of the file, *.msh.
         settings: number and shape of cells; by default `Discretisation()`.
 
     Raises:
@@ -392,7 +392,7 @@ def read_mesh(structure: Structure, path: str | Path) -> Mesh:
 
     Args:
         structure: meshed structure.
-        path: of the file.
+        path: path of the file.
 
     Returns:
         The mesh.

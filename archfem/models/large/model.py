@@ -1,4 +1,4 @@
-"""Models of large displacements: blocks that rotate and slide as far as they like.
+"""Models of large displacements: blocks with rotations and slips of any size.
 
 A model of small displacements is written in corotational coordinates of its blocks: displacement
 of the centroid, rotation, and elastic motions in the frame that rotates with the block. These

@@ -56,7 +56,7 @@ def register_record_format(
     """Add a format of record files, which is tried before those of archfem.
 
     Args:
-        name: of the format.
+        name: name of the format.
         marks: regular expressions that all files of the format contain, each with the number of
             lines, from the first, among which it must be found.
         read: function from the text of a file to its components. `text.lines` are the lines;

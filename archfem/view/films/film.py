@@ -69,9 +69,9 @@ def film(  # noqa: PLR0913  (a film has many settings)
     Args:
         model: the model of the run.
         run: a history with recorded fields.
-        path: of the film, .mp4 or .gif; missing folders are created.
-        magnification: of displacements [-]; by default a round number that makes them visible, and
-            1 for large displacements. Loose blocks are always true to scale.
+        path: path of the film, .mp4 or .gif; missing folders are created.
+        magnification: magnification of displacements [-]; by default a round number that makes them
+            visible, and 1 for large displacements. Loose blocks are always true to scale.
         colour: "displacement" or, for deformable blocks, "stress".
         fps: largest number of frames per second; lower if the run has fewer fields.
         seconds: length of the film [s]; by default that of the run.
@@ -156,7 +156,8 @@ def picture(
         q: an equilibrium, or coordinates (n,).
         joints: at that instant, e.g. `run.joints.sel(time=…)`; by default computed by the model
             with its joint memory.
-        magnification: of displacements [-]; by default a round number that makes them visible.
+        magnification: magnification of displacements [-]; by default a round number that makes them
+            visible.
         colour: "displacement" or, for deformable blocks, "stress".
         size: width and height, even numbers [pixels].
         criteria: failure criteria; by default those of `joints`, or else the default ones.
@@ -194,8 +195,8 @@ def film_modes(
 
     Args:
         modes: result of `modes`.
-        path: of the film, .mp4 or .gif, which repeats; missing folders are created.
-        numbers: of the modes, counted from 1; by default all.
+        path: path of the film, .mp4 or .gif, which repeats; missing folders are created.
+        numbers: numbers of the modes, counted from 1; by default all.
         swings: number of swings.
 
     Returns:

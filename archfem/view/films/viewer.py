@@ -239,7 +239,8 @@ class Viewer:
         """Open the viewer.
 
         Args:
-            options: of `pyvista.Plotter.show`, for example `jupyter_backend` or `screenshot`.
+            options: options of `pyvista.Plotter.show`, for example `jupyter_backend` or
+                `screenshot`.
 
         Returns:
             The result of `pyvista.Plotter.show`: a widget in a notebook, else nothing or an image.
@@ -266,8 +267,8 @@ def viewer(
     Args:
         run: a history with recorded fields.
         model: the model of the run.
-        magnification: of displacements [-]; by default a round number that makes them visible, and
-            1 for large displacements.
+        magnification: magnification of displacements [-]; by default a round number that makes them
+            visible, and 1 for large displacements.
         colour: "displacement" or, for deformable blocks, "stress".
 
     Returns:

@@ -205,7 +205,7 @@ class StandalonePage(ABC):
         """Write the page to a file atomically.
 
         Args:
-            path: of the file, .html; missing folders are created.
+            path: path of the file, .html; missing folders are created.
 
         Returns:
             The path of the file.
