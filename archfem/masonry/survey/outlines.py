@@ -550,7 +550,7 @@ def _check_gaps(
     more = f", the widest of {len(found)} gaps" if len(found) > 1 else ""
     raise NarrowGap(
         f"the faces of '{outlines[one].name}' and '{outlines[other].name}' are "
-        f"{1e3 * width:.3g} mm apart at {frame.place(places[place])}{more}; a gap within "
-        f"{frame.length(widest)} = {AMBIGUOUS_GAP_RATIO:g} times snap is taken for an error "
-        "of the survey: draw faces that touch"
+        f"{1e3 * width:.3g} mm apart at {frame.place(places[place])}{more}, within "
+        f"{frame.length(widest)} = {AMBIGUOUS_GAP_RATIO:g} times snap, taken for an error of the "
+        "survey: draw faces that touch"
     )
