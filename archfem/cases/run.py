@@ -437,7 +437,7 @@ def doubt_fidelity(at_rest: DeadLoadResult, motion: Motion, history: History) ->
     # of the largest |e| [-]; rigid stones of ordinary stiffness differ by 0.02 where joints slide
     tolerance = 0.03
     # Softened joints differ as a finer fidelity does, by a factor of 0.35 at least in 180 random
-    # runs, and without a mesh, whose libraries take longer to load than the run.
+    # runs. They need no mesh, whose libraries take longer to load than the run.
     screened = _compare_start(at_rest, at_rest.softened, motion, history)
     if screened is not None and screened[0] <= 0.25 * tolerance:
         return []

@@ -51,8 +51,8 @@ def strongest_window(
     shortest = int(np.argmin(np.maximum(ends - starts, 1)))
     end = motion.dt * ends[shortest]
     start = max(0.0, min(motion.dt * starts[shortest], motion.duration - least))
-    # a run that starts from rest amid the strongest shaking begins with a jolt, which lets joints
-    # slide that do not slide in the whole run: start some periods of a stone structure earlier
+    # a run that starts from rest amid the strongest shaking begins with a jolt: joints slide that
+    # do not slide in the whole run. Start some periods of a stone structure earlier
     return motion.cut(max(0.0, start - lead), min(max(end, start + least), motion.duration))
 
 

@@ -21,8 +21,8 @@ from archfem.masonry.structure import join_names
 from archfem.models.model import Doubt, read_doubts
 from archfem.units import format_mm
 
-# A condition is named if at most this share of random permutations of the outcomes has one that
-# separates them as well [-], and the number of permutations
+# Largest share of random permutations of the outcomes with a condition that separates them as well
+# as the one that is named [-], and the number of permutations
 MAX_CHANCE, PERMUTATIONS = 0.05, 999
 MAX_EDGES = 250  # conditions of each sense on one property
 

@@ -232,8 +232,8 @@ def _compute_correction(
 
 def _build_wavelet(period: float, centre: float, dt: float, count: int) -> Array:
     """Return a wavelet (count,) [-] with peak 1 whose displacement starts and ends at zero."""
-    # The displacement exp(-(t/γ)²) cos(2 π t/T), γ = 1.178 T^0.93, is brought to zero within a
-    # period of the ends of the record where it reaches them.
+    # The displacement is exp(-(t/γ)²) cos(2 π t/T), γ = 1.178 T^0.93. Where it reaches the ends of
+    # the record it is brought to zero within a period of them.
     width = 1.178 * period**0.93
     first = max(int((centre - WAVELET_HALF_LENGTH * width) / dt), 0)
     last = min(int((centre + WAVELET_HALF_LENGTH * width) / dt) + 2, count)

@@ -29,7 +29,7 @@ def find_peak_responses(
 ) -> tuple[Array, Array]:
     """Find the largest pseudo-acceleration of oscillators at rest at first, and when it occurs."""
     # u'' + 2 ζ ω u' + ω² u = -a is solved exactly from sample to sample. The record is interpolated
-    # to 40 samples a period, and the peak is that of a parabola through the largest sample and its
+    # to 40 samples a period. The peak is that of a parabola through the largest sample and its
     # neighbours, or of the free vibration after the last sample.
     check_oscillators(periods, damping)
     values, times = np.empty(len(periods)), np.empty(len(periods))

@@ -205,8 +205,8 @@ class LoadPath(EquilibriumPath):
 
     def advance_normal(self, distance: float) -> bool:
         """Add the equilibrium in the hyperplane normal to the last step, at a distance."""
-        # Unlike `advance` this follows a path on which the load itself moves back for a while, as
-        # when a hinge moves from one joint to the next. Lengths are mass-weighted means.
+        # Unlike `advance` this follows a path on which the load moves back for a while, as when a
+        # hinge moves from one joint to the next. Lengths are mass-weighted means.
         if len(self.states) < 2:
             return self.advance(np.array([1.0, 1.0]) / np.sqrt(2.0), distance)
         step, weighted = self._last_steps(1)
@@ -428,8 +428,8 @@ class SupportPath(EquilibriumPath):
     @property
     def factors(self) -> Array:
         """Work of the weights on a unit of the motion (steps,) [N m]."""
-        # F·o - V·s, with o and s the openings and slips that the motion alone would cause, and F
-        # the compressions at both ends of each joint
+        # F·o - V·s: the motion alone would cause the openings o and the slips s. F are the
+        # compressions at both ends of each joint
         blocks = RigidBlocks(self.model.structure)
         intrados, extrados, slip = blocks.gaps(self.motion)
         normal, shear, moment = np.moveaxis(self.resultants, -1, 0)

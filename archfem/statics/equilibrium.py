@@ -376,8 +376,8 @@ def _move_supports(
     def at(part: float) -> tuple[Model, Array]:
         return state.model.with_support_motion(part * motion), load
 
-    # where full Newton steps do not converge the motion is halved, since a search far from the
-    # start may end in an equilibrium that the loading path does not reach
+    # where full Newton steps do not converge the motion is halved: a search far from the start may
+    # end in an equilibrium that the loading path does not reach
     searches = solve_local, solve_local, solve_or_relax
     return _increment_load(solver, state, at, "settlement", searches)
 

@@ -74,8 +74,8 @@ from archfem.units import STANDARD_GRAVITY
 # Properties that are varied by default; the alternatives of joint rules are for `alternatives`
 VARIED = ("k_n", "k_s", "friction", "damping_ratio")
 
-# Number of samples before the others begin their search at the median of these, and the smallest
-# number of answers with which a lognormal is fitted [-]
+# Number of samples in the first round, at whose median the others begin their search; also the
+# least number of answers to which a lognormal is fitted [-]
 FIRST_ROUND = 8
 
 # Variables of the table that are results

@@ -121,9 +121,9 @@ def joint_pairs(structure: Structure, shown: NDArray[np.bool_]) -> NDArray[np.in
     for number in np.flatnonzero(shown):
         for block in structure.joints[number].blocks:
             touching[block].append(int(number))
-    # A block passes on a single thrust if it is free, since no line runs along the ground from one
-    # pier to the next, has two joints, and is of a part whose joints are shown. Walls in bond have
-    # no line: blocks at their edges alone have two joints.
+    # A block passes on a single thrust if it is free, has two joints, and is of a part whose joints
+    # are shown: no line runs along the ground from one pier to the next. Walls in bond have no
+    # line, as only blocks at their edges have two joints.
     roles = {structure.joints[number].role for number in np.flatnonzero(shown)}
     walls = {structure.joints[number].part for number in np.flatnonzero(structure.heads)}
     free = [(number, structure.blocks[number]) for number in structure.free]

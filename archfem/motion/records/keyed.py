@@ -155,7 +155,7 @@ def read_knet(text: RecordText) -> list[Channel]:
 def read_peer(text: RecordText) -> list[Channel]:
     """Read the single component of a file of PEER or PEER NGA (`.AT2`), in g."""
     # Count and step follow their names (`NPTS= 5437, DT= .0050 SEC`), in either order, on one line
-    # or two, or both precede or follow the names (`4096 0.0100 NPTS, DT`). The rest of the header
+    # or two. Or both precede or follow the names (`4096 0.0100 NPTS, DT`). The rest of the header
     # is free: a unit of acceleration identifies one, unless a velocity or displacement is named.
     count, dt, line = _find_count_and_step(text)
     header = " ; ".join(text.lines[:line])
