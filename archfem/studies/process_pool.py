@@ -15,7 +15,7 @@ import signal
 import sys
 import threading
 from collections import Counter, deque
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from functools import cache
 from itertools import islice
@@ -90,13 +90,9 @@ def evaluate_points(
     evaluator: Evaluator,
     workers: int | None = None,
     log: Path | None = None,
-    meanwhile: Callable[[], object] | None = None,
     shared: Path | None = None,
 ) -> Iterator[tuple[int, Row]]:
-    """Evaluate points on a number of processes, by default one a core; on this one if it is 1.
-
-    `meanwhile` runs while the processes start.
-    """
+    """Evaluate points on a number of processes, by default one a core; on this one if it is 1."""
     workers = count_cores() if workers is None else workers
     if check_integer(workers, "workers") == 1 or len(points) < 2:
         with threadpool_limits(limits=1), share_results(shared):
@@ -104,8 +100,6 @@ def evaluate_points(
         return
     pool = WorkerPool(TaskQueue(points, evaluator), workers, str(log or os.devnull), shared)
     try:
-        if meanwhile is not None:
-            meanwhile()
         yield from pool.rows()
     finally:
         pool.close()
@@ -276,8 +270,6 @@ class WorkerPool:
         if START_METHOD == "forkserver":
             forkserver.set_forkserver_preload(["archfem.studies.fork_server"])
             _make_socket_folder()
-            with _isolate_start():
-                forkserver.ensure_running()
         self._tasks, self._max_workers, self._log, self._shared = tasks, max_workers, log, shared
         self._workers: list[Worker] = []
         self._deaths: Counter[int] = Counter()

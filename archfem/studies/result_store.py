@@ -369,16 +369,6 @@ def build_table(
     return table
 
 
-def load_table_libraries() -> None:
-    """Load the libraries that write tables, which are otherwise loaded by the first table."""
-    frame = xr.Dataset({"number": ("point", [0.0])}).to_dataframe()
-    frame.to_csv()
-    with suppress(ImportError):
-        frame.to_parquet()
-    with suppress(ImportError):
-        import_module("openpyxl")
-
-
 def _holds_same(stored: Path, table: Path) -> bool:
     """Return whether a stored file is intact and has the table of another."""
     with suppress(InvalidInput):

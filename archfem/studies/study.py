@@ -42,7 +42,7 @@ from archfem.studies.parameter_space import (
     parameter_axes,
 )
 from archfem.studies.process_pool import Row, evaluate_points
-from archfem.studies.result_store import Progress, Store, build_table, load_table_libraries, status
+from archfem.studies.result_store import Progress, Store, build_table, status
 from archfem.studies.statements import Statement, column_label, read_statements, statement_table
 
 STUDY_KEYS: Mapping[str, Any] = {
@@ -270,8 +270,7 @@ class Study:
                 ) from error
             yield from evaluate_on_cluster(points, self.evaluator, client, shared)
             return
-        options |= {"meanwhile": load_table_libraries, "shared": shared}
-        yield from evaluate_points(points, self.evaluator, **options)
+        yield from evaluate_points(points, self.evaluator, shared=shared, **options)
 
     def _check(self) -> None:
         """Make the cases at the ends of each axis, so that errors are raised before the study."""

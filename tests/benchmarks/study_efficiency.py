@@ -36,7 +36,6 @@ from archfem.studies import process_pool
 from archfem.studies.evaluators import Evaluator
 from archfem.studies.parameter_space import Point
 from archfem.studies.process_pool import Row
-from archfem.studies.result_store import load_table_libraries
 
 MESHES = Path(__file__).parents[2] / "meshes"
 RING, BRIDGE = MESHES / "ring_paper.toml", MESHES / "prusias_sensitivity.toml"
@@ -79,7 +78,6 @@ def alone(points: Sequence[tuple[int, Point]], evaluator: Evaluator) -> Iterator
     """Evaluate points on one process that is not this one."""
     tasks = process_pool.TaskQueue(points, evaluator)
     with closing(process_pool.WorkerPool(tasks, 1, os.devnull)) as pool:
-        load_table_libraries()
         yield from pool.rows()
 
 
