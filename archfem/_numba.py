@@ -13,7 +13,6 @@ processes that need the same code, one compiles it, and the others wait and load
 
 import hashlib
 import io
-import logging
 import re
 import sys
 from collections.abc import Callable, Iterator
@@ -33,10 +32,9 @@ from numba.core.compiler_machinery import LoweringPass, register_pass
 from numba.core.typed_passes import NativeLowering
 
 from archfem._files import lock_file
+from archfem.errors import logger
 
 # mypy: disable-error-code="no-untyped-call"
-
-logger = logging.getLogger("archfem")
 
 # Folders of the modules with compiled functions
 SOURCE_FOLDERS = tuple(

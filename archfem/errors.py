@@ -1,10 +1,29 @@
 """Exception classes, one for each remedy; messages give the value, the reason and the remedy."""
 
 import logging
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 # Receives the warnings of all rooms
 logger = logging.getLogger("archfem")
+
+
+@contextmanager
+def keep_warnings() -> Iterator[list[str]]:
+    """Yield a list of the warnings of a block, which are not logged."""
+    warnings: list[str] = []
+
+    def keep(record: logging.LogRecord) -> bool:
+        if is_warning := record.levelno == logging.WARNING:
+            warnings.append(record.getMessage())
+        return not is_warning
+
+    logger.addFilter(keep)
+    try:
+        yield warnings
+    finally:
+        logger.removeFilter(keep)
 
 
 class ArchfemError(Exception):

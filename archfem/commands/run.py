@@ -42,7 +42,7 @@ from archfem.cases.toml_file import format_tables, parse_change
 from archfem.commands.cli import ExitCode
 from archfem.commands.tools import print_motions, show_both_senses
 from archfem.dynamics.history import Ending, History
-from archfem.errors import ArchfemError, DidNotConverge, InvalidInput
+from archfem.errors import ArchfemError, DidNotConverge, InvalidInput, keep_warnings, logger
 from archfem.limit.collapse import Collapse, describe_fill
 from archfem.limit.rating import Rating
 from archfem.masonry.ring_thickness import find_ring
@@ -56,8 +56,6 @@ from archfem.units import MPa
 from archfem.view.collapse import draw_ratings, draw_worst_places
 from archfem.view.motions import draw_suite
 from archfem.view.style import Files, write_files
-
-logger = logging.getLogger("archfem")
 
 Command = Callable[[argparse.Namespace], int]
 
@@ -270,11 +268,8 @@ def assess(options: argparse.Namespace) -> int:
     with record_doubts(case.structure) as doubts:
         found = case.assessment.solve(case.structure, demand, options.parts)
     # warnings of the comparison are those of the assessment, or of a sliding that it leaves out
-    logger.addFilter(_refuse)
-    try:
+    with keep_warnings():
         doubts += _compare_crushing(case, found.values())
-    finally:
-        logger.removeFilter(_refuse)
     doubts += [f"{DOUBT_MARK}{doubt}" for result in found.values() for doubt in result.doubts]
     doubts += answers.note_band(case, found.values())
     texts = [answers.describe_margin(found.values())]
@@ -294,11 +289,6 @@ def assess(options: argparse.Namespace) -> int:
 
     write_results("assess", case, options.out, f"{case.title}\n{text}", draw)
     return doubt_code(doubts)
-
-
-def _refuse(_: logging.LogRecord) -> bool:
-    """Return that a record is not logged."""
-    return False
 
 
 def _compare_crushing(case: Case, found: Iterable[KinematicAssessment]) -> list[str]:

@@ -7,7 +7,6 @@ replaced.
 """
 
 import atexit
-import logging
 import os
 import pickle
 import re
@@ -40,7 +39,7 @@ from archfem import _numba
 from archfem._files import temporary_folder
 from archfem._validation import check_integer
 from archfem.cases.provenance import describe_version
-from archfem.errors import ArchfemError, InvalidInput, StudyStopped, logger
+from archfem.errors import ArchfemError, InvalidInput, StudyStopped, keep_warnings, logger
 from archfem.studies.evaluators import Evaluator
 from archfem.studies.parameter_space import PAIR_KEY, StudyPoint, describe_changes
 from archfem.studies.shared_results import share_results
@@ -123,23 +122,6 @@ def evaluate_serially(
         repeated.log(warnings)
         yield number, row
     repeated.log_count()
-
-
-@contextmanager
-def keep_warnings() -> Iterator[list[str]]:
-    """Yield a list of the warnings of a block, which are not logged."""
-    warnings: list[str] = []
-
-    def keep(record: logging.LogRecord) -> bool:
-        if is_warning := record.levelno == logging.WARNING:
-            warnings.append(record.getMessage())
-        return not is_warning
-
-    logger.addFilter(keep)
-    try:
-        yield warnings
-    finally:
-        logger.removeFilter(keep)
 
 
 class RepeatedWarnings:

@@ -1,6 +1,5 @@
 """Least-squares circle through surveyed points, such as those of an intrados."""
 
-import logging
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -8,11 +7,9 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from archfem._typing import Array
-from archfem.errors import InvalidInput
+from archfem.errors import InvalidInput, logger
 from archfem.masonry.block import Point, as_point, check_points
 from archfem.units import mm
-
-logger = logging.getLogger("archfem")
 
 # Largest distance from the circle that is no doubt, in extents of the points: 5 % of a ring whose
 # thickness is a twelfth of its span, 16 mm at 4 m, and surveys err by millimetres. By then a ring
