@@ -15,7 +15,7 @@ from archfem._threads import single_threaded
 from archfem._typing import Array
 from archfem._validation import check_between, check_choice, check_fields, check_type
 from archfem.errors import DidNotConverge, InvalidInput
-from archfem.joints.criteria import Criteria, with_failure_flags
+from archfem.joints.criteria import Criteria
 from archfem.joints.resultants import joint_dataset, select_joint
 from archfem.masonry.loads import Action, BodyForce, PointLoad, Settlement, list_loads
 from archfem.models.model import Model
@@ -413,11 +413,8 @@ def _label_result(path: Path, criteria: Criteria, outcome: str) -> Pushover:
     return Pushover(curve, joints, *hinge_order(joints), outcome, limit, uncertainty)
 
 
-def hinge_order(
-    joints: xr.Dataset, criteria: Criteria | None = None
-) -> tuple[tuple[tuple[int, str], ...], tuple[int, ...]]:
+def hinge_order(joints: xr.Dataset) -> tuple[tuple[tuple[int, str], ...], tuple[int, ...]]:
     """Sort joints by the step at which they first hinge; in a step, those nearer the edge first."""
-    joints = with_failure_flags(joints, criteria)
     side = joints["hinge"].transpose("step", "joint").values
     first = np.argmax(side != 0, axis=0)
     e = np.abs(joints["eccentricity"].transpose("step", "joint").values)

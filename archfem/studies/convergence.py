@@ -232,7 +232,7 @@ def _sensitivity(table: xr.Dataset, quantity: str) -> MeshSensitivity:
 
 @validate_arguments
 def case_accuracy(
-    case: Case, folder: str | Path | None = None, *, workers: int | None = 1, client: Any = None
+    case: Case, folder: str | Path | None = None, *, workers: int | None = 1
 ) -> Accuracy:
     """Compare processor time and error of fidelities, meshes, quadratures and steps of a case.
 
@@ -243,7 +243,6 @@ def case_accuracy(
         folder: folder for finished settings, as for `Study.run`.
         workers: number of processes; several share the memory bandwidth, which raises the processor
             time by a few per cent.
-        client: client of Dask, as for `Study.run`.
 
     Returns:
         All settings with times and errors, the reference and the error of the reference.
@@ -262,7 +261,7 @@ def case_accuracy(
         {"name": evaluate_time, "damping": damping},
         title=f"{case.title}: speed against error",
     )
-    table = study.run(folder, workers=workers, client=client)
+    table = study.run(folder, workers=workers)
     if "peaks" not in table:
         raise DidNotConverge(f"no setting ran: {table['error'].values[0] or 'each failed'}")
     runs = [_to_run(table.isel(point=k)) for k in range(len(settings))]

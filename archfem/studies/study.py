@@ -485,9 +485,7 @@ def _log_stored(store: Store, digests: Sequence[str], rows: Mapping[str, Row]) -
 
 
 @validate_arguments
-def run_pairs(
-    case: Case, folder: str | Path, *, workers: int | None = None, client: Any = None
-) -> list[str]:
+def run_pairs(case: Case, folder: str | Path, *, workers: int | None = None) -> list[str]:
     """Run the pairs of a suite whose histories are not in the folder yet.
 
     `run_case(case, folder)` then loads them, and runs again those that are incomplete.
@@ -496,7 +494,6 @@ def run_pairs(
         case: case with a suite.
         folder: folder of the histories.
         workers: number of processes, as for `Study.run`.
-        client: as for `Study.run`; its workers must see the folder.
 
     Returns:
         How the run of each pair ended; the text of an error if there is no history.
@@ -505,10 +502,10 @@ def run_pairs(
         InvalidInput: the case has no suite, or selects its model by one pair for all.
     """
     with replace_run(case, Path(folder)) as draft:
-        return compute_pairs(case, draft, workers=workers, client=client)
+        return compute_pairs(case, draft, workers)
 
 
-def compute_pairs(case: Case, draft: Path, **options: Any) -> list[str]:
+def compute_pairs(case: Case, draft: Path, workers: int | None = None) -> list[str]:
     """Run the pairs of a suite as `run_pairs` does, into the draft of a result folder."""
     if case.suite is None or case.analysis.selects_model:
         raise InvalidInput(
@@ -517,7 +514,8 @@ def compute_pairs(case: Case, draft: Path, **options: Any) -> list[str]:
         )
     pairs = list(case.suite["pairs"])
     find = {"name": save_pair, "folder": str(draft.resolve())}
-    table = Study(case, {PAIR_KEY: pairs}, find, title="pairs of the suite").run(**options)
+    study = Study(case, {PAIR_KEY: pairs}, find, title="pairs of the suite")
+    table = study.run(workers=workers)
     endings = table["ended"].values if "ended" in table else [""] * len(pairs)
     return [a or b for a, b in zip(table["error"].values.tolist(), endings, strict=True)]
 

@@ -333,7 +333,6 @@ def draw_pushover(
     pushes: Pushover | Mapping[str, Pushover],
     *,
     limits: Mapping[str, float] | None = None,
-    reach: float | None = None,
     axes: Axes | None = None,
 ) -> Figure:
     """Draw pushover curves, load factor over displacement, with discs at the first hinges.
@@ -344,7 +343,6 @@ def draw_pushover(
     Args:
         pushes: a pushover analysis, or the label of each one and the analysis.
         limits: names of known limit loads, and their factors, drawn as dashed lines.
-        reach: end of the displacement axis [m]; by default the point where the curves are flat.
         axes: matplotlib axes; by default those of a new figure.
 
     Returns:
@@ -360,7 +358,7 @@ def draw_pushover(
     units = {push.curve["factor"].attrs["units"] for push in pushes.values()}
     load = "load factor λ [-]" if units == {"1"} else "work per unit of settlement [N m]"
     style_axes(axes, "displacement [mm]", load)
-    reach = reach or max(_displacement_shown(push) for push in pushes.values())
+    reach = max(_displacement_shown(push) for push in pushes.values())
     for number, (label, push) in enumerate(pushes.items()):
         displacement, factor = push.curve["displacement"] / mm, push.curve["factor"]
         axes.plot(displacement, factor, label=label, **line_style(number))
