@@ -64,10 +64,11 @@ def format_schema() -> str:
 def build_schema() -> Schema:
     """Return the schema (draft 7) of case and study files."""
     study: Schema = {"cases": _by_name(_table(STUDIED_CASE_KEYS)), "columns": {"type": "object"}}
-    study["statements"] = {"type": "array", "items": _table_of(Statement)}
+    study["statements"] = _list(_table_of(Statement))
     top = {key: _value(kind) for key, kind in STUDY_KEYS.items()} | study
     top |= {"title": {"type": "string", "description": "title of the case, or of the study"}}
-    top |= {"extensions": _strings(), "base": {"type": "string"}, "remove": _strings()}
+    words = _list({"type": "string"})
+    top |= {"extensions": words, "base": {"type": "string"}, "remove": words}
     return {
         "$schema": "http://json-schema.org/draft-07/schema#",
         "title": "case or study of archfem",
@@ -92,7 +93,7 @@ def _case_sections() -> dict[str, Schema]:
             _table(structure_keys.CONTACT_KEYS, Contact, finish=_choice(*CONDITIONS))
         ),
         "motion": _MOTION,
-        "suite": _suite(),
+        "suite": _table(motion_keys.suite_keys(), Suite, pairs=_by_name(_MOTION), target=_SPECTRUM),
         "criteria": _CRITERIA,
         "record": _table_of(Record),
         "limit": _limit(),
@@ -117,7 +118,7 @@ def _parts_of_structure(name: str) -> dict[str, Schema]:
     """Return the schemas of the tables in [structure]."""
     if name == "blocks":
         rows = {"blocks": Block, "joints": Joint}
-        return {key: {"type": "array", "items": _part(cls)} for key, cls in rows.items()}
+        return {key: _list(_part(cls)) for key, cls in rows.items()}
     fill = _choice("elastic", "jointed")
     parts: dict[str, Schema] = {"fill": _table(structure_keys.fill_keys(), law=fill)}
     if name == "outlines":
@@ -161,7 +162,7 @@ def _analysis_sections() -> dict[str, Schema]:
         "newton": _table_of(Newton),
     }
     return {
-        section: _table({name: keys[name] for name in names}, Analysis, **_present(own, names))
+        section: _table({name: keys[name] for name in names}, Analysis, **own)
         for section, names in analysis_tables.SECTION_FIELDS.items()
     }
 
@@ -180,11 +181,6 @@ def _motion() -> Schema:
     return _table(motion_keys.motion_keys(), Motion.read, **own)
 
 
-def _suite() -> Schema:
-    """Return the schema of [suite]."""
-    return _table(motion_keys.suite_keys(), Suite, pairs=_by_name(_MOTION), target=_SPECTRUM)
-
-
 def _list_own_spectra() -> list[str]:
     """Return the codes of the spectra that no module of the user has registered."""
     return [code for code, cls in registered_spectra.items() if "archfem" in cls.__module__]
@@ -200,11 +196,10 @@ def _spectrum(code: str) -> Schema:
 
 def _limit() -> Schema:
     """Return the schema of [limit]."""
-    point = _table_of(PointLoad)
     return _table(
         analysis_keys.limit_keys(),
         (collapse_factor, BodyForce),
-        point=_any([point, {"type": "array", "items": point}]),
+        point=_one_or_several(_table_of(PointLoad)),
         friction=_choice(*analysis_keys.FRICTION_LAWS),
         fill=_fill(),
     )
@@ -217,11 +212,10 @@ def _fill() -> Schema:
 
 def _pushover() -> Schema:
     """Return the schema of [pushover]."""
-    point = _table_of(PointLoad)
     return _table(
         analysis_keys.pushover_keys(),
         (pushover, BodyForce),
-        point=_any([point, {"type": "array", "items": point}]),
+        point=_one_or_several(_table_of(PointLoad)),
         control=_choice("displacement", "arc length", "path", "force"),
         stop=_table_of(Stop),
         settlement=_table_of(Settlement),
@@ -231,8 +225,7 @@ def _pushover() -> Schema:
 def _rating() -> Schema:
     """Return the schema of [rating]; names of vehicles are read in any case of letters."""
     vehicle = _any([{"type": "string", "examples": [*VEHICLES]}, _table_of(Vehicle)])
-    vehicle = _any([vehicle, {"type": "array", "items": vehicle}])
-    return _table(analysis_keys.rating_keys(), rate, vehicle=vehicle)
+    return _table(analysis_keys.rating_keys(), rate, vehicle=_one_or_several(vehicle))
 
 
 def _assessment() -> Schema:
@@ -243,7 +236,7 @@ def _assessment() -> Schema:
         spectrum=_SPECTRUM,
         friction=_choice(*analysis_keys.FRICTION_LAWS),
         fill=_fill(),
-        loads={"type": "array", "items": _table_of(AttachedLoad)},
+        loads=_list(_table_of(AttachedLoad)),
         limit_state=_any([{"type": "string"}, _table_of(LimitState)]),
     )
 
@@ -257,7 +250,7 @@ def _risk() -> Schema:
 
 def _dead_load() -> Schema:
     """Return the schema of [dead_load]."""
-    stages = _any([_choice("none", "usual"), {"type": "array", "items": _table_of(Stage)}])
+    stages = _any([_choice("none", "usual"), _list(_table_of(Stage))])
     return _table(analysis_tables.DEAD_LOAD_KEYS, stages=stages)
 
 
@@ -275,7 +268,10 @@ def _merge_tables(declarations: Iterable[Callable[..., Any]], **own: Schema) -> 
 
 
 def _table(keys: Mapping[str, Any], declarations: Any = (), **own: Schema) -> Schema:
-    """Return the schema of a table; texts and defaults are those of the declarations."""
+    """Return the schema of a table; texts and defaults are those of the declarations.
+
+    Schemas in `own` of other keys are left out.
+    """
     unpacked = declarations if isinstance(declarations, tuple) else (declarations,)
     texts = {key: text for each in unpacked for key, text in _describe_keys(each).items()}
     values = {key: own.get(key) or _value(kind) for key, kind in keys.items()}
@@ -311,7 +307,7 @@ def _value(kind: Any) -> Schema:
     if isinstance(kind, NumberOrWord):
         return _any([_value(kind.unit), {"const": kind.word}])
     if isinstance(kind, list):
-        return {"type": "array", "items": _value(kind[0])}
+        return _list(_value(kind[0]))
     if isinstance(kind, tuple):
         return _any(map(_value, kind))
     types = {int: "integer", str: "string", bool: "boolean", dict: "object", list: "array"}
@@ -328,9 +324,14 @@ def _choice(*words: str) -> Schema:
     return {"enum": list(words)}
 
 
-def _strings() -> Schema:
-    """Return the schema of a list of words."""
-    return {"type": "array", "items": {"type": "string"}}
+def _list(schema: Schema) -> Schema:
+    """Return the schema of a list of values."""
+    return {"type": "array", "items": schema}
+
+
+def _one_or_several(schema: Schema) -> Schema:
+    """Return the schema of a value, or a list of such."""
+    return _any([schema, _list(schema)])
 
 
 def _by_name(schema: Schema) -> Schema:
@@ -341,8 +342,3 @@ def _by_name(schema: Schema) -> Schema:
 def _object(properties: dict[str, Schema]) -> Schema:
     """Return the schema of a table that has no other keys."""
     return {"type": "object", "properties": properties, "additionalProperties": False}
-
-
-def _present(schemas: Mapping[str, Schema], names: Iterable[str]) -> dict[str, Schema]:
-    """Return the schemas of the keys of a section."""
-    return {name: schemas[name] for name in names if name in schemas}
