@@ -93,8 +93,9 @@ def _check_sizes(file: netCDF4.Dataset, size: int) -> None:
     # texts of any length are Python's, which take more; NumPy's product may overflow
     sizes = [(prod(map(int, v.shape)), v.dtype) for v in file.variables.values()]
     declared = sum(count * getattr(dtype, "itemsize", 64) for count, dtype in sizes)
-    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    most = min(1032 * size, memory)  # deflate compresses no content further
+    most = 1032 * size  # deflate compresses no content further
+    if hasattr(os, "sysconf"):  # which Windows has not
+        most = min(most, os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
     if declared > most:
         raise InvalidInput(
             f"declares {declared / 1e9:.3g} GB, and its {size} bytes hold at most {most / 1e9:.3g} "

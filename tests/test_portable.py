@@ -40,7 +40,7 @@ for name in {missing}:
     sys.modules[name] = None
 if "fcntl" in {missing}:
     sys.modules["msvcrt"] = SimpleNamespace(LK_NBLCK=2, locking=lambda *_: None)
-    for name in ("fork", "getuid", "getpgid", "killpg"):
+    for name in ("fork", "getuid", "getpgid", "killpg", "sysconf"):
         delattr(os, name)
     del signal.SIGKILL, signal.SIGPIPE
 import archfem
@@ -86,6 +86,11 @@ def test_its_history_is_that_of_this_system(carried_out):
     # its dead load is found by SciPy, and here by PETSc if that is there: to their tolerances
     expected = here.joints["N"].values
     assert abs(run.joints["N"].values - expected).max() < 1e-6 * abs(expected).max()
+
+
+def test_a_history_is_read_where_the_size_of_the_memory_is_not_known(carried_out, monkeypatch):
+    monkeypatch.delattr(os, "sysconf")
+    assert af.History.read(carried_out[0] / "history.nc").time.size > 1
 
 
 @pytest.mark.parametrize(
