@@ -2,16 +2,17 @@
 
 import json
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
 from archfem._display import DOUBT_MARK, NOTE_MARK
 from archfem.cases.case import Case
-from archfem.cases.result_text import ResultTable
+from archfem.cases.result_text import PushFactors, ResultTable, format_ends
 from archfem.dynamics.motion_scaling import CollapseScale, MechanismScales
 from archfem.limit.fill_range import FillRange
 from archfem.limit.rating import Rating
+from archfem.models.model import Doubt, read_doubts, write_doubts
 from archfem.motion.hazard import DESIGN_PERIOD, MEASURES
 from archfem.motion.matching import DEFAULT_BAND
 from archfem.motion.motion import Motion
@@ -33,7 +34,59 @@ RESULTS = {
     "verdict_range": "range of the verdict over uncertain properties",
 }
 
-Row = Sequence[str]  # result, demand, capacity or outcome, factor; "-" where there is none
+
+class Row(NamedTuple):
+    """One result among the capacities, in words, with the numbers that sentences are made of."""
+
+    result: str
+    demand: str  # "-" where there is none
+    outcome: str  # or capacity
+    factor: str  # "-" where there is none
+    numbers: Mapping[str, Any]  # such as the fields of `Ratios`; none in earlier files
+
+
+class Ratios(NamedTuple):
+    """Ratios of a check of an assessment, factors on the spectrum [-]."""
+
+    check: str
+    directions: Sequence[str]
+    least: float
+    most: float  # over what is assumed of a fill
+    needed: str = ""  # assumptions on the fill under which alone it passes
+    linear: bool = False  # whether accelerations are checked, rather than displacements
+    moved: float | None = None  # by displacements, of what passes at rest
+    bodies: float | None = None  # with one weight a body, where it is less
+
+    @property
+    def name(self) -> str:
+        """Name of the check, with the direction of one that holds in one alone."""
+        return (
+            ", ".join([self.check, *self.directions]) if len(self.directions) == 1 else self.check
+        )
+
+    @property
+    def beside(self) -> str:
+        """The other ratios, in brackets."""
+        texts = {"by displacements": self.moved, "with one weight a body": self.bodies}
+        each = "; ".join(f"{x:.3g} {words}" for words, x in texts.items() if x is not None)
+        return f" ({each})" if each else ""
+
+    def __str__(self) -> str:
+        """Return all ratios in words."""
+        return f"{format_ends(self.least, self.most)}{self.beside}"
+
+
+class Scales(NamedTuple):
+    """Scales of a motion at which a search has found states of a structure [-]."""
+
+    motion: str
+    pga: float  # of the motion [g]
+    held: float  # largest below any at which it does not stand; 0 for none
+    states: Mapping[str, float]  # smallest at which it is in a state, as of `CollapseScale`
+    unfinished: bool  # whether Ctrl-C has ended the search
+
+
+Numbers = TypeVar("Numbers")
 
 
 class Statement(NamedTuple):
@@ -41,18 +94,39 @@ class Statement(NamedTuple):
 
     sentences: Sequence[str]
     rows: Sequence[Row]
-    doubts: Sequence[str] = ()  # lines of the text, or without their mark; also those of notes
+    doubts: Sequence[Doubt] = ()
     notes: Sequence[str] = ()
 
     def as_file(self, name: str) -> dict[str, str]:
         """Return name and content of the file beside the text of a result."""
-        lines = [*self.doubts, *(f"{NOTE_MARK}{note}" for note in self.notes)]
-        doubts = (x.removeprefix(DOUBT_MARK) for x in lines if not x.startswith(NOTE_MARK))
-        notes = (x.removeprefix(NOTE_MARK) for x in lines if x.startswith(NOTE_MARK))
-        plain = self._replace(
-            doubts=list(dict.fromkeys(map(cut_remedy, doubts))), notes=list(dict.fromkeys(notes))
-        )
+        doubts = json.loads(write_doubts(self.doubts))
+        plain = self._replace(doubts=doubts, notes=list(dict.fromkeys(self.notes)))
         return {f"{name}.json": json.dumps(plain._asdict(), indent=1)}
+
+    def with_lines(self, lines: Sequence[str]) -> "Statement":
+        """Return this with the doubts and notes of some lines, of which each has its mark."""
+        marked = [x for x in lines if x.startswith(DOUBT_MARK)]
+        doubts = [Doubt(cut_remedy(x.removeprefix(DOUBT_MARK))) for x in marked]
+        notes = [x.removeprefix(NOTE_MARK) for x in lines if x.startswith(NOTE_MARK)]
+        return self._replace(doubts=[*doubts, *self.doubts], notes=[*self.notes, *notes])
+
+    @classmethod
+    def read(cls, text: str) -> "Statement | None":
+        """Return what `as_file` wrote; None of an earlier version with other values."""
+        values = json.loads(text)
+        if values.keys() != {*cls._fields}:
+            return None
+        # earlier versions have no numbers, and doubts as texts
+        rows = [Row(*(*row, {})[:5]) for row in values["rows"]]
+        doubts = [[x] if isinstance(x, str) else x for x in values["doubts"]]
+        found = read_doubts(json.dumps(doubts))
+        return cls(values["sentences"], rows, found, values["notes"])
+
+
+def read_numbers(kind: type[Numbers], stated: Statement | None) -> list[Numbers]:
+    """Return the numbers of the rows that have them; files of earlier versions have none."""
+    rows = stated.rows if stated else []
+    return [kind(**row.numbers) for row in rows if {*row.numbers} == {*kind.__annotations__}]
 
 
 def cut_remedy(doubt: str) -> str:
@@ -61,75 +135,94 @@ def cut_remedy(doubt: str) -> str:
 
 
 def state_outcome(
-    result: str, words: str, doubts: Sequence[str] = (), demand: str = "-", factor: str = "-"
+    result: str,
+    words: str,
+    lines: Sequence[str] = (),
+    demand: str = "-",
+    factors: PushFactors | None = None,
 ) -> Statement:
-    """State one outcome, which is the capacity too."""
-    return Statement([f"{result}: {words}"], [(result, demand, words, factor)], doubts)
+    """State one outcome, which is the capacity too, with lines of doubts and notes."""
+    row = Row(result, demand, words, "-", {})
+    if factors:
+        demand = factors.site or demand
+        row = Row(result, demand, words, str(factors), factors._asdict())
+    return Statement([f"{result}: {words}"], [row]).with_lines(lines)
 
 
 def state_scale(
-    found: CollapseScale | MechanismScales, motion: Motion, doubts: Sequence[str]
+    found: CollapseScale | MechanismScales, motion: Motion, lines: Sequence[str]
 ) -> dict[str, str]:
     """Return the files with what is stated of a search of scales, and with its runs."""
-    demand = f"'{motion.name}', PGA {motion.pga / STANDARD_GRAVITY:.2f} g"
-    # what was run between the scales stands in the text
-    words, files = repr(found).partition(";")[0], dict[str, str]()
+    result, pga, words = RESULTS["scale"], motion.pga / STANDARD_GRAVITY, found.sentence
+    files = dict[str, str]()
     if isinstance(found, CollapseScale):
-        lower = found.held
-        files["scale.csv"] = ResultTable(*found.rows()).csv
+        held, files["scale.csv"] = found.held, ResultTable(*found.rows()).csv
     else:
-        lower = min((found[each] for each in found.definitions), key=lambda x: x.upper).lower
-        words += "; a fall was not computed"
-    factor = f"{lower:#.3g}" if lower else "-"
-    stated = state_outcome(RESULTS["scale"], words, doubts, demand, factor)
+        held, words = found[found.first].lower, f"{words}; a fall was not computed"
+    scales = Scales(motion.name, pga, held, found.states, found.interrupted)
+    factor = f"{held:#.3g}" if held else "-"
+    row = Row(result, f"'{motion.name}', PGA {pga:.2f} g", words, factor, scales._asdict())
+    stated = Statement([f"{result}: {words}"], [row], found.doubts).with_lines(lines)
     return {**stated.as_file("scale"), **files}
 
 
 def state_ratings(rated: Sequence[tuple[Rating, Sequence[str]]]) -> Statement:
-    """State the factor of each vehicle, by codes too; of the first by pressure and backing."""
-    rows, sentences = [], list[str]()
+    """State the factor of each vehicle, by codes too; sentences are of the first."""
+    rows, first = [], rated[0][0]
     for found, _ in rated:
-        name, factor = found.vehicle.name, "-" if np.isnan(found.factor) else f"{found.factor:.4g}"
-        rows.append(("rating", name, f"{found.outcome}, {found.place}", factor))
-        for code, (of_code, words) in found.by_codes.items():
-            rows.append(("rating", f"{name} {code}", words, f"{of_code:.4g}"))
-        own = [repr(found)]
-        if factor != "-":
-            own = [f"rating for {name}: factor {factor}, {found.outcome}", f"worst {found.place}"]
-        sentences += [*own, *found.describe_codes()]
-        if found is rated[0][0]:
-            sentences += [*found.describe_pressure(), *found.describe_backing()]
-    return Statement(sentences, rows, [doubt for _, own in rated for doubt in own])
+        for code, each in {"": found, **found.by_codes}.items():
+            demand, words = f"{found.vehicle.name} {code}".strip(), each.short_outcome
+            at = f", {each.place}" if each is found else ""
+            factor = "-" if np.isnan(each.factor) else f"{each.factor:.4g}"
+            rows.append(Row("rating", demand, f"{words}{at}", factor, {"outcome": words}))
+    sentences = [repr(first)]
+    if not np.isnan(first.factor):
+        outcome, *others = first.clauses
+        outcome = f"rating for {first.vehicle.name}: factor {first.factor:.4g}, {outcome}"
+        sentences = [outcome, *others, f"worst {first.place}"]
+    if len(rated) > 1:
+        least = min((found for found, _ in rated), key=lambda each: each.factor)
+        words = f"{least.vehicle.name} has the least factor, {least.factor:.4g}"
+        sentences.append(f"of {len(rated)} vehicles {words}")
+    sentences += [*first.describe_codes(), *first.describe_pressure(), *first.describe_backing()]
+    return Statement(sentences, rows).with_lines([line for _, own in rated for line in own])
 
 
-def state_assessments(found: Mapping[str, KinematicAssessment], doubts: list[str]) -> Statement:
+def state_assessments(found: Mapping[str, KinematicAssessment], lines: Sequence[str]) -> Statement:
     """State each check of an assessment with the directions in which it holds; the last decides."""
-    checks: dict[tuple[str, str], tuple[AssessmentCheck, list[str]]] = {}
+    checks: dict[tuple[str, str], tuple[AssessmentCheck, Ratios, list[str]]] = {}
     for direction, result in found.items():
         for check, ratios in list_ratios(result):
-            checks.setdefault((str(check), ratios), (check, []))[1].append(direction)
+            same = checks.setdefault((str(check), str(ratios)), (check, ratios, []))
+            same[2].append(direction)
     last = [str(result.checks[-1]) for result in found.values()]
     rows, sentences = [], []
-    for (text, ratios), (check, directions) in checks.items():
+    for (text, _), (check, ratios, directions) in checks.items():
         ways, outcome = " and ".join(directions), check.outcome
         if check.passes and check.at_rest:
             outcome += ", for the mechanism does not begin to move"
         demand, capacity = (f"{x:.4g} {check.unit}" for x in (check.demand, check.capacity))
-        name = f"assessment: {check.name}, {ways}"
-        rows.append((name, demand, f"{capacity}, {outcome}", ratios))
+        name, numbers = f"assessment: {check.name}, {ways}", ratios._replace(directions=directions)
+        row = name, demand, f"{capacity}, {outcome}", str(ratios), numbers._asdict()
+        rows.append(Row(*row))
         sentences += [f"kinematic assessment, {ways}: {text}"] if text in last else []
     sentences.append(describe_margin(found.values()))
-    return Statement(sentences, rows, doubts, [x for each in found.values() for x in each.notes])
+    doubts, notes = (
+        [y for x in found.values() for y in getattr(x, k)] for k in ("doubts", "notes")
+    )
+    return Statement(sentences, rows, doubts, notes).with_lines(lines)
 
 
-def list_ratios(found: KinematicAssessment) -> list[tuple[AssessmentCheck, str]]:
+def list_ratios(found: KinematicAssessment) -> list[tuple[AssessmentCheck, Ratios]]:
     """List the checks of an assessment with their ratios; with one weight a body if it is less."""
     listed = []
     for check, whole in zip(found.checks, (found.of_bodies or found).checks, strict=True):
-        beside = [f"{check.moved:.3g} by displacements"] * (check.at_rest and not check.over_fill)
-        less = whole.ratio < 0.999 * check.least
-        beside += [f"{whole.ratio:.3g} with one weight a body"] * less
-        listed.append((check, check.ratios + f" ({'; '.join(beside)})" * bool(beside)))
+        over = check.over_fill
+        ends = (check.ratio, check.ratio) if over is None else over.ends
+        moved = check.moved if check.at_rest and not over else None
+        bodies = whole.ratio if whole.ratio < 0.999 * check.least else None
+        needed, linear = over.needed if over else "", check.unit != "m"
+        listed.append((check, Ratios(check.name, (), *ends, needed, linear, moved, bodies)))
     return listed
 
 
@@ -140,8 +233,8 @@ def describe_margin(found: Iterable[KinematicAssessment]) -> str:
     same = [x.over_fill for x, _ in listed if x.name == check.name and x.over_fill is not None]
     if same:
         over = FillRange.least_of(same)
-        ratios = ratios.replace(check.ratios, over.describe(digits=3))
-        return f"least margin {ratios}, by {check.name}: {over.outcome}"
+        text = f"{over.describe(digits=3)}{ratios.beside}"
+        return f"least margin {text}, by {check.name}: {over.outcome}"
     return f"least margin {ratios}, by {check.name}: {check.outcome}"
 
 
@@ -173,5 +266,4 @@ def state_risk(found: Any) -> Statement:  # of `archfem.studies`, a room to the 
         f"the structure falls at {rate}; in half of the cases from {median:.3g} {unit} of {name}; "
     )
     text += hazard.origin
-    row = "annual rate", demand, outcome, factor
-    return Statement([text], [row], list(map(str, found.doubts)))
+    return Statement([text], [Row("annual rate", demand, outcome, factor, {})], found.doubts)

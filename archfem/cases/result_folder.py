@@ -14,7 +14,7 @@ from archfem._validation import validate_arguments, validate_methods
 from archfem.cases.answers import state_outcome
 from archfem.cases.case import Case
 from archfem.cases.provenance import list_input_files
-from archfem.cases.result_text import compare_push, compare_with_site
+from archfem.cases.result_text import PushFactors, compare_push, compare_with_site
 from archfem.cases.run import (
     CASE_FILE,
     HISTORY_FILE,
@@ -190,14 +190,12 @@ def limit_files(case: Case, collapse: Collapse, text: str, doubts: Sequence[str]
     """Return text, joints at collapse and mechanism of a limit analysis."""
     columns = ["name", "N", "V", "M", "eccentricity"]
     joints = collapse.joints.to_dataframe()[columns].to_csv(index=False).rstrip()
-    demand, factor = compare_with_site(case, collapse)
-    if not factor:
-        demand, factor = "the given load", "-"
-        if collapse.push:  # a factor would be read as one on a demand
-            demand = "no demand given"
-        elif collapse.outcome is Outcome.COLLAPSES:
-            factor = " to ".join(dict.fromkeys(f"{bound:.4g}" for bound in collapse.range))
-    given = collapse.sentence, doubts, demand, factor
+    site = compare_with_site(case, collapse)
+    # without a site the factor of a push would be read as one on a demand
+    demand = "no demand given" if collapse.push else "the given load"
+    if not collapse.push and collapse.outcome is Outcome.COLLAPSES:
+        site = PushFactors(*collapse.range)
+    given = collapse.sentence, doubts, demand, site
     stated = state_outcome("limit analysis", *given).as_file("limit")
     return {"limit.txt": text, "limit.csv": joints, "collapse.png": collapse.plot(), **stated}
 
@@ -206,9 +204,8 @@ def pushover_files(case: Case, push: Pushover, text: str) -> Files:
     """Return text, curve and picture of a pushover."""
     curve = push.curve.to_dataframe().to_csv().rstrip()
     peak = push.factor * abs(find_push(case.pushover.live if case.pushover else []))
-    demand, factor = compare_push(case, peak, peak) if peak else ("", "")
-    words = repr(push).removeprefix("Pushover: ")
-    stated = state_outcome("pushover", words, demand=demand or "-", factor=factor or "-")
+    site = compare_push(case, peak, peak) if peak else None
+    stated = state_outcome("pushover", push.sentence, (), "-", site)
     return {
         "pushover.txt": text,
         "pushover.csv": curve,

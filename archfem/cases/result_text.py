@@ -372,8 +372,8 @@ def describe_limit(case: Case, found: Collapse, opposite: Collapse | None) -> tu
         rank = _compare_senses(found, opposite)
         others.append(f"in the other sense: {opposite.sentence} ({rank})")
     others += filter(None, [describe_fill_defaults(case)])
-    demand, ratio = compare_with_site(case, found)
-    others += [f"it begins to move at {ratio} times {demand}"] if ratio else []
+    site = compare_with_site(case, found)
+    others += [f"it begins to move at {site} times {site.site}"] if site else []
     return found, "\n".join([describe_collapse(case.structure, found, case.limit), *others])
 
 
@@ -395,7 +395,7 @@ def site_acceleration(case: Case) -> float:
     return float(spectrum.horizontal(0.0)) if spectrum is not None else np.nan
 
 
-def describe_thickness(case: Case, ring: Ring) -> tuple[str, str, list[str]]:
+def describe_thickness(case: Case, ring: Ring) -> tuple[str, float, list[str]]:
     """Find a ring's least thickness: in words, as a factor of safety, and in lines."""
     limit, build = case.limit, ring.with_thickness
     find = partial(minimum_thickness, build, strength=limit.strength, tolerance=1e-5)
@@ -415,40 +415,61 @@ def describe_thickness(case: Case, ring: Ring) -> tuple[str, str, list[str]]:
             lines.append(f"if thinner, {moving}; without sliding {format_mm(rough)} are enough")
         alone = describe_friction_margin(case, build(ring.thickness))
         lines += [f"the ring alone, as drawn: {alone[0]}", *alone[1:]] if alone else []
-    return words, f"{factor:.3g}", lines
+    return words, factor, lines
 
 
-def compare_with_site(case: Case, found: Collapse) -> tuple[str, str]:
-    """Return the site's ground acceleration, and its multiple at collapse; both empty if unknown.
+class PushFactors(NamedTuple):
+    """Factors on a load at which a mechanism forms [-], over what is assumed of a fill."""
 
-    The multiple is that of a push by the weight, over the assumptions on a fill.
+    least: float
+    most: float
+    site: str = ""  # the site's acceleration, of which they are multiples, in words
+    proved: float | None = None  # bound from below, where a search may have missed the least
+
+    def __str__(self) -> str:
+        """Return both in words."""
+        text = format_ends(self.least, self.most, digits=3 if self.site else 4)
+        if self.proved is None:
+            return text
+        proved = f"proved ≥ {self.proved:.3g}" if self.proved else "no lower bound is known"
+        return f"{text} ({proved})"
+
+
+def format_ends(least: float, most: float, digits: int = 3) -> str:
+    """Return both ends of a range of factors, or one where their texts do not differ."""
+    return " to ".join(dict.fromkeys(f"{end:.{digits}g}" for end in (least, most)))
+
+
+def compare_with_site(case: Case, found: Collapse) -> PushFactors | None:
+    """Return the multiple of the site's ground acceleration at collapse; None if unknown.
+
+    It is that of a push by the weight, over the assumptions on a fill.
     """
     if not found.push or found.outcome is not Outcome.COLLAPSES:
-        return "", ""
-    demand, factor = compare_push(case, *(bound * abs(found.push) for bound in found.range))
-    if factor and found.solutions and found.solutions.may_be_less and found.over_fill is None:
+        return None
+    factors, searched = compare_push(case, *found.range, abs(found.push)), found.solutions
+    if factors and searched and searched.may_be_less and found.over_fill is None:
         # the search may have missed a weaker solution
-        _, least = compare_push(case, *[found.solutions.bracket[0] * abs(found.push)] * 2)
-        factor += f" (proved ≥ {least})" if float(least) > 0.0 else " (no lower bound is known)"
-    return demand, factor
+        share = factors.least / found.range[0]
+        factors = factors._replace(proved=max(searched.bracket[0] * share, 0.0))
+    return factors
 
 
-def compare_push(case: Case, low: float, high: float) -> tuple[str, str]:
-    """Return the site's ground acceleration, and how many times it two pushes [g] are."""
+def compare_push(case: Case, low: float, high: float, unit: float = 1.0) -> PushFactors | None:
+    """Return how many times the site's ground acceleration two pushes are, in a unit [g]."""
     spectrum, ground = case.assessment.spectrum or case.target, site_acceleration(case)
     if np.isnan(ground):
-        return "", ""
+        return None
     rock = getattr(spectrum, "ag", None)
     size = f"{ground:.3g} g" if rock is None else f"{rock:.3g} g × S {ground / rock:.3g}"
-    ends = (f"{push / ground:.3g}" for push in (low, high))
-    return f"the site's {size}", " to ".join(dict.fromkeys(ends))
+    return PushFactors(low * unit / ground, high * unit / ground, f"the site's {size}")
 
 
 def describe_pushover(push: Pushover) -> str:
     """Describe a pushover: factor, end, and the joints in the order in which they first hinge."""
     names = push.joints["name"].values
     hinges = [f"{names[joint]} at the {side}" for joint, side in push.hinges]
-    first = repr(push).replace("Pushover", "pushover", 1)
+    first = f"pushover: {push.sentence}"
     return "\n".join([first, f"hinges in turn: {join_names(hinges, '; ')}"] if hinges else [first])
 
 

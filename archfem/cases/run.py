@@ -445,12 +445,12 @@ def doubt_fidelity(at_rest: DeadLoadResult, motion: Motion, history: History) ->
     if compared is None or compared[0] <= tolerance:
         return []
     worst, end, finer = compared
-    cause = (
-        f"within the first {end:g} s fidelity '{at_rest.dead.model.fidelity}' differs from "
-        f"'{finer}' by {worst:.2g} in the largest |e| of a joint, and displacements may differ "
+    words = (
+        f"within the first {{:g}} s fidelity '{at_rest.dead.model.fidelity}' differs from "
+        f"'{finer}' by {{:.2g}} in the largest |e| of a joint, and displacements may differ "
         f"several times: take fidelity '{finer}'"
     )
-    return [Doubt(cause, "or 'auto', which predicts its error")]
+    return [Doubt(words, "or 'auto', which predicts its error", (end, worst))]
 
 
 def _compare_start(

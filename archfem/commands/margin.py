@@ -32,6 +32,7 @@ from archfem.dynamics.motion_scaling import (
 )
 from archfem.errors import InvalidInput
 from archfem.limit.mechanism_count import Mechanism
+from archfem.models.model import Doubt
 from archfem.motion.motion import Motion
 from archfem.view.style import Files
 
@@ -108,9 +109,10 @@ def scale(options: argparse.Namespace) -> int:
         found = search(case.analysis, motion, made=made)
     # of a run that Ctrl-C ended nothing is kept
     doubts = [line for line in doubts if not line.startswith(f"{DOUBT_MARK}interrupted at ")]
+    files: Files = {**answers.state_scale(found, motion, doubts)}
     doubts += [f"{DOUBT_MARK}{doubt}" for doubt in found.doubts]
     text = "\n".join([f"{motion.name}: {found}", *dict.fromkeys(doubts), "", found.table()])
-    files: Files = {"scale.txt": text, **answers.state_scale(found, motion, doubts)}
+    files["scale.txt"] = text
     if isinstance(found, CollapseScale):
         from archfem.view.studies import draw_scale
 
@@ -147,6 +149,9 @@ def _unpack_runs(text: str) -> KeptRuns:
         run["mechanisms"] = {name: x and Mechanism(**_with_tuples(x)) for name, x in met}
         run["fall"] = run["fall"] and CollapseState(**_with_tuples(run["fall"]))
         run["ending"] = Ending(run["ending"])
+        # those of earlier versions are texts
+        doubts = ({"words": x} if isinstance(x, str) else _with_tuples(x) for x in run["doubts"])
+        run["doubts"] = [Doubt(**doubt) for doubt in doubts]
         made[dt, run["scale"]] = ScaledRun(**_with_tuples(run))
     return made
 

@@ -252,7 +252,7 @@ def thickness(options: argparse.Namespace) -> int:
         words, factor, lines = result_text.describe_thickness(case, ring)
     text = "\n".join([*lines, *doubts])
     notes = [line for line in lines if line.startswith(NOTE_MARK)]
-    given = words, [*doubts, *notes], "at rest", factor
+    given = words, [*doubts, *notes], "at rest", result_text.PushFactors(factor, factor)
     stated = answers.state_outcome(RESULTS["thickness"], *given)
     files: Files = {"thickness.txt": text, **stated.as_file("thickness")}
     write_results("thickness", case, options.out, f"{case.title}\n{text}", lambda: files)
@@ -270,8 +270,9 @@ def assess(options: argparse.Namespace) -> int:
     # warnings of the comparison are those of the assessment, or of a sliding that it leaves out
     with keep_warnings():
         doubts += _compare_crushing(case, found.values())
-    doubts += [f"{DOUBT_MARK}{doubt}" for result in found.values() for doubt in result.doubts]
     doubts += answers.note_band(case, found.values())
+    listed = [f"{DOUBT_MARK}{doubt}" for result in found.values() for doubt in result.doubts]
+    every = [*dict.fromkeys([*doubts, *listed])]
     texts = [answers.describe_margin(found.values())]
     for name, result in found.items():
         # doubts follow at the end, once
@@ -279,7 +280,7 @@ def assess(options: argparse.Namespace) -> int:
         texts.append("\n".join([f"{name}: {lines[0]}", *lines[1:]]))
     of_fill = describe_fill(case.assessment.options.get("fill"), case.structure)
     texts.append("\n".join(filter(None, [of_fill, describe_fill_defaults(case)])))
-    text = "\n\n".join(filter(None, [*texts, "\n".join(dict.fromkeys(doubts))]))
+    text = "\n\n".join(filter(None, [*texts, "\n".join(every)]))
 
     def draw() -> Files:
         mechanisms = [k for k, result in enumerate(found.values()) if result.path is not None]
@@ -288,7 +289,7 @@ def assess(options: argparse.Namespace) -> int:
         return {"assessment.txt": text, **stated, **figures}
 
     write_results("assess", case, options.out, f"{case.title}\n{text}", draw)
-    return doubt_code(doubts)
+    return doubt_code(every)
 
 
 def _compare_crushing(case: Case, found: Iterable[KinematicAssessment]) -> list[str]:
@@ -323,8 +324,7 @@ def rate(options: argparse.Namespace) -> int:
         varied, sentences, doubts = _vary(case, table, first, options.out)
         interrupted = len(doubts) > 0
         lines[:0] = [*sentences, *doubts]
-        every = [*stated.doubts, *doubts]
-        stated = stated._replace(sentences=[*stated.sentences, *sentences], doubts=every)
+        stated = stated._replace(sentences=[*stated.sentences, *sentences]).with_lines(doubts)
     text, files = result_text.describe_ratings(case, ratings, varied)
     # the case of the folder, that of a run, may be rated for another vehicle
     files |= {RATING_FILE: format_tables({"rating": table}).rstrip(), **stated.as_file("rating")}
@@ -545,7 +545,11 @@ def print_modes(at_rest: DeadLoadResult, count: int, folder: Path) -> Modes:
     computed = compute_modes(at_rest.dead.model, count, start=at_rest.dead)
     text = f"{computed.table()}\n\n{at_rest.damping[1]}"
     print(text)
-    write({"modes.txt": text, "modes.png": computed.plot()}, folder)
+    head = "frequency [Hz],period [s],mass x,mass y"
+    columns = [computed.frequencies, computed.periods, computed.mass_ratios]
+    rows = (",".join(f"{x:.6g}" for x in row) for row in np.column_stack(columns))
+    files: Files = {"modes.csv": "\n".join([head, *rows]), "modes.png": computed.plot()}
+    write({"modes.txt": text, **files}, folder)
     return computed
 
 

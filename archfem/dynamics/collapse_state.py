@@ -158,27 +158,28 @@ def doubt_collapse(
     # more than 0.6, as did 14 of the others. A stack overturns at about 1.
     if fall.displacement > 0.6 * depth:
         yield Doubt(
-            f"a corner was displaced by {format_mm(fall.displacement)}, "
-            f"{fall.displacement / depth:.2g} of the depth of the shallowest part: other joints "
-            "or time steps may let it fall",
+            "a corner was displaced by {:mm}, {:.2g} of the depth of the shallowest part: "
+            "other joints or time steps may let it fall",
             RANGE_REMEDY,
+            (fall.displacement, fall.displacement / depth),
         )
     limit = DISLOCATION * depth
     if limit / 1.5 < fall.residual < 1.5 * limit:
         yield Doubt(
             f"it {'stands' if fall.kind == COLLAPSE_STATES[0] else 'is dislocated'} by little: "
-            f"residual displacement {format_mm(fall.residual)}, limit {format_mm(limit)}",
+            f"residual displacement {{:mm}}, limit {format_mm(limit)}",
             "state the displacement rather than the kind",
+            (fall.residual,),
         )
     # a portal that still rocked when its motion ended was dislocated by 70 mm, and at rest by none
     if fall.kind == COLLAPSE_STATES[1] and not fall.resting:
         yield Doubt(
-            f"blocks still move at the end: they may come back from {format_mm(fall.residual)}, or "
-            "go farther",
+            "blocks still move at the end: they may come back from {:mm}, or go farther",
             "hold the push longer, until it falls or rests"
             if held
             else "let the ground rest at the end, `--set motion.rest=10`, or "
             "suite.pairs.NAME.rest=10",
+            (fall.residual,),
         )
 
 

@@ -107,9 +107,9 @@ def follow_fall(
         history = replace(history, dataset=history.dataset.merge(dataset).assign_attrs(attrs))
         doubts += _doubt_fall(structure, dataset)
         if failure := dataset.attrs["fall_failure"]:
-            cause = f"loose blocks were followed until {frames[-1].time:.2f} s alone, and what "
+            words = "loose blocks were followed until {:.2f} s alone, and what comes after is not"
             remedy = "compare with another dt, or with archfem.dynamics.RigidBlockSimulation"
-            doubts.append(Doubt(f"{cause}comes after is not known: {failure}", remedy))
+            doubts.append(Doubt(f"{words} known: {{}}", remedy, (frames[-1].time, failure)))
             if fall.time is None:
                 return history.with_doubts((*history.doubts, *doubts))
     else:
@@ -248,26 +248,24 @@ def _doubt_fall(structure: Structure, dataset: xr.Dataset) -> Iterator[Doubt]:
     unsettled = "impulses of loose blocks did not settle in"
     if early > MAX_UNSETTLED:
         yield Doubt(
-            f"it is in doubt whether blocks fall: {unsettled} {early:.0%} of the steps before the "
+            f"it is in doubt whether blocks fall: {unsettled} {{:.0%}} of the steps before the "
             "first was lost",
             RANGE_REMEDY,
+            (early,),
         )
     elif share > MAX_UNSETTLED:
         yield Doubt(
             "it is in doubt where blocks come to rest, and not that they fall: "
-            f"{unsettled} {share:.0%} of the steps, of those before the first was lost {early:.0%}",
+            f"{unsettled} {{:.0%}} of the steps, of those before the first was lost {{:.0%}}",
             "state that it falls, and not how its blocks lie",
+            (share, early),
         )
     if (gained := dataset.attrs["fall_gained_share"]) > MAX_ENERGY_GAIN:
-        yield Doubt(
-            f"loose blocks gained {gained:.2g} of the energy exchanged, by errors of the steps",
-            RANGE_REMEDY,
-        )
+        words = "loose blocks gained {:.2g} of the energy exchanged, by errors of the steps"
+        yield Doubt(words, RANGE_REMEDY, (gained,))
     if (change := dataset.attrs["fall_step_change"]) > MAX_STEP_CHANGE:
-        yield Doubt(
-            f"half the step changes how far a block falls or moves by {change:.0%}",
-            RANGE_REMEDY,
-        )
+        words = "half the step changes how far a block falls or moves by {:.0%}"
+        yield Doubt(words, RANGE_REMEDY, (change,))
     joints = [structure.joints[k] for k in np.flatnonzero(mark_stone_joints(structure))]
     if held := [joint.name for joint in joints if not joint.contact.slides]:
         yield Doubt(

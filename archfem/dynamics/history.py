@@ -1,5 +1,6 @@
 """History of a run: recorded joints and fields, first mechanisms, verdict, and its file."""
 
+import json
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from enum import StrEnum
@@ -42,7 +43,7 @@ from archfem.limit.mechanism_kinematics import (
 )
 from archfem.masonry.joint_closing import describe_closing
 from archfem.masonry.structure import Structure, join_names
-from archfem.models.model import Doubt, Model
+from archfem.models.model import Doubt, Model, read_doubts, write_doubts
 from archfem.units import kPa
 
 SIGN_CONVENTION = (
@@ -205,9 +206,10 @@ class History(ResultDisplay):
         piece; and joints between stones that fail and are not assessed. The last need the
         structure.
         """
-        lines = str(self.dataset.attrs.get("doubts", "")).splitlines()
-        stored = [Doubt(cause, remedy) for cause, _, remedy in (x.partition("\t") for x in lines)]
-        return (*stored, *self._doubts_of_run)
+        text = str(self.dataset.attrs.get("doubts", "[]"))
+        if not text.startswith("["):  # files of earlier versions have a line for each
+            text = json.dumps([line.split("\t") for line in text.splitlines()])
+        return (*read_doubts(text), *self._doubts_of_run)
 
     @cached_property
     def _doubts_of_run(self) -> list[Doubt]:
@@ -226,8 +228,7 @@ class History(ResultDisplay):
             doubts: doubts in place of those of the run; repeated ones count once.
         """
         stored = [each for each in dict.fromkeys(doubts) if each not in self._doubts_of_run]
-        text = "\n".join(f"{doubt.cause}\t{doubt.remedy}" for doubt in stored)
-        return History(self.dataset.assign_attrs(doubts=text), self.structure)
+        return History(self.dataset.assign_attrs(doubts=write_doubts(stored)), self.structure)
 
     @cached_property
     def mechanism(self) -> Mechanism | None:

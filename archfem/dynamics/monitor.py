@@ -143,7 +143,7 @@ class RunMonitor:
         self._depth = float(model.structure.depths.min())
         self._last, self._before = start.state(0), start.state(0)
         self._steps = 0
-        self._doubts = {f"model {k}": doubt for k, doubt in enumerate(model.doubts)}
+        self._doubts = {doubt.words: doubt for doubt in model.doubts}
         self._mass_damping = mass_damping  # coefficient of the mass matrix [1/s]
         self._mass_damping_loss = 0.0  # [J]
         self._kinetic = start.energy[0, 0]
@@ -246,14 +246,12 @@ class RunMonitor:
         """Warn of energy drift, relative to the largest energy exchanged."""
         # amplitudes, which vary with the root of energy, are then off by 2.5 %
         if abs(self.worst_drift) > doubtful:
-            change = (
-                "was gained by the scheme" if self.worst_drift > 0.0 else "was lost to the scheme"
-            )
             self._add_doubt(
-                "energy",
-                f"energy drifts: by t = {self._worst_time:.4g} s {abs(self.worst_drift):.0%} of "
-                f"the largest exchanged {change}",
+                "energy drifts: by t = {:.4g} s {:.0%} of the largest exchanged was {} the scheme",
                 "compare with the scheme Conserving, with a smaller dt, or with more damping",
+                self._worst_time,
+                abs(self.worst_drift),
+                "gained by" if self.worst_drift > 0.0 else "lost to",
             )
 
     def _check_tension(self) -> None:
@@ -261,12 +259,13 @@ class RunMonitor:
         tension, time = self.fill_tension
         if tension > SOIL_TENSION:
             self._add_doubt(
-                "tension",
-                f"elastic fill bears {tension / kPa:.3g} kPa of tension, at t = {time:.4g} s: soil "
-                f"has next to none, {SOIL_TENSION / kPa:.2g} kPa with a cohesion of "
+                "elastic fill bears {:.3g} kPa of tension, at t = {:.4g} s: soil has next to "
+                f"none, {SOIL_TENSION / kPa:.2g} kPa with a cohesion of "
                 f"{SOIL_COHESION / kPa:g} kPa",
                 'compare with fill in pieces (law = "jointed", friction_angle, cohesion and '
                 "piece_size in [structure.fill] of a case)",
+                tension / kPa,
+                time,
             )
 
     def _check_small_displacements(self, time: float, small_rotation: float = 0.01) -> None:
@@ -274,25 +273,27 @@ class RunMonitor:
         # beyond that rotation the largest |e| of six arches and columns was wrong by 0.01 to 0.03
         if self.largest_turn > small_rotation:
             self._add_doubt(
-                "turn",
-                f"by t = {time:.4g} s a joint had turned by {self.largest_turn:.2g} rad: to take "
-                "displacements as small errs by 0.01 and more in |e| there",
+                "by t = {:.4g} s a joint had turned by {:.2g} rad: to take displacements as small "
+                "errs by 0.01 and more in |e| there",
                 "compare with displacements='large'",
+                time,
+                self.largest_turn,
             )
         if self._met is not None:
             self._add_doubt(
-                "meeting",
-                f"at t = {self._met[0]:.4g} s {self._met[1]}, with which it shares no joint: small "
-                "displacements let stones pass through each other",
+                "at t = {:.4g} s {}, with which it shares no joint: small displacements let "
+                "stones pass through each other",
                 "follow them with displacements='large'",
+                *self._met,
             )
         if self.largest_displacement > self._depth:
             self._add_doubt(
-                "displacement",
-                f"by t = {time:.4g} s blocks had moved {self.largest_displacement:.3g} m, more "
-                f"than a joint is deep, {self._depth:.3g} m: what follows is beyond the small "
-                "displacements that this model assumes",
+                "by t = {:.4g} s blocks had moved {:.3g} m, more than a joint is deep, "
+                f"{self._depth:.3g} m: what follows is beyond the small displacements that this "
+                "model assumes",
                 "read it as collapse, or follow it with displacements='large'",
+                time,
+                self.largest_displacement,
             )
 
     def _check_facets(self, time: float, doubtful: float = 0.1) -> None:
@@ -304,19 +305,20 @@ class RunMonitor:
         coarse = any(name in self.model.fidelity for name in ("rigid", "faces"))
         coarser = "" if coarse else ", fidelity 'faces' or 'rigid' for stones"
         doubt = Doubt(
-            f"by t = {time:.4g} s the faces of '{name}' had slid by {slip:.2g} of a facet, though "
-            "they are paired as meshed",
+            "by t = {:.4g} s the faces of '{}' had slid by {:.2g} of a facet, though they are "
+            "paired as meshed",
             "take fewer cells, down to cells=(1, 1) of cell='triangle', one facet on each stone "
             f"that is not slender{coarser}; hold the fill's ends by sidewalls; or cut it with "
             "jointed_fill",
+            (time, name, slip),
         )
         if slip > 1.0:
             raise DidNotConverge(str(doubt), last=self._before)
-        self._add_doubt("facets", doubt.cause, doubt.remedy)
+        self._add_doubt(doubt.words, doubt.remedy, *doubt.values)
 
-    def _add_doubt(self, kind: str, cause: str, remedy: str) -> None:
-        """Log the first doubt of a kind in a run, and store the latest."""
-        doubt = Doubt(cause, remedy)
-        if kind not in self._doubts:
+    def _add_doubt(self, words: str, remedy: str, *values: float | str) -> None:
+        """Log the first doubt of its words in a run, and store the latest."""
+        doubt = Doubt(words, remedy, values)
+        if words not in self._doubts:
             logger.warning("%s", doubt)
-        self._doubts[kind] = doubt
+        self._doubts[words] = doubt

@@ -11,7 +11,6 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import pairwise
 from math import inf, sqrt
-from re import sub
 from time import perf_counter
 from typing import Any
 
@@ -63,7 +62,7 @@ class ScaledRun:
     ending: Ending
     outcome: str  # ending in words
     fall: CollapseState | None = None  # state of collapse; None for small displacements
-    doubts: tuple[str, ...] = ()  # reasons why the run may be wrong
+    doubts: tuple[Doubt, ...] = ()
     admissible_step: float = inf  # that follows sliding, where that of the run does not [s]
 
     def has_answer(self, definition: str) -> bool:
@@ -115,21 +114,35 @@ class MechanismScales:
     pga: float | None = None  # peak of the motion [m/s²]
     dt: float | None = None  # time step that was given [s]
 
-    def __repr__(self) -> str:
-        """Return the scales around the first mechanism by any definition, in one line."""
-        first = min(self.definitions, key=lambda definition: self[definition].upper)
-        bracket = self[first]
+    @property
+    def first(self) -> str:
+        """Definition of the mechanism that is met at the smallest scale."""
+        return min(self.definitions, key=lambda definition: self[definition].upper)
+
+    @property
+    def states(self) -> dict[str, float]:
+        """Smallest scale at which it forms a mechanism, if any [-]."""
+        bracket = self[self.first]
+        return {"mechanism": bracket.upper} if bracket.run else {}
+
+    @property
+    def sentence(self) -> str:
+        """Scales around the first mechanism by any definition, in words."""
+        first, bracket = self.first, self[self.first]
         met = "nor at any scale that was tried"
         if bracket.run:
             met = f"first mechanism at {_say_scale(bracket.upper, self.pga)}, by {first}"
         met = f"{UNFINISHED}, {met}" if self.interrupted else met
         return _say_bracket("no mechanism", bracket.lower, self.pga, met)
 
+    def __repr__(self) -> str:
+        """Return this in one line."""
+        return self.sentence
+
     @property
-    def doubts(self) -> tuple[str, ...]:
+    def doubts(self) -> tuple[Doubt, ...]:
         """Reasons why the scales of the first mechanism may be wrong."""
-        first = min(self.definitions, key=lambda definition: self[definition].upper)
-        return _doubts_of_searches({"": self}, first)
+        return _doubts_of_searches({"": self}, self.first)
 
     @property
     def kept_runs(self) -> KeptRuns:
@@ -236,8 +249,7 @@ def mechanism_scales(  # noqa: PLR0913  (arguments of `time_history`, and of the
         options = {"start": start, "damping": damping, "criteria": criteria, "method": solver}
         record = Record(whole_fall=False)  # mechanisms come before a fall
         run = _run_as_far(model, scaled, dt=dt, until=EveryMechanism(), record=record, **options)
-        doubts = tuple(map(str, run.doubts))
-        return ScaledRun(scale, first_mechanisms(run), run.ending, run.outcome, doubts=doubts)
+        return ScaledRun(scale, first_mechanisms(run), run.ending, run.outcome, doubts=run.doubts)
 
     definitions = (*applicable_definitions(start.model.structure, criteria), "verified")
     within = admissible_range(between, motion)
@@ -272,36 +284,32 @@ def _say_bracket(state: str, lower: float, pga: float | None, met: str) -> str:
 
 def _doubts_of_searches(
     searches: Mapping[str, MechanismScales], definition: str
-) -> tuple[str, ...]:
+) -> tuple[Doubt, ...]:
     """Return reasons why brackets may be wrong: runs broken off, not monotonic, or in doubt.
 
     Searches are by their settings in words. Doubts that differ in numbers alone are stated once.
     """
-    doubts, of_runs = list[str](), dict[str, tuple[str, list[str]]]()
+    doubts, of_runs = list[Doubt](), dict[tuple[str, ...], tuple[Doubt, list[str]]]()
     for settings, scales in searches.items():
         bracket = scales[definition]
-        for note, values in {
-            "it is not monotonic: it survives also": bracket.above,
-            "runs without an answer were": bracket.unanswered,
-        }.items():
-            if values:
-                at = ", ".join(f"{value:#.3g}" for value in values)
-                doubts.append(f"{note} at {at} × the motion{settings}")
-        if bracket.unanswered:
-            broken = next(run for run in scales.runs if run.scale == bracket.unanswered[0])
-            doubts[-1] += f": the first {broken.outcome}" if broken.outcome else ""
+        if above := bracket.above:
+            words = "it is not monotonic: above a fall it survives {:#.3g} × the motion"
+            doubts.append(Doubt(words, "", ((min(above), max(above)),), settings))
+        if broken := [run for run in scales.runs if run.scale in bracket.unanswered]:
+            first = f": the first {broken[0].outcome}" if broken[0].outcome else ""
+            words, at = "runs without an answer were at {:#.3g} × the motion{}", bracket.unanswered
+            doubts.append(Doubt(words, "", ((at[0], at[-1]), first), settings))
         if scales.interrupted:
-            made = f"{len(scales.runs)} run{'s' * (len(scales.runs) != 1)}{settings}"
-            doubts.append(f"the search was interrupted after {made}; the same command continues it")
+            made = f"{len(scales.runs)} run{'s' * (len(scales.runs) != 1)}"
+            words = f"the search was interrupted after {made}"
+            doubts.append(Doubt(words, "the same command continues it", (), settings))
         for run in scales.runs:
-            if run.scale in (bracket.lower, bracket.upper):
-                for doubt in run.doubts:
-                    kind = sub(r"[\d.]+(e[-+]\d+)?", "#", doubt)
-                    _, places = of_runs.setdefault(kind, (doubt, []))
-                    places.append(f"{run.scale:#.3g} ×{settings}")
+            for doubt in run.doubts if run.scale in (bracket.lower, bracket.upper) else ():
+                _, places = of_runs.setdefault(doubt.kind, (doubt, []))
+                places.append(f"{run.scale:#.3g} × {settings}".strip())
     for doubt, (first, *others) in of_runs.values():
         likewise = f" (likewise at {join_names(others)})" if others else ""
-        doubts.append(f"at {first}{likewise}: {doubt}")
+        doubts.append(replace(doubt, place=f"at {first}{likewise}"))
     return tuple(doubts)
 
 
@@ -426,10 +434,10 @@ class CollapseScale:
     of_model: tuple[Doubt, ...] = ()
     longer: dict[float, MechanismScales] = field(default_factory=dict)
 
-    def __repr__(self) -> str:
-        """Return scales around the fall, and from which it is dislocated, which is no fall."""
-        least, (low, *_) = self._least_fall, sorted(run.scale for run in self._runs) or [inf]
-        met = "falls at no scale that was tried"
+    @property
+    def sentence(self) -> str:
+        """Scales around the fall, and from which it is dislocated, which is no fall, in words."""
+        least, met = self._least_fall, "falls at no scale that was tried"
         if least < inf:
             met = f"falls at {_say_scale(least, self.pga)}"
         elif unanswered := [run.scale for run in self._runs if run.fall is None]:
@@ -441,11 +449,16 @@ class CollapseScale:
         if self.dislocated < inf:
             met = f"dislocated from {self.dislocated:#.3g} ×, {met}"
         if self.moves <= self.held:
-            met = f"a mechanism from {self.moves:#.3g} ×{' or less' * (self.moves == low)}, {met}"
+            less = " or less" * ("moves in all" in self.states)
+            met = f"a mechanism from {self.moves:#.3g} ×{less}, {met}"
         met = f"{UNFINISHED}, {met}" if self.interrupted else met
+        return _say_bracket("stands", self.held, self.pga, met)
+
+    def __repr__(self) -> str:
+        """Return this, how closely scales were run, and what was varied."""
         steps = join_names([f"{1e3 * dt:g}" for dt in sorted(self._every, reverse=True)])
         varied = f"; varied were the scale and the time step ({steps} ms), and no property"
-        return _say_bracket("stands", self.held, self.pga, met) + self._say_tested() + varied
+        return f"{self.sentence}{self._say_tested()}{varied}"
 
     def _say_tested(self) -> str:
         """Return in words how closely scales were run up to `lower`; "" where none stands."""
@@ -467,20 +480,17 @@ class CollapseScale:
         return any(search.interrupted for search in self.searches.values())
 
     @property
-    def doubts(self) -> tuple[str, ...]:
+    def doubts(self) -> tuple[Doubt, ...]:
         """Reasons why the scales may be wrong."""
-        doubts = [str(doubt) for doubt in self.of_model]
+        doubts = [*self.of_model]
         finished = {dt: each for dt, each in self._every.items() if not each.interrupted}
-        brackets = {dt: each[COLLAPSE_DEFINITION] for dt, each in finished.items()}
         if len(finished) > 1 and _disagreeing(finished):
-            found = (
-                f"between {b.lower:#.3g} and {b.upper:#.3g} × by {1e3 * dt:g} ms"
-                for dt, b in brackets.items()
-            )
-            low, *_, high = sorted(bracket.upper for bracket in brackets.values())
-            ends = f"{low:#.3g} to {high:#.3g} ×" if high < inf else f"{low:#.3g} × on, or nowhere"
-            doubts.append(f"its time steps find the first fall from {ends}: {', '.join(found)}")
-        searches = {f" by {1e3 * dt:g} ms": search for dt, search in self.searches.items()}
+            low, *_, high = sorted(x[COLLAPSE_DEFINITION].upper for x in finished.values())
+            words, ends = "its time steps find the first fall at {:#.3g} × the motion", (low, high)
+            if high == inf:
+                words, ends = "a time step finds a fall at {:#.3g} ×, and another none", (low, low)
+            doubts.append(Doubt(words, "", (ends,)))
+        searches = {f"by {1e3 * dt:g} ms": search for dt, search in self.searches.items()}
         return (*doubts, *_doubts_of_searches(searches, COLLAPSE_DEFINITION))
 
     @property
@@ -535,6 +545,16 @@ class CollapseScale:
         """Smallest scale at which failed joints let blocks move [-]; infinite for none."""
         runs = (run.scale for run in self._runs if run.mechanisms.get("verified"))
         return min(runs, default=inf)
+
+    @property
+    def states(self) -> dict[str, float]:
+        """Smallest scales at which it moves, is dislocated and falls, by all steps too [-]."""
+        scales = {"moves": self.moves if self.moves <= self.held else inf}
+        scales |= {"dislocated": self.dislocated, "falls": self._least_fall}
+        scales["falls by all steps"] = self.upper
+        if self.moves == min((run.scale for run in self._runs), default=inf):
+            scales["moves in all"] = scales["moves"]  # and maybe at smaller ones
+        return {state: scale for state, scale in scales.items() if scale < inf}
 
     @property
     def dislocated(self) -> float:
@@ -721,9 +741,8 @@ def collapse_scale(
         if kept := (made or {}).get((step, scale)):
             return kept
         run = _run_as_far(model, motion.scaled(scale), start=begin, damping=damping, dt=step)
-        doubts, follows = tuple(map(str, run.doubts)), run.dataset.attrs.get("admissible_step", inf)
-        met = run.mechanisms
-        return ScaledRun(scale, met, run.ending, run.outcome, run.fall, doubts, follows)
+        met, follows = run.mechanisms, run.dataset.attrs.get("admissible_step", inf)
+        return ScaledRun(scale, met, run.ending, run.outcome, run.fall, run.doubts, follows)
 
     limits, limit = admissible_range(between, motion), (COLLAPSE_DEFINITION,)
 

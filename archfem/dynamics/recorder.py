@@ -179,11 +179,11 @@ class Recorder:
         share = self.monitor.mass_damping_share
         if not share or not (dataset["open"].values.any() or dataset["hinge"].values.any()):
             return []
-        cause = (
+        words = (
             "damping has a part proportional to mass, which also drags loose blocks, and joints "
-            f"opened: that part took {share:.0%} of the energy lost"
+            "opened: that part took {:.0%} of the energy lost"
         )
-        return [Doubt(cause, "use effective_damping(model, ratio) or StiffnessDamping")]
+        return [Doubt(words, "use effective_damping(model, ratio) or StiffnessDamping", (share,))]
 
     def _attributes(self, motion: Motion, ending: Ending, outcome: str) -> dict[str, Any]:
         """Return the scalar results and settings of the run."""

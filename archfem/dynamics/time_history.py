@@ -45,7 +45,6 @@ from archfem.models.model import Doubt, Model, check_model
 from archfem.motion.motion import Motion
 from archfem.statics.equilibrium import Equilibrium, dead_load, fill_doubts
 from archfem.statics.newton import Newton
-from archfem.units import format_mm
 
 
 @takes_analysis
@@ -178,9 +177,10 @@ def _state_tolerance(history: History, tolerance: float, share: float) -> Histor
     """State the tolerance of the steps in a history; doubt it where over 2 % of them missed it."""
     history.dataset.attrs |= {"tolerance": tolerance, "tolerance_unmet": share}
     doubt = Doubt(
-        f"the shortest steps erred by more than {tolerance:g} in |e| in {share:.0%} of the run",
+        f"the shortest steps erred by more than {tolerance:g} in |e| in {{:.0%}} of the run",
         "compare with constant steps of 0.1 ms or less (`--set analysis.dt=1e-4`), "
         "or with more damping",
+        (share,),
     )
     return history.with_doubts((*history.doubts, doubt)) if share > 0.02 else history
 
@@ -205,10 +205,11 @@ def _doubt_steps_of_sliding(history: History, slip_error: SlipError, dt: float) 
     limit = max(limit, 0.3 * largest)
     if error <= limit:
         return history
-    said = f"{format_mm(error)}, where the largest slip is {format_mm(largest)}"
+    sizes: tuple[float, ...] = error, largest
+    said = "{:mm}, where the largest slip is {:mm}"
     remedy = "or leave dt out"
     if error > max(largest, limit / 0.3):  # a sum of bounds, which says nothing of the step
-        said = f"as much as it is, {format_mm(largest)} at most"
+        said, sizes = "as much as it is, {:mm} at most", (largest,)
         remedy = "and compare, or leave dt out"
         error = max(largest, limit / 0.3)
     # the error varies with the square of the step, and faster where steps miss peaks
@@ -217,9 +218,9 @@ def _doubt_steps_of_sliding(history: History, slip_error: SlipError, dt: float) 
     shorter = floor(shorter / unit) * unit
     history.dataset.attrs["admissible_step"] = shorter
     doubt = Doubt(
-        f"steps of {1e3 * dt:g} ms are long for sliding: of '{dataset['name'].values[worst]}' the "
-        f"slip may be wrong by {said}",
+        f"steps of {1e3 * dt:g} ms are long for sliding: of '{{}}' the slip may be wrong by {said}",
         f"take {1e3 * shorter:g} ms or less, `--set analysis.dt={shorter:g}`, {remedy}",
+        (str(dataset["name"].values[worst]), *sizes),
     )
     return history.with_doubts((*history.doubts, doubt))
 

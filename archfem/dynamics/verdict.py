@@ -89,10 +89,19 @@ class Verdict:
     @property
     def headline(self) -> str:
         """Outcome and number of doubts, in one line."""
+        return self._add_doubts(self._outcome_text) + f"; {NO_RANGE}" * (not self.doubts)
+
+    @property
+    def brief(self) -> str:
+        """The same without lost blocks, and without saying that there is no range."""
+        fall = self.fall and replace(self.fall, time=None)
+        return self._add_doubts(fall.text if fall else self._outcome_text)
+
+    def _add_doubts(self, text: str) -> str:
+        """Return an outcome with how the run was broken off, and the number of doubts."""
+        text += f", but the run {self.incomplete}" if self.incomplete else ""
         count = len(self.doubts)
-        doubt = f"{count} doubt{'s' if count > 1 else ''}" if count else NO_RANGE
-        broken_off = f", but the run {self.incomplete}" if self.incomplete else ""
-        return f"{self._outcome_text}{broken_off}; {doubt}"
+        return f"{text}; {count} doubt{'s' * (count > 1)}" if count else text
 
     @property
     def _outcome_text(self) -> str:

@@ -150,17 +150,23 @@ class VerdictRange(ResultDisplay):
         return f"falls in {falls or 'none'} of {self.answered.sum()} variations{also}"
 
     @property
-    def displacements(self) -> str:
+    def displacement_ends(self) -> str:
         """Range of the largest displacements of the runs that do not fall; empty without such."""
-        rows = self.answers
-        sizes = rows["displacement"].values[~self.falls[self.answered]]
+        sizes = self.answers["displacement"].values[~self.falls[self.answered]]
         if not np.isfinite(sizes).any():
             return ""
         least, usual, largest = np.quantile(sizes, (0.0, 0.95, 1.0), method="inverted_cdf")
-        ends, hardly = f"{format_mm(least)} to {format_mm(largest)}", sizes < largest / 100
-        text = (
-            f"largest displacements {ends}, in 95 % of {len(sizes)} runs {format_mm(usual)} or less"
-        )
+        ends = f"{format_mm(least)} to {format_mm(largest)}"
+        return f"{ends}, in 95 % of {len(sizes)} runs {format_mm(usual)} or less"
+
+    @property
+    def displacements(self) -> str:
+        """This with its subject, and how many of these runs hardly move."""
+        if not self.displacement_ends:
+            return ""
+        text, rows = f"largest displacements {self.displacement_ends}", self.answers
+        sizes = rows["displacement"].values[~self.falls[self.answered]]
+        hardly = sizes < sizes.max() / 100
         # runs that rest, as under a joint rule without a mechanism, say little of the others
         if not hardly.any():
             return text

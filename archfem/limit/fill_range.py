@@ -106,12 +106,19 @@ class FillRange:
     @property
     def outcome(self) -> str:
         """Return "passes", "fails", or "passes only with" the assumptions under which it does."""
+        if self.needed:
+            return f"passes only with {self.needed}"
+        return "passes" if self.ends[0] >= 1.0 else "fails"
+
+    @property
+    def needed(self) -> str:
+        """Assumptions under which alone it passes, in words; "" where it always does, or never."""
         good = [key for key, value in self.values.items() if value >= 1.0]
         if len(good) in (0, len(self.values)):
-            return "passes" if good else "fails"
+            return ""
         enough = self._find_sufficient(good)
         rest = [" and ".join(filter(None, key)) for key in good if not {*key} & {*enough}]
-        return f"passes only with {' or '.join([*enough, *rest])}"
+        return " or ".join([*enough, *rest])
 
     def _find_sufficient(self, good: Sequence[FillAssumption]) -> list[str]:
         """Return the words, on inertia or pressure alone, with which it passes in any case."""

@@ -1,6 +1,5 @@
 """Rating of bridges for vehicles of codes: partial factors, widths, geometric factor of safety."""
 
-import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import islice
@@ -141,19 +140,19 @@ class Rating(ResultDisplay):
     @property
     def outcome(self) -> str:
         """Whether it passes, on which condition, and the factor by rule where less was given."""
+        return "; ".join(self.clauses)
+
+    @property
+    def clauses(self) -> list[str]:
+        """Clauses of the outcome: on which condition it passes, range, what is left out, rule."""
+        words, codes = self._verdict, f"the code's {' × '.join(self.missing)}"
         if np.isnan(self.factor):
-            return "does not stand under its own weight"
-        words = "passes" if self.passes else "fails"
-        if self.passes:
-            needed = [f"the {part}" for part in [self._needs()] if part]
-            needed += ["stones that do not crush"] if self.crushing < 1.0 else []
-            words += f" only with {' and '.join(needed)}" if needed else ""
+            return [words]
         if self.missing:
-            most = f" if the code's {self._missing_factors} is at most {self.factor:.4g}"
-            words += most if self.passes else f" even without the code's {self._missing_factors}"
-        words += self._say_range()
-        words += f" without {self.vehicle.left_out}" if self.vehicle.left_out else ""
-        return words if np.isnan(self.by_rule) else f"{words}; {self._rule_text()}"
+            most = f" if {codes} is at most {self.factor:.4g}"
+            words += most if self.passes else f" even without {codes}"
+        left = f"left out: {self.vehicle.left_out}" if self.vehicle.left_out else ""
+        return [*filter(None, [words, self._say_range(), left, self._rule_text()])]
 
     @property
     def label(self) -> str:
@@ -162,8 +161,17 @@ class Rating(ResultDisplay):
 
     @property
     def short_outcome(self) -> str:
-        """The outcome without range and conditions on factors, and which of these are missing."""
-        return re.split(r" if the| even| \(|;", self.outcome)[0] + name_missing(self.missing)
+        """Whether it passes, with which parts of a bridge alone, and which factors are missing."""
+        return self._verdict + name_missing(self.missing)
+
+    @property
+    def _verdict(self) -> str:
+        """Whether it passes, and with which parts of a bridge alone."""
+        if not self.passes:
+            return "does not stand under its own weight" if np.isnan(self.factor) else "fails"
+        needed = [f"the {part}" for part in [self._needs()] if part]
+        needed += ["stones that do not crush"] if self.crushing < 1.0 else []
+        return f"passes only with {' and '.join(needed)}" if needed else "passes"
 
     @property
     def headline(self) -> str:
@@ -204,15 +212,12 @@ class Rating(ResultDisplay):
         factors += [self.without_backing, self.without_either] if self._has_backing else []
         factors += [self.by_pressure] if isinstance(self.fill, PlasticFill) else []
         least = "none" if np.isnan(factors).any() else f"{min(factors):.4g}"
-        return f" ({least} to {np.nanmax(factors):.4g} over what is assumed of the fill)"
-
-    @property
-    def _missing_factors(self) -> str:
-        """Factors of a code that neither the vehicle nor its user gave, in words."""
-        return " × ".join(self.missing)
+        return f"the factor is {least} to {np.nanmax(factors):.4g} over what is assumed of the fill"
 
     def _rule_text(self) -> str:
-        """Return the factor with the width by rule and the whole load of the code."""
+        """Return the factor with the width by rule and the code's whole load, if it is known."""
+        if np.isnan(self.by_rule):
+            return ""
         rule, code = self.vehicle.spread_over(self.structure), self.vehicle.area_load
         load = f" and {code / 1e3:g} kN/m² beside the axles" if code else ""
         width = f"over {rule:.3g} m of width{load}, by rule"
@@ -354,8 +359,8 @@ class Rating(ResultDisplay):
         return f"at {ASSUMED_STRENGTH / MPa:g} MPa the least factor is {self.crushing:.4g}"
 
     @property
-    def by_codes(self) -> dict[str, tuple[float, str]]:
-        """Factor and outcome of a vehicle of one's own with the factors of codes, by their names.
+    def by_codes(self) -> dict[str, "Rating"]:
+        """Ratings of a vehicle of one's own with the factors of codes, by their names.
 
         They are from memory. With a distributed load or an impact on one axle they are of CS 454
         alone. Of a train of a code the dynamic factor is that of the span.
@@ -372,14 +377,12 @@ class Rating(ResultDisplay):
             live, impact = code.factors
             words = f"by CS 454 ({live:g}, and {impact:g} on the worst axle, from memory)"
             found[words] = self.by_cs454
-        codes = {name: self._with_factors(of) for name, of in found.items()}
-        return {name: (other.factor, other.outcome) for name, other in codes.items()}
+        return {name: self._with_factors(of) for name, of in found.items()}
 
     @property
     def _is_multiple(self) -> bool:
         """Whether the factor with other factors on the vehicle is a multiple of this one."""
-        on_all = self.impact == 1.0 or self.vehicle.impact_on == "all axles"
-        return on_all and not self.area_load
+        return not self.area_load and (self.impact == 1.0 or self.vehicle.impact_on == "all axles")
 
     def _with_factors(self, of: Mapping[str, float]) -> "Rating":
         """Return this with the factors, in each state, of another code on the same vehicle."""
@@ -391,11 +394,10 @@ class Rating(ResultDisplay):
         """Return the lines on a vehicle of one's own with the factors of codes, if it is one."""
         codes, product, lines = self.by_codes, self.live * self.impact, list[str]()
         if codes and self._is_multiple and len(self.missing) < 2 and self.vehicle.grade == "given":
-            given = f"live × impact {product:.4g} given"
-            lines = [f"bare axles {product * self.factor:.4g}, {given}"]
+            lines = [f"bare axles {product * self.factor:.4g}, live × impact {product:.4g} given"]
         name = self.vehicle.name
         return lines + [
-            f"{name} {by}: factor {factor:.4g}, {words}" for by, (factor, words) in codes.items()
+            f"{name} {by}: factor {each.factor:.4g}, {each.outcome}" for by, each in codes.items()
         ]
 
     def _describe_hinges(self) -> list[str]:

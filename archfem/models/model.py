@@ -5,9 +5,9 @@ it through this interface alone, whatever its fidelity and whether displacements
 """
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from copy import copy
-from dataclasses import astuple, dataclass
+from dataclasses import astuple, dataclass, replace
 from functools import cached_property
 from typing import Any, Protocol, Self, runtime_checkable
 
@@ -19,6 +19,7 @@ from archfem.errors import InvalidInput
 from archfem.joints.operator import JointOperator
 from archfem.masonry.loads import Action, BodyForce, Settlement
 from archfem.masonry.structure import Structure
+from archfem.units import format_mm
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,12 +159,51 @@ class Cells:
 class Doubt:
     """Reason why a result may be wrong."""
 
-    cause: str  # what was found, with values
-    remedy: str  # what to do about it
+    words: str  # what was found, with a field of `str.format` for each value
+    remedy: str = ""  # what to do about it
+    values: tuple[Any, ...] = ()  # numbers, the ends of their ranges over several runs, and names
+    place: str = ""  # of which of several runs, in words
+
+    @property
+    def cause(self) -> str:
+        """What was found, with the values."""
+        values = (x if isinstance(x, str) else Ends(list_ends(x)) for x in self.values)
+        return self.words.format(*values) if self.values else self.words
+
+    @property
+    def kind(self) -> tuple[str, ...]:
+        """What doubts that differ in numbers alone have in common."""
+        return (self.words, *(x for x in self.values if isinstance(x, str)))
 
     def __str__(self) -> str:
-        """Cause and remedy as one sentence."""
-        return f"{self.cause}; {self.remedy}" if self.remedy else self.cause
+        """Place, cause and remedy as one sentence."""
+        text = f"{self.place}: {self.cause}" if self.place else self.cause
+        return f"{text}; {self.remedy}" if self.remedy else text
+
+
+class Ends(tuple[float, ...]):
+    """Least and largest of a number, which have one format; "mm" is that of lengths [m]."""
+
+    def __format__(self, spec: str) -> str:
+        """Return both ends, or one where their texts do not differ."""
+        if spec == "mm":
+            texts = (format_mm(end).removesuffix(" mm") for end in self)
+            return f"{' to '.join(dict.fromkeys(texts))} mm"
+        return " to ".join(dict.fromkeys(format(end, spec) for end in self))
+
+
+def list_ends(value: Any) -> tuple[float, ...]:
+    """Return the ends of a range, or a number alone."""
+    return value if isinstance(value, tuple) else (value,)
+
+
+def merge_doubts(doubts: Sequence[Doubt], place: str = "") -> Doubt:
+    """Return doubts of one kind as one, with the ends of each of their numbers."""
+    values: list[Any] = []
+    for column in zip(*(doubt.values for doubt in doubts), strict=True):
+        text, numbers = isinstance(column[0], str), [end for x in column for end in list_ends(x)]
+        values.append(column[0] if text else (min(numbers), max(numbers)))
+    return replace(doubts[0], values=tuple(values), place=place)
 
 
 def write_doubts(doubts: Iterable[Doubt]) -> str:
@@ -173,7 +213,11 @@ def write_doubts(doubts: Iterable[Doubt]) -> str:
 
 def read_doubts(text: str) -> tuple[Doubt, ...]:
     """Return the doubts that `write_doubts` wrote."""
-    return tuple(Doubt(*each) for each in json.loads(text))
+    found = (Doubt(*row) for row in json.loads(text))
+    return tuple(
+        replace(each, values=tuple(tuple(x) if isinstance(x, list) else x for x in each.values))
+        for each in found
+    )
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from archfem.limit.fill_range import FillAssumption, FillRange
 from archfem.masonry.loads import AttachedLoad
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import Structure
+from archfem.models.model import Doubt
 from archfem.motion.design_spectra import (
     DesignSpectrum,
     Eurocode8,
@@ -24,6 +25,9 @@ from archfem.motion.design_spectra import (
 from archfem.motion.motion import Motion
 from archfem.motion.response_spectra import response_spectrum
 from archfem.units import STANDARD_GRAVITY
+
+# Value of a doubt about ratios that are no less than the true one
+UPPER_BOUND = "an upper bound"
 
 
 @dataclass(frozen=True)
@@ -60,7 +64,7 @@ class LimitState:
             options: Any = {"ends": "(]", "remedy": "give a ratio, such as 0.4 for 40 %"}
             check_between(getattr(self, key), f"{self.name}, {key} [-]", 0.0, most, **options)
 
-    def doubt(self, spectrum: DesignSpectrum | Motion) -> list[str]:
+    def doubt(self, spectrum: DesignSpectrum | Motion) -> list[Doubt]:
         """Return the doubt about a check of NTC against a spectrum of another code, if it is one.
 
         Args:
@@ -70,8 +74,10 @@ class LimitState:
         if not self.name.startswith("NTC") or {*codes} <= {"NTC-2018", "table"}:
             return []
         return [
-            f"the check is one of NTC, which was not made for a spectrum of {codes[0]}; give "
-            "limit_state with the rules of its code, or a spectrum of NTC-2018"
+            Doubt(
+                f"the check is one of NTC, which was not made for a spectrum of {codes[0]}",
+                "give limit_state with the rules of its code, or a spectrum of NTC-2018",
+            )
         ]
 
 

@@ -53,12 +53,14 @@ from archfem.masonry.structure import (
     list_or_count,
     structure_of,
 )
+from archfem.models.model import Doubt
 from archfem.motion.design_spectra import (
     DesignSpectrum,
 )
 from archfem.motion.motion import Motion
 from archfem.statics.assessment_checks import (
     LIMIT_STATES,
+    UPPER_BOUND,
     AssessmentCheck,
     LimitState,
     add_fill_ranges,
@@ -125,7 +127,7 @@ class KinematicAssessment(ResultDisplay):
     control: str
     path: MechanismPath | None
     notes: tuple[str, ...]
-    doubts: tuple[str, ...]
+    doubts: tuple[Doubt, ...]
     of_bodies: "KinematicAssessment | None"
     least: "KinematicAssessment | None" = None
 
@@ -381,21 +383,21 @@ class _Search:
 
     def _follow(
         self, placed: PlacedBlocks, joints: list[int], friction: Array, first: KinematicChain
-    ) -> tuple[MechanismPath, int, str]:
+    ) -> tuple[MechanismPath, int, Doubt | None]:
         """Return the path of a mechanism, where it holds to, and the doubt about its factor.
 
         In walls in bond, and where dilatancy alone lets a mechanism move, it is that of the search
         without dilatancy, if it is weaker; of one that has no finite motion even so, the path is
         the place at rest.
         """
-        mechanism, doubt, moved = first, "", None
+        mechanism, moved, doubt = first, None, None
         slides = any(contact.slip for contact in first.contacts)
         searches = [False, True] if self.friction == "coulomb" else [True]
         for searched in searches if slides else [False]:
             if searched:
                 mechanism, doubt = self._search_flat(placed, joints, first)
                 if moved is not None and moved[0].factors[0] <= mechanism.factor:
-                    return (*moved, doubt if mechanism is not first else "")
+                    return (*moved, doubt if mechanism is not first else None)
             follower = PathFollower(placed, joints, friction)
             with suppress(DidNotConverge):  # no mechanism was found whose faces slide flat
                 path = follower.follow(mechanism)
@@ -411,12 +413,13 @@ class _Search:
 
     def _search_flat(
         self, placed: PlacedBlocks, joints: list[int], first: KinematicChain
-    ) -> tuple[KinematicChain, str]:
+    ) -> tuple[KinematicChain, Doubt | None]:
         """Return the mechanism of the search without dilatancy, or the first, and a doubt."""
         structure, searches = placed.structure, self.friction == "nonassociated"
-        dilates = (
-            f"faces dilate as this mechanism slides: alpha_0 = {first.factor:.4g} is an upper "
-            "estimate"
+        dilates = Doubt(
+            "faces dilate as this mechanism slides: alpha_0 = {:.4g} is {}",
+            "a search without dilatancy takes no part, loads and fill",
+            (first.factor, UPPER_BOUND),
         )
         if len(joints) < len(structure.joints) or placed.loads:
             if searches:
@@ -424,18 +427,21 @@ class _Search:
                     "friction 'nonassociated' is searched for the whole structure only: leave out "
                     "part and blocks, or use 'coulomb'"
                 )
-            return first, f"{dilates}; a search without dilatancy takes no part, loads and fill"
+            return first, dilates
         dry = [replace(x, contact=replace(x.contact, cohesion=0.0)) for x in structure.joints]
         wall, live = replace(structure, joints=tuple(dry)), BodyForce(placed.direction)
         found = collapse_factor(wall, live=live, friction="nonassociated", strength=np.inf)
         if not found.motion.any():
-            return first, f"{dilates}, and a search without dilatancy found none: hold a motion"
-        contacts, doubt = placed.touching(joints), ""
+            words = "a search without dilatancy found none: hold a motion"
+            return first, replace(dilates, remedy=words)
+        contacts, doubt = placed.touching(joints), None
         flat = np.zeros(len(contacts))
         if found.solutions is not None and found.solutions.may_be_less:
-            doubt = (
-                "alpha_0 is an upper bound, the least that a search without dilatancy found, and a "
-                "weaker mechanism may exist: hold a motion a tenth below"
+            doubt = Doubt(
+                "alpha_0 is {}, the least that a search without dilatancy found, and a weaker "
+                "mechanism may exist",
+                "hold a motion a tenth below",
+                (UPPER_BOUND,),
             )
         return classify_motion(placed, joints, found.motion, flat, contacts, found.factor), doubt
 
@@ -497,7 +503,7 @@ class _Oscillator:
     rules: LimitState
     confidence_factor: float
     by_body: bool = False  # whether each body that moves as one has one weight
-    searched: str = ""  # doubt about a factor that was searched without dilatancy
+    searched: Doubt | None = None  # about a factor that was searched without dilatancy
 
     @cached_property
     def weights(self) -> tuple[Array, Array]:
@@ -588,25 +594,23 @@ class _Oscillator:
         return found
 
     @property
-    def doubts(self) -> list[str]:
+    def doubts(self) -> list[Doubt]:
         """Why a ratio may be too high: another code's spectrum, a fill left out, other joints."""
         found = self.rules.doubt(self.spectrum)
         if self.searched:
             share = f"its linear ratio is e* = {self.e_star:.3g} times that of this one at least"
-            found.append(f"{self.searched}; whatever moves at this alpha_0, {share}")
+            words = f"whatever moves at this alpha_0, {share}"
+            found += [self.searched, Doubt(words, values=(UPPER_BOUND,))]
         if self.fill and self.placed.fill is None and self.path is not None:
-            found.append(
-                "the fill counts as weight and mass on the stones: its pressure on them, which "
-                "may hold an arch back or push a wall out, is left out; give fill for it"
-            )
+            words = "the fill counts as weight and mass on the stones, without its pressure on them"
+            found.append(Doubt(words, "give fill for it"))
         if self.path is not None and self.holds < len(self.path.factors) - 1:
             held = abs(float(self.curve["d"][self.holds]))
             late = f"beyond d* = {held:.3g} m", "there the curve"
-            place, bound = late if self.holds else ("from rest", "the whole curve, and each ratio,")
-            found.append(
-                f"{place} joints open or slide that the mechanism keeps closed: {bound} is an "
-                "upper bound; a time history with large displacements can test it"
-            )
+            place, what = late if self.holds else ("from rest", "the whole curve, and each ratio,")
+            words = f"{place} joints open or slide that the mechanism keeps closed: {what} is {{}}"
+            remedy = "a time history with large displacements can test it"
+            found.append(Doubt(words, remedy, (UPPER_BOUND,)))
         return found
 
     def assess(self, q: float) -> KinematicAssessment:

@@ -106,13 +106,18 @@ class Pushover(ResultDisplay):
 
     def _summary(self) -> str:
         """Describe the pushover in one or two lines."""
+        return f"Pushover: {self.sentence}"
+
+    @property
+    def sentence(self) -> str:
+        """Factor, its limit, number of hinges and end, in words."""
         steps, limit = self.curve.sizes["step"] - 1, ""
         end = float(self.curve["factor"][-1])
         last = "" if end == self.factor else f", at the end {end:.4g}"
         if np.isfinite(self.limit):
             limit = f", tends to {self.limit:.4g} ± {self.uncertainty:.2g}"
         return (
-            f"Pushover: factor {self.factor:.4g} after {steps} steps{limit}{last}, "
+            f"factor {self.factor:.4g} after {steps} steps{limit}{last}, "
             f"{len(self.hinges)} hinge{'s' if len(self.hinges) != 1 else ''}; {self.outcome}"
         )
 

@@ -200,9 +200,10 @@ def doubt_steps_of_sliding(
         return []
     return [
         Doubt(
-            f"in {len(steps)} of {len(admissible)} {runs} the steps, {1e3 * dt:g} ms{half}, are "
-            "long for sliding",
+            f"in {{}} of {len(admissible)} {runs} the steps, {1e3 * dt:g} ms{half}, are long for "
+            "sliding",
             f"take {1e3 * min(steps):g} ms or less, `--set analysis.dt={min(steps):g}`",
+            (len(steps),),
         )
     ]
 

@@ -304,7 +304,7 @@ def test_command(small, capsys):
     said = capsys.readouterr().out
     assert (out / "modes.txt").read_text(encoding="utf-8") in said
     assert "damping: 5 % at" in said
-    written = {"modes.txt", "modes.png", "modes.gif", "archfem.json"}
+    written = {"modes.txt", "modes.csv", "modes.png", "modes.gif", "archfem.json"}
     assert {path.name for path in out.iterdir()} == written
 
 

@@ -1,5 +1,6 @@
 """Sentences of a report's conclusion: margins, doubts by weight, and what was not varied."""
 
+import json
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,8 +11,11 @@ import archfem as af
 from archfem.cases import answers
 from archfem.cases.report import conclusion, doubts, sections
 from archfem.cases.report.report_data import ReportData
+from archfem.cases.result_text import PushFactors
 from archfem.dynamics import VerdictRange
-from archfem.models.model import Doubt
+from archfem.dynamics.collapse_state import RANGE_REMEDY
+from archfem.models.model import Doubt, read_doubts, write_doubts
+from archfem.statics.assessment_checks import UPPER_BOUND
 
 SPECTRUM = {"spectrum": {"code": "EC8", "ag": 0.2, "ground": "A"}}
 
@@ -44,6 +48,24 @@ def data_of(case, found=None, **verdicts):
     return data
 
 
+def state(result, *numbers, words="in words", factor="1.1"):
+    """A made-up statement of a result, whose sentences have none of its numbers."""
+    rows = [answers.Row(result, words, words, factor, each._asdict()) for each in numbers]
+    return answers.Statement([words], rows)
+
+
+def scales(motion, held, unfinished=False, **states):
+    """Made-up results of a search of scales under a motion of 0.2 g."""
+    found = {name.replace("_", " "): scale for name, scale in states.items()}
+    return answers.Scales(motion, 0.2, held, found, unfinished)
+
+
+def say_margin(data, **statements):
+    """Sentences on the margin of made-up results."""
+    vars(data)["statements"] = statements
+    return [*conclusion._describe_margin(data)]
+
+
 def range_of(*displacements, outcome="stands", motion="first", sampled=False, error=""):
     """Made-up variations under a motion, of which the first has changed nothing."""
     count = len(displacements)
@@ -70,33 +92,37 @@ def case():
 
 def test_equal_doubts_of_runs_are_one_with_the_range_of_its_numbers(case):
     """Numbers in names of joints are no values; a run may have several doubts of a kind."""
+    words = "rigid differs by {:.3g} in |e|, of joint {} by {:mm}"
     one, two, three = (
-        Doubt(f"rigid differs by {x} in |e|, of joint {k} by {size} mm", "take faces")
-        for x, k, size in (("0.092", 4, 12), ("0.1", 4, 8), ("0.053", 5, 9))
+        Doubt(words, "take faces", values)
+        for values in ((0.092, "4", 0.012), (0.1, "4", 0.008), (0.053, "5", 0.009))
     )
-    every = {"a": [one], "b": [two], "c": [three, Doubt("it turns", "")]}
+    every = {"a": [one], "b": [two], "c": [three, Doubt("it turns")]}
     data = data_of(case, **{name: verdict_of(doubts=each) for name, each in every.items()})
-    assert [text for _, text in doubts.list_doubts(data)] == [
-        "2 of 3 runs: rigid differs by 0.092 to 0.1 in |e|, of joint 4 by 8 to 12 mm",
-        "1 of 3 runs: rigid differs by 0.053 in |e|, of joint 5 by 9 mm",
+    assert [f"{each}" for _, each in doubts.list_doubts(data)] == [
+        "2 of 3 runs: rigid differs by 0.092 to 0.1 in |e|, of joint 4 by 8 to 12 mm; take faces",
+        "1 of 3 runs: rigid differs by 0.053 in |e|, of joint 5 by 9 mm; take faces",
         "1 of 3 runs: it turns",
     ]
     alone = data_of(case, a=verdict_of(doubts=[one]))
-    assert [text for _, text in doubts.list_doubts(alone)] == [one.cause]
+    assert [each.cause for _, each in doubts.list_doubts(alone)] == [one.cause]
+    assert read_doubts(write_doubts([one, two])) == (one, two)
 
 
 def test_the_weightiest_doubts_of_a_result_are_not_folded_away(case):
-    causes = ["steps are long", "it slips", "energy drifts", "a corner was displaced by 3 mm"]
-    causes += ["joints let it fall", "blocks fall, and as rigid blocks none falls"]
-    data = data_of(case, a=verdict_of(doubts=[Doubt(cause, "") for cause in causes]))
+    """Those that a range answers are of the outcome."""
+    causes = [Doubt(f"it slips {k} times") for k in range(3)]
+    causes += [Doubt("joints let it fall", RANGE_REMEDY)]
+    causes += [Doubt("as rigid blocks none falls", f"{RANGE_REMEDY}, and check the stiffness")]
+    data = data_of(case, a=verdict_of(doubts=causes))
     (text,) = (
         each.text
         for each in conclusion.build_conclusion(data).pieces
         if getattr(each, "text", "").startswith("In doubt")
     )
     assert text == (
-        "In doubt, time histories: Blocks fall, and as rigid blocks none falls. Joints let it "
-        "fall. A corner was displaced by 3 mm. 3 more: see section 'Response'."
+        "In doubt, time histories: Joints let it fall. As rigid blocks none falls. It slips 0 "
+        "times. 2 more: see section 'Response'."
     )
 
 
@@ -111,38 +137,29 @@ def test_the_weightiest_doubts_of_a_result_are_not_folded_away(case):
 def test_a_push_is_no_margin_of_what_moves(case, outcomes, verified, moves):
     verdicts = (verdict_of(each, verified=verified) for each in outcomes)
     data = data_of(case, **{f"m{k}": each for k, each in enumerate(verdicts)})
-    bounded, elastic = "1.04 (proved ≥ 0.9)", "1.02"
-    rows = [
-        ("limit analysis", "the site's 0.2 g", "mechanism", bounded),
-        ("pushover", "the site's 0.2 g", "factor 0.204", elastic),
+    site = "the site's 0.2 g"
+    bounded, elastic = PushFactors(1.04, 1.04, site, 0.9), PushFactors(1.02, 1.02, site)
+    stated = {"limit": state("limit analysis", bounded), "pushover": state("pushover", elastic)}
+    bodies = {"at most 1.04 (proved ≥ 0.9)": "as rigid blocks", "1.02": "with elastic joints"}
+    begins = "begins to move it {}, which is no collapse".format
+    ends = {body: f"{body} is no margin: {moves}" if moves else "" for body in bodies.values()}
+    assert say_margin(data, **stated) == [
+        f"a push of {size} times {site} {ends[body] or begins(body)}"
+        for size, body in bodies.items()
     ]
-    bodies = {f"at most {bounded}": "as rigid blocks", elastic: "with elastic joints"}
-    if moves:
-        expected = [
-            f"a push of {size} times the site's 0.2 g {body} is no margin: {moves}"
-            for size, body in bodies.items()
-        ]
-    else:
-        expected = [
-            f"a push of {size} times the site's 0.2 g begins to move it {body}, "
-            "which is no collapse"
-            for size, body in bodies.items()
-        ]
-    assert [*conclusion._describe_margin(data, rows)] == expected
-    rows[:] = [("limit analysis", "the site's 0.2 g", "mechanism", "0.9")]
-    least = "a push of 0.9 times the site's 0.2 g begins to move it, which is no collapse"
-    assert [*conclusion._describe_margin(data, rows)] == [least, *filter(None, [moves])]
-    unshaken = [*conclusion._describe_margin(data_of(case), rows)]
-    assert unshaken == [least, "shaken it may begin to move at less"]
+    less = {"limit": state("limit analysis", PushFactors(0.9, 0.9, site))}
+    least = f"a push of 0.9 times {site} begins to move it, which is no collapse"
+    assert say_margin(data, **less) == [least, *filter(None, [moves])]
+    assert say_margin(data_of(case), **less) == [least, "shaken it may begin to move at less"]
 
 
-@pytest.mark.parametrize(("factor", "counts"), [("1.03", True), ("1.01", False)])
+@pytest.mark.parametrize(("factor", "counts"), [(1.03, True), (1.01, False)])
 def test_a_run_stronger_than_a_push_says_nothing_of_it(case, factor, counts):
     """The run has 2 m/s², 1.02 times the 0.2 g of the site."""
     data = data_of(case, a=verdict_of(verified="rocks"))
     vars(data)["case"] = af.Case.of({**case.settings, "assessment": SPECTRUM})
-    rows = [("limit analysis", "the site's 0.2 g", "mechanism", factor)]
-    (text,) = conclusion._describe_margin(data, rows)
+    found = state("limit analysis", PushFactors(factor, factor, "the site's 0.2 g"))
+    (text,) = say_margin(data, limit=found)
     assert ("is no margin" in text) == counts
 
 
@@ -150,7 +167,7 @@ def test_a_run_stronger_than_a_push_says_nothing_of_it(case, factor, counts):
 def test_a_check_of_what_begins_to_move_is_one_of_displacements_where_it_moves(case, verified):
     data = data_of(case, a=verdict_of(verified=verified))
     vars(data)["case"] = af.Case.of({**case.settings, "assessment": SPECTRUM})
-    row = ("assessment: code, right", "1 m/s²", "2 m/s², passes", "1.1 (0.842 by displacements)")
+    found = state("assessment", answers.Ratios("code", ["right"], 1.1, 1.1, moved=0.842))
     expected = [
         "the least margin is 1.1 (0.842 by displacements), on the EC8 spectrum of PGA 0.2 g, by "
         "code, right",
@@ -163,82 +180,56 @@ def test_a_check_of_what_begins_to_move_is_one_of_displacements_where_it_moves(c
             "code, right",
             "the check passes for what is at rest, and in the runs it moves, and falls in none",
         ]
-    assert [*conclusion._describe_margin(data, [row])] == expected
+    assert say_margin(data, assessment=found) == expected
 
 
 def test_the_margin_of_scales_ends_where_it_is_dislocated(case):
-    rocks = "stands at 0.3 g (1.38 × the motion), a mechanism from 0.85 × or less"
-    rows = [
-        ("scale of the motion", f"'{name}', PGA 0.2 g", outcome, factor)
-        for name, outcome, factor in (
-            ("a", f"{rocks}, dislocated from 1.41 ×, falls at 0.9 g (4.5 × the motion)", "1.38"),
-            ("b", "stands at 2.00 × the motion, falls at 0.5 g (2.10 × the motion)", "2.00"),
-            ("c", "falls at 0.2 g (1.00 × the motion); no smaller scale is known", "-"),
-        )
+    every = [
+        scales("a", 1.38, moves=0.85, moves_in_all=0.85, dislocated=1.41, falls=4.5),
+        scales("b", 2.0, falls=2.1),
+        scales("c", 0.0, falls=1.0),
     ]
     data = data_of(case)
     vars(data)["pairs"] = ("a", "b", "c", "d")
-    assert [*conclusion._describe_margin(data, rows)] == [
-        "the least margin is 1.38 on 'a', PGA 0.2 g, of 2 motions",
-        "it moves as a mechanism from 0.85 × or less on, is dislocated from 1.41 × on and falls "
-        "from 4.5 × on",
+    assert say_margin(data, scale=state("scale", *every)) == [
+        "the least margin is 1.38 on 'a', PGA 0.20 g, of 2 motions",
+        "it moves as a mechanism from 0.850 × or less on, is dislocated from 1.41 × on and falls "
+        "from 4.50 × on",
         "it falls first under 'b', from 2.10 × on",
         "no scale is known up to which it stands under 'c'",
         "'d' was not scaled",
     ]
-    small = (
-        "no mechanism at 0.1 g (0.5 × the motion), first mechanism at 0.11 g (0.55 × the motion)"
-    )
-    rows = [("scale of the motion", "'a', PGA 0.2 g", small, "0.5")]
-    assert [*conclusion._describe_margin(data, rows)][:2] == [
-        "the least margin is 0.5 on 'a', PGA 0.2 g, which it fails",
-        "it forms a mechanism from 0.55 × on",
+    small = scales("a", 0.5, mechanism=0.55)
+    assert say_margin(data, scale=state("scale", small))[:2] == [
+        "the least margin is 0.500 on 'a', PGA 0.20 g, which it fails",
+        "it forms a mechanism from 0.550 × on",
     ]
-    other = "stands at 0.3 g (1.5 × the motion), falls at no scale that was tried"
-    rows = [("scale of the motion", "'a', PGA 0.2 g", other, "1.5")]
-    assert [*conclusion._describe_margin(data, rows)][1] == "it falls in no run"
-    begun = (
-        "stands at 0.3 g (0.7 × the motion), search unfinished, a mechanism from 0.5 ×, falls at"
-    )
-    for end, fails in (("1.3", ""), ("0.9", ", which it fails")):
-        rows = [
-            (
-                "scale of the motion",
-                "'a', PGA 0.2 g",
-                f"{begun}, falls at {end} × the motion",
-                "0.7",
-            )
-        ]
-        assert next(conclusion._describe_margin(data, rows)) == (
-            f"the least margin is 0.7 (search unfinished) on 'a', PGA 0.2 g{fails}"
+    assert say_margin(data, scale=state("scale", scales("a", 1.5)))[1] == "it falls in no run"
+    for least, fails in ((1.3, ""), (0.9, ", which it fails")):
+        begun = scales("a", 0.7, unfinished=True, moves=0.5, falls=least)
+        assert say_margin(data, scale=state("scale", begun))[0] == (
+            f"the least margin is 0.700 (search unfinished) on 'a', PGA 0.20 g{fails}"
         )
 
 
 def test_the_answer_has_displacements_the_first_fall_and_the_checks(case):
     """First falls are of all motions and time steps, on page 1 in one range; bounds decide none."""
-    falls = {
-        "a": "a mechanism from 0.5 × or less, falls at 0.34 g (1.30 × the motion)",
-        "b": "falls at 0.4 g (1.41 × the motion), the other time step first falls at 1.51 ×",
-    }
-    result, holds = "scale of the motion", "stands at 0.3 g (1.1 × the motion)"
-    rows = [(result, f"'{name}', PGA 0.2 g", f"{holds}, {x}", "1.1") for name, x in falls.items()]
-    steps = "its time steps find the first fall from"
-    rigid = "blocks fall, and as rigid blocks none falls"
-    loose = f"at 1.30 × by 2 ms (likewise at 1.38 × by 1 ms): {rigid}"
-    scaled = [f"under 'a': {steps} 1.30 to 1.38 ×: between 1.27 and 1.30 × by 5 ms"]
-    scaled += [f"under 'b': {steps} 1.41 to 1.51 ×: between 1.38 and 1.41 × by 5 ms"]
-    scaled += [f"under '{name}': {loose}" for name in "ab"]
-    check = (
-        "assessment: damage, right and left",
-        "0.09 m",
-        "0.06 m, fails",
-        "0.592 (0.488 bodies)",
+    first, other = (
+        scales("a", 1.1, falls=1.3),
+        scales("b", 1.1, falls=1.41, falls_by_all_steps=1.51),
     )
+    steps, rigid = "its time steps find the first fall at {:.3g} ×", Doubt("none falls as rigid")
+    scaled = [
+        Doubt(steps, "", (ends,), name) for name, ends in (("a", (1.3, 1.38)), ("b", (1.4, 1.51)))
+    ]
+    scaled += [Doubt(rigid.words, place=name) for name in "ab"]
+    bound = Doubt("the curve is {}", "", (UPPER_BOUND,))
+    check = answers.Ratios("damage", ["right", "left"], 0.592, 0.592, bodies=0.488)
     data = data_of(case, a=verdict_of(displacement=0.06), b=verdict_of(displacement=0.08))
-    bound = "the curve is an upper bound"
+    searched = state("scale", first, other)._replace(doubts=scaled)
     vars(data)["statements"] = {
-        "assessment": answers.Statement([], [check], [bound]),
-        "scale": answers.Statement([], rows, scaled),
+        "assessment": state("assessment", check)._replace(doubts=[bound]),
+        "scale": searched,
     }
     answer = (
         "moves by 60 to 80 mm, first falls at 1.30 × the motion (1.30 to 1.51 over motions and "
@@ -250,29 +241,23 @@ def test_the_answer_has_displacements_the_first_fall_and_the_checks(case):
     pieces = conclusion.build_conclusion(data).pieces
     assert pieces[0].text == f"The structure stands under all 2 motions of PGA 0.20 g, {answer}."
     texts = [getattr(piece, "text", "") for piece in pieces]
-    assert f"In doubt, kinematic assessment: T{bound[1:]}." in texts
+    assert "In doubt, kinematic assessment: The curve is an upper bound." in texts
     assert (
-        "In doubt, scale of the motion: Under 'a' and 'b': blocks fall, and as rigid blocks none "
-        "falls. Under 'a' and 'b' it first falls between 1.30 and 1.51 × over its time steps."
+        "In doubt, scale of the motion: Under 'a' and 'b': its time steps find the first fall at "
+        "1.3 to 1.51 ×. Under 'a' and 'b': none falls as rigid."
     ) in texts
     assert any("The doubts below, on scale of the motion, may change this." in x for x in texts)
-    for at, said in ("1.20", True), ("1.35", False):
-        parted = rows[0][2].replace(", falls", f", dislocated from {at} ×, falls")
-        changed = [(*rows[0][:2], parted, "1.1"), rows[1]]
-        data.statements["scale"] = answers.Statement([], changed, scaled)
-        words = f", is first dislocated at {at} × the motion; "
+    for at, said in (1.2, True), (1.35, False):
+        parted = first._replace(states={"dislocated": at, "falls": 1.3})
+        data.statements["scale"] = state("scale", parted, other)
+        words = f", is first dislocated at {at:.2f} × the motion; "
         assert (words in dict(conclusion.list_facts(data))["verdict"]) == said
-    data.statements["scale"] = answers.Statement([], rows, scaled)
-    rows[0] = (*rows[0][:2], f"search unfinished, {rows[0][2]}", "1.1")
+    data.statements["scale"] = state("scale", first._replace(unfinished=True), other)
     facts = dict(conclusion.list_facts(data))
     assert "over motions and time steps, search unfinished); " in facts["verdict"]
-    passed = (
-        "assessment: damage, right",
-        "0.09 m",
-        "0.1 m, passes",
-        "1.1 (0.842 by displacements)",
-    )
-    data.statements["assessment"] = answers.Statement([], [passed], [bound])
+    data.statements["scale"] = searched
+    passed = answers.Ratios("damage", ["right"], 1.1, 1.1, moved=0.842)
+    data.statements["assessment"] = state("assessment", passed)._replace(doubts=[bound])
     facts = dict(conclusion.list_facts(data))
     rested = "the displacement check of damage, right is met at rest (0.842 by displacements)"
     assert facts["verdict"].endswith(rested)
@@ -281,6 +266,44 @@ def test_the_answer_has_displacements_the_first_fall_and_the_checks(case):
     moves = rested.replace("at rest", "at rest alone, and it moves")
     assert dict(conclusion.list_facts(data))["verdict"].endswith(moves)
     assert facts["in doubt"] == "kinematic assessment, scale of the motion"
+
+
+def test_rewording_a_sentence_changes_no_number_of_the_report(case):
+    """Sentences, outcomes and factors in words are shown alone, and never read."""
+    found = {
+        "scale": state("scale", scales("a", 1.38, moves=0.85, falls=4.5)),
+        "assessment": state("assessment", answers.Ratios("code", ["right"], 0.8, 1.2, "columns")),
+        "limit": state("limit analysis", PushFactors(0.9, 1.1, "the site's 0.2 g")),
+    }
+    data = data_of(case, a=verdict_of())
+    said = say_margin(data, **found), [*conclusion._say_answer(data)]
+    for words in (
+        "fails at 9 ×, passes only with 7",
+        "under 'b': falls from 3 × or less",
+        "an upper",
+    ):
+        for name, each in found.items():
+            rows = [
+                row._replace(demand=words, outcome=words, factor="9 (8 by displacements)")
+                for row in each.rows
+            ]
+            data.statements[name] = answers.Statement([words], rows)
+        assert (say_margin(data, **data.statements), [*conclusion._say_answer(data)]) == said
+
+
+def test_a_file_of_an_earlier_version_is_shown_without_a_margin(case):
+    """Its rows have no numbers, and its doubts are texts."""
+    row = ["scale of the motion", "'a', PGA 0.2 g", "stands at 0.3 g (1.5 × the motion)", "1.5"]
+    old = {"sentences": ["scale"], "rows": [row], "doubts": ["under 'a': it falls"], "notes": []}
+    stated = answers.Statement.read(json.dumps(old))
+    assert stated.rows == [answers.Row(*row, {})]
+    assert stated.doubts == (Doubt("under 'a': it falls"),)
+    data = data_of(case)
+    assert say_margin(data, scale=stated) == []
+    assert [x.cause for _, x in doubts.list_doubts(data)] == ["under 'a': it falls"]
+    again = answers.Statement.read(stated.as_file("scale")["scale.json"])
+    assert (again.rows, again.doubts) == (stated.rows, stated.doubts)
+    assert answers.Statement.read(json.dumps({"factor": 1.0})) is None
 
 
 def test_of_unequal_outcomes_the_worst_is_the_first(case):
@@ -300,24 +323,19 @@ def test_of_unequal_outcomes_the_worst_is_the_first(case):
 
 
 def test_doubts_of_several_motions_are_one(case):
-    """With ranges of a few numbers, else in the numbers of the first; others stay as they are."""
+    """With the ranges of their numbers; names differ in kind."""
     given = [
-        ("scale", f"under '{name}': at {scale} × by 2 ms: joints let it fall")
-        for name, scale in (("a", "1.48"), ("b", "2.18"))
+        Doubt("at {:.2f} × it falls by {}", "", values, place)
+        for place, values in (
+            ("a", (1.48, "joint 1")),
+            ("b", (2.18, "joint 1")),
+            ("c", (1.5, "joint 2")),
+        )
     ]
-    given += [
-        ("scale", f"under '{name}': it falls between {low} and {low}1 ×, by 1 ms from {low}2 ×")
-        for name, low in (("a", "1.4"), ("b", "2.4"), ("c", "1.7"))
-    ]
-    given += [("risk", "it errs by 1.5 %"), ("risk", "it errs by 2.5 %")]
-    assert [*doubts._merge_motions(given)] == [
-        ("scale", "under 'a' and 'b': at 1.48 to 2.18 × by 2 ms: joints let it fall"),
-        (
-            "scale",
-            "under 'a': it falls between 1.4 and 1.41 ×, by 1 ms from 1.42 ×; likewise under 'b' "
-            "and 'c'",
-        ),
-        *given[-2:],
+    assert [*map(str, doubts._merge_motions([*given, Doubt("it errs by 1.5 %")]))] == [
+        "under 'a' and 'b': at 1.48 to 2.18 × it falls by joint 1",
+        "under 'c': at 1.50 × it falls by joint 2",
+        "it errs by 1.5 %",
     ]
 
 
@@ -330,7 +348,7 @@ def test_a_displacement_has_the_range_of_its_time_steps_and_single_changes_are_s
     data = data_of(case, ranges[0], a=verdict_of(displacement=0.1), b=verdict_of())
     (row, *_) = (row for _, row in conclusion._capacity_rows(data))
     assert row[2] == (
-        "stands in 2 of 2 runs; displaced by up to 100 mm (over time steps 20 mm to 120 mm under "
+        "stands in 2 of 2 runs; displaced by up to 100 mm (over time steps 20 to 120 mm under "
         "'a'), 0 mm at the end"
     )
     same = "it falls with none of 1 single changes"
@@ -345,48 +363,36 @@ def test_a_displacement_has_the_range_of_its_time_steps_and_single_changes_are_s
     ]
 
 
-def test_single_changes_are_drawn_and_tabulated_the_worst_first(case):
-    """The bar of a fall would hide the others; where all are alike there is no picture."""
+def test_single_changes_are_tabulated_the_worst_first(case):
+    """A fall has no displacement but that to the ground."""
     found = range_of(0.02, 0.12, 9.0)
     found.dataset["sampled"][:] = False
     found.dataset["dt"][1] = "half"
     found.dataset["sign"] = "run", np.array(["as given", "as given", "reversed"])
     found.dataset.attrs["properties"] = ["dt", "sign"]
     found.dataset["outcome"] = "run", np.array(["stands", "stands", "fallen"])
-    figure, table = sections._build_single_changes(data_of(case), found, "a")
+    (table,) = sections._tabulate_single_changes(data_of(case), found, "a")
     assert [row[:3] for row in table.rows] == [
         ("motion reversed", "fallen", "-"),
         ("half the time step", "stands", "120 mm"),
         ("unvaried", "stands", "20 mm"),
     ]
-    assert table.caption == "Single changes under 'a', the worst first"
-    (axes,) = figure.figure.axes
-    assert [bar.get_width() for bar in axes.patches] == pytest.approx(
-        [20.0, np.nan, 120.0], nan_ok=True
-    )
+    assert table.caption == "Single changes under 'a'; the worst first"
     found.dataset["outcome"] = "run", np.array(["stands", "stands", "dislocated"])
     found.dataset["residual"] = "run", np.array([0.01, 0.03, 0.06])
-    figure, table = sections._build_single_changes(data_of(case), found, "a")
-    (axes,) = figure.figure.axes
-    assert [bar.get_width() for bar in axes.patches] == pytest.approx([10.0, 60.0, 30.0])
-    limits = [x.get_xdata()[0] for x in axes.get_lines() if x.get_linestyle() == "-"]
-    assert limits == pytest.approx([50.0])  # a tenth of the column's breadth
-    assert figure.caption.endswith("'a'; beyond the line, 50 mm, it counts as dislocated.")
-    assert "by the residual displacement, the worst first" in table.caption
-    found.dataset["outcome"][2] = "fallen"
-    found.dataset["displacement"][:] = 0.02
-    assert [each.kind for each in sections._build_single_changes(data_of(case), found, "")] == [
-        "grid"
-    ]
-    assert sections._build_single_changes(data_of(case), range_of(0.1, sampled=True), "") == []
+    (table,) = sections._tabulate_single_changes(data_of(case), found, "")
+    # a tenth of the column's breadth
+    assert "at the end; beyond 50 mm it is dislocated; the worst first" in table.caption
+    varied = range_of(0.1, sampled=True)
+    assert sections._tabulate_single_changes(data_of(case), varied, "") == []
 
 
 @pytest.mark.parametrize(
     ("found", "says"),
     [
-        (range_of(0.0418, 0.2), "displaced by up to 109 mm, the unvaried one"),
-        (range_of(0.3, 0.2), "another fidelity, displaced by up to 300 mm"),
-        (range_of(0.109, 0.2, outcome="fallen"), "another fidelity, fallen"),
+        (range_of(0.0418, 0.2), "run is displaced by up to 109 mm; unvaried, with another"),
+        (range_of(0.3, 0.2), "or fidelity, it is displaced by up to 300 mm"),
+        (range_of(0.109, 0.2, outcome="fallen"), "or fidelity, it falls"),
         (range_of(0.09, 0.2), ""),
         (range_of(0.0418, 0.2, motion="second"), ""),
         (range_of(0.0418, 0.2, motion=""), ""),
@@ -396,7 +402,7 @@ def test_single_changes_are_drawn_and_tabulated_the_worst_first(case):
 )
 def test_a_run_and_its_unvaried_variation_may_differ_by_half(case, found, says):
     data = data_of(case, found, first=verdict_of(displacement=0.109))
-    texts = [text for result, text in doubts.list_doubts(data) if result == "variations"]
+    texts = [x.cause for result, x in doubts.list_doubts(data) if result == "variations"]
     assert len(texts) == (says != "")
     assert says in "".join(texts)
 
@@ -438,7 +444,8 @@ def test_motions_matched_to_shorter_periods_than_that_of_a_check_are_noted(perio
 
 
 def test_the_head_of_a_push_says_when_it_begins_to_move(case):
-    row = ("limit analysis", "the site's 0.2 g", "four-hinge mechanism, at 0.1 g", "0.5")
+    row = "limit analysis", "the site's 0.2 g", "four-hinge mechanism", "0.5"
+    row = answers.Row(*row, PushFactors(0.5, 0.5, "the site's 0.2 g")._asdict())
     data = data_of(case)
     vars(data)["statements"] = {"limit": answers.Statement(["limit analysis"], [row])}
     begins = "a push begins to move it at 0.5 times the site's 0.2 g"

@@ -9,7 +9,7 @@ import archfem as af
 from archfem.cases.report import motion_rules, report_data
 
 TARGET = {"code": "EC8", "type": 1, "ag": 0.2, "ground": "B"}
-MODES = "mode  frequency\n1  9.00 Hz  0.111 s   1.0%  2%\n2  10.00 Hz  0.10000 s   73.9%  0.0%\n"
+MODES = "frequency [Hz],period [s],mass x,mass y\n9,0.111,0.01,0.02\n10,0.1,0.739,0\n"
 
 
 def data_of(norm="EN 1998-1", pairs=3, duration=30.0, modes=MODES, factor=1.0, **suite):
@@ -23,7 +23,7 @@ def data_of(norm="EN 1998-1", pairs=3, duration=30.0, modes=MODES, factor=1.0, *
     data = report_data.ReportData(af.Case.of(tables), dict.fromkeys(made))
     motions = af.cases.Case.of(tables).ground_suite().motions
     vars(data)["motions"] = {name: m.scaled(factor) for name, m in zip(made, motions, strict=True)}
-    object.__setattr__(data, "read_text", lambda name: modes if name == "modes.txt" else None)
+    object.__setattr__(data, "read_text", lambda name: modes if name == "modes.csv" else None)
     return data
 
 

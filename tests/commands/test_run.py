@@ -36,6 +36,7 @@ def test_run_command(tmp_path, undrawn, capsys):
         "dead.png",
         "names.png",
         "modes.txt",
+        "modes.csv",
         "modes.png",
         "history.nc",
         "summary.txt",
@@ -824,14 +825,16 @@ def test_vehicles_are_rated_together(tmp_path, unplotted, capsys, monkeypatch):
         assert {*lines} <= {*said.splitlines()}
         shared = "every x is that of the case and the picture; "
         assert said.count(shared) == 1
-        answer = f"rating for {name}: factor {found.factor:.4g}, {found.outcome}"
-        stated += [answer, f"worst {found.place}", *found.describe_codes()]
         if name == "cart":
+            outcome, *others = found.clauses
+            stated += [f"rating for {name}: factor {found.factor:.4g}, {outcome}", *others]
+            least = f"{rows['vehicle'][1]} has the least factor, {rows['factor'][1]:.4g}"
+            stated += [f"worst {found.place}", f"of 4 vehicles {least}", *found.describe_codes()]
             assert (out / "rating.csv").read_text().strip() == found.table()
             table = tomllib.loads((out / "rating.toml").read_text())["rating"]
             assert table["vehicle"]["name"] == name
             codes = [f"cart {code}" for code in found.by_codes]
-    # a conclusion states each vehicle by itself, that of the case first, by codes too
+    # a conclusion has sentences of the first, by codes too, and rows of all
     kept = json.loads((out / "rating.json").read_text())
     assert kept["sentences"] == stated
     names = [*rows["vehicle"]]
@@ -873,10 +876,10 @@ def test_a_bridge_that_does_not_stand_is_rated_for_no_vehicle(tmp_path, unplotte
     words = "does not stand under its own weight, and carries no vehicle"
     assert first == f"Rating of 'a ring pushed over': {words}"
     stated = json.loads((out / "rating.json").read_text())
-    assert stated["rows"] == [["rating", "LM1", words, "-"]]
-    assert stated["doubts"] == [
-        "limit analysis finds no equilibrium of the bridge under its own weight"
-    ]
+    numbers = {"outcome": "does not stand under its own weight"}
+    assert stated["rows"] == [["rating", "LM1", words, "-", numbers]]
+    (doubt,) = stated["doubts"]
+    assert doubt[0] == "limit analysis finds no equilibrium of the bridge under its own weight"
     assert "nan" not in (out / "rating.txt").read_text()
 
 

@@ -273,12 +273,15 @@ def test_less_than_the_rule_is_stated_beside_the_verdict(monkeypatch):
         assert f"; {by_rule} at this place, with the fill as given" in repr(found)
     assert np.isnan(rule.by_rule)
     ends = f"{rule.without_pressure:.4g} to {rule.full_pressure:.4g}"
-    assert repr(rule).endswith(f"passes ({ends} over what is assumed of the fill)")
+    over = "over what is assumed of the fill"
+    assert repr(rule).endswith(f"passes; the factor is {ends} {over}")
     train = replace(VEHICLES["LM71"], axles=(1e3,), spacings=())
     found = af.rate(bridge, train, fill=GRAVEL)
-    ends = f"({found.without_pressure:.4g} to {found.full_pressure:.4g} over what is assumed of the"
-    left = f"at most {found.factor:.4g} {ends} fill) without the 80 kN/m beside the axles"
-    assert repr(found).endswith(f"passes if the code's impact is {left} (LM71-train)")
+    ends = f"the factor is {found.without_pressure:.4g} to {found.full_pressure:.4g} {over}"
+    left = "left out: the 80 kN/m beside the axles (LM71-train)"
+    most = f"passes if the code's impact is at most {found.factor:.4g}"
+    assert repr(found).endswith(f"{most}; {ends}; {left}")
+    assert found.short_outcome == "passes, without impact"
 
 
 def test_places_are_a_hundredth_of_the_bridge_apart():
@@ -511,9 +514,9 @@ def test_a_verdict_says_which_parts_of_the_fill_it_rests_on(lorry_rating):
     # with neither it is the least, and may be far below that without one of them
     least = replace(either, without_either=1.005, full_pressure=np.inf)
     assert least.outcome.startswith("passes if")
-    assert "(1.005 to inf over what is assumed of the fill)" in least.outcome
+    assert "; the factor is 1.005 to inf over what is assumed of the fill" in least.outcome
     none = replace(least, without_pressure=np.nan, full_pressure=7.5).outcome
-    assert "(none to 7.5 over what is assumed of the fill)" in none
+    assert "; the factor is none to 7.5 over what is assumed of the fill" in none
     assert "over what is assumed" not in replace(least, full_pressure=np.nan).outcome
 
 
@@ -600,31 +603,34 @@ def test_factors_of_codes_are_stated_with_outcome_and_range():
     for found in (bare, given, good, alone):
         assert [*found.by_codes] == [*names, code]
         for name, other in expected.items():
-            factor, outcome = found.by_codes[name]
-            assert factor == pytest.approx(other.factor, rel=EXACT)
-            assert outcome == other.outcome  # with the ends of the range
+            own = found.by_codes[name]
+            assert own.factor == pytest.approx(other.factor, rel=EXACT)
+            assert own.outcome == other.outcome  # with the ends of the range
     least = f"{alone.without_either:.4g} to {alone.full_pressure:.4g} over what is assumed"
-    assert least in bare.by_codes[names[2]][1]
+    assert least in bare.by_codes[names[2]].outcome
     # in each state of fill and stones, by the nearest bounds alone
     for state in ("factor", *rating._STATES[:-1]):
         assert given.by_cs454[state] == pytest.approx(getattr(by_cs454, state), rel=1e-3), state
     of_code = given.by_codes[code]
-    assert of_code[0] == given.by_cs454["factor"]
-    assert of_code[1].partition(" (")[0] == by_cs454.outcome.partition(" (")[0]
-    ends = f"({given.by_cs454['without_either']:.4g} to "
-    assert f"{ends}{given.by_cs454['full_pressure']:.4g} over" in of_code[1]
+    assert of_code.factor == given.by_cs454["factor"]
+    assert of_code.short_outcome == by_cs454.short_outcome
+    ends = f"is {given.by_cs454['without_either']:.4g} to "
+    assert f"{ends}{given.by_cs454['full_pressure']:.4g} over" in of_code.outcome
     assert by_cs454.factor < 0.7 * bare.factor / 1.9  # the impact counts
     factors = f"bare axles {bare.factor:.4g}, live × impact 1.89 given"
-    lines = [f"lorry {name}: factor {x:.4g}, {says}" for name, (x, says) in given.by_codes.items()]
+    codes = given.by_codes.items()
+    lines = [f"lorry {name}: factor {x.factor:.4g}, {x.outcome}" for name, x in codes]
     assert given.describe_codes() == [factors, *lines]
     assert bare.describe_codes()[0].startswith(f"lorry {names[0]}: factor ")
     assert [*by_cs454.by_codes] == [code]  # for Eurocodes another axle may be the worst
     (row, *rows), sentences = state_ratings([(given, [])])[1::-1]
-    first = f"rating for lorry: factor {given.factor:.4g}, {given.outcome}"
-    assert [first, f"worst {given.place}", factors, *lines] == sentences[:7]
-    assert row[1:3] == ("lorry", f"{given.outcome}, {given.place}")
-    assert rows == [
-        ("rating", f"lorry {name}", says, f"{x:.4g}") for name, (x, says) in given.by_codes.items()
+    outcome, *others = given.clauses
+    first = f"rating for lorry: factor {given.factor:.4g}, {outcome}"
+    expected = [first, *others, f"worst {given.place}", factors, *lines]
+    assert sentences[: len(expected)] == expected
+    assert row[1:3] == ("lorry", f"{given.short_outcome}, {given.place}")
+    assert [row[:4] for row in rows] == [
+        ("rating", f"lorry {name}", x.short_outcome, f"{x.factor:.4g}") for name, x in codes
     ]
     # the impact is not on a distributed load, so that no multiple of the factor is that of a code
     assert [*replace(given, area_load=1e3).by_codes] == [code]
@@ -638,12 +644,13 @@ def test_the_impact_on_a_train_is_that_of_half_the_span(monkeypatch):
         arch = af.shapes.Arch(span=span, rise=span / 4.0, thickness=0.5, voussoirs=9)
         bridge = af.bridge(arches=[arch], backfill=af.shapes.Backfill(cover=0.4), width=3.0)
         found = af.rate(bridge, "LM71", fill=GRAVEL, strength=10e6)
-        ((name, (factor, outcome)),) = found.by_codes.items()
+        ((name, by_span),) = found.by_codes.items()
         half = f"{span / 2.0:g} m; from memory"
         assert name == f"with impact {min(impact, 1.67):.3g} (by half the span, {half})"
         other = af.rate(bridge, "LM71", fill=GRAVEL, strength=10e6, impact=min(impact, 1.67))
-        assert factor == pytest.approx(other.factor, rel=EXACT)
-        assert outcome == other.outcome
+        assert by_span.factor == pytest.approx(other.factor, rel=EXACT)
+        assert by_span.outcome == other.outcome
+        factor, outcome = by_span.factor, by_span.outcome
         assert not other.by_codes
         assert found.describe_codes() == [f"LM71 {name}: factor {factor:.4g}, {outcome}"]
 

@@ -1,6 +1,5 @@
 """Head and conclusion of a report: who signs what, outcome with margin and range."""
 
-import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -12,7 +11,7 @@ import numpy as np
 
 from archfem._files import read_file_list
 from archfem.cases import result_text
-from archfem.cases.answers import RESULTS, Row
+from archfem.cases.answers import RESULTS, Ratios, Row, Scales, read_numbers
 from archfem.cases.case import REPORT_KEYS
 from archfem.cases.report.doubts import (
     HISTORIES,
@@ -30,16 +29,17 @@ from archfem.cases.report.doubts import (
 )
 from archfem.cases.report.report_data import SHOWN_RESULTS, ReportData
 from archfem.cases.report.study_findings import read_study, say_what_changes
+from archfem.cases.result_text import PushFactors, format_ends
 from archfem.dynamics.collapse_state import COLLAPSE_STATES, FALLEN_STATES, CollapseState
 from archfem.dynamics.history import History
 from archfem.dynamics.motion_scaling import UNFINISHED
-from archfem.dynamics.verdict import NO_RANGE
 from archfem.dynamics.verdict_range import (
     HALF_STEP,
     UNVARIED,
     VerdictRange,
 )
 from archfem.masonry.structure import join_names, join_words
+from archfem.models.model import Doubt, Ends
 from archfem.units import STANDARD_GRAVITY, format_mm
 from archfem.view.pages.document import Grid, Section, TextBlock
 
@@ -74,11 +74,12 @@ SECTIONS = {
     RESULTS["risk"]: "Annual rate of collapse",
 }
 
-# States that a search of scales finds first, in the words of the answer
-_FIRST_STATES = {
-    "falls": "first falls",
-    "dislocated": "is first dislocated",
-    "first mechanism": "first forms a mechanism",
+# States that a search of scales finds, in the words of margin and answer
+_STATES = {
+    "moves": ("moves as a mechanism", ""),
+    "dislocated": ("is dislocated", "is first dislocated"),
+    "falls": ("falls", "first falls"),
+    "mechanism": ("forms a mechanism", "first forms a mechanism"),
 }
 
 # Fidelity of the variations of a verdict
@@ -86,6 +87,12 @@ VARIED_FIDELITY = "rigid"
 
 # Results that may be of a push
 PUSHES = RESULTS["limit"], RESULTS["pushover"]
+
+# Vehicles that the head of a report names one by one
+MAX_VEHICLES = 3
+
+# Results with a margin, which is made of the numbers of their rows
+_NUMBERED = {"limit", "pushover", "assessment", "scale"}
 
 # What commands keep of results that they have not finished
 _BEGUN = {RESULTS["risk"]: "risk_samples.nc", RESULTS["verdict_range"]: "variations"}
@@ -129,21 +136,28 @@ def list_facts(data: ReportData) -> list[tuple[str, str]]:
 
 def _say_factors(data: ReportData) -> Iterator[str]:
     """Yield the factors of results without runs; those of checks and vehicles are said apart."""
-    for result, (_, demand, outcome, factor) in _capacity_rows(data):
+    for result, row in _capacity_rows(data):
         said = result in (RESULTS["assessment"], RESULTS["rating"])
-        if said or (factor == "-" and demand != "no demand given"):
+        if said or (row.factor == "-" and row.demand != "no demand given"):
             continue
-        text = f"{demand}: {outcome}" + f", factor {factor}" * (factor != "-")
-        begins = result in PUSHES and demand.startswith("the site")
-        yield f"a push begins to move it at {factor} times {demand}" if begins else text
+        text = f"{row.demand}: {row.outcome}" + f", factor {row.factor}" * (row.factor != "-")
+        begins = result in PUSHES and row.numbers.get("site")
+        yield f"a push begins to move it at {row.factor} times {row.demand}" if begins else text
 
 
 def _list_ratings(data: ReportData) -> Iterator[tuple[str, str]]:
-    """Yield each vehicle, by each code, with its outcome; its place is in the conclusion."""
+    """Yield each vehicle with its outcome, or of many those that have each outcome."""
     stated = data.statements.get("rating")
-    for _, demand, outcome, factor in stated.rows if stated else []:
-        if factor != "-":
-            yield demand, f"{outcome.partition(', with')[0]}, factor {factor}"
+    rows = [row for row in stated.rows if row.factor != "-"] if stated else []
+    outcomes: dict[str, list[Row]] = {}
+    for row in rows:
+        outcomes.setdefault(row.numbers.get("outcome", row.outcome), []).append(row)
+    for outcome, same in outcomes.items():
+        vehicles = [(row.demand, f"{outcome}, factor {row.factor}") for row in same]
+        if len(rows) > MAX_VEHICLES:
+            listed = join_words([f"{row.demand} ({row.factor})" for row in same])
+            vehicles = [(outcome, listed)]
+        yield from vehicles
 
 
 def _say_movement(data: ReportData) -> Iterator[str]:
@@ -151,38 +165,35 @@ def _say_movement(data: ReportData) -> Iterator[str]:
     verdicts = [run.verdict for run in data.runs.values()]
     sizes = [x.displacement for x in verdicts if x.outcome in COLLAPSE_STATES[:2]]
     if sizes and np.isfinite(sizes).all():
-        low, high = (format_mm(end(sizes)) for end in (min, max))
-        yield f"moves by {low.removesuffix(' mm')} to {high}" if low != high else f"moves by {low}"
-    rows = data.statements["scale"].rows if "scale" in data.statements else []
-    least = np.inf
-    for state, words in _FIRST_STATES.items():
-        # those of other time steps stand in the same words
-        pattern = rf"{state} (?:from|at) (?:[\d.]+ g \()?([\d.]+) ×"
-        found = sorted((x for row in rows for x in re.findall(pattern, row[2])), key=float)
-        if found and float(found[0]) < least:  # a dislocation beyond a fall says nothing
-            least = float(found[0])
-            over = " and ".join(["motions"] * (len(rows) > 1) + ["time steps"])
-            notes = [f"{found[0]} to {found[-1]} over {over}"] * (found[0] != found[-1])
-            notes += [UNFINISHED] * any(UNFINISHED in row[2] for row in rows)
-            yield f"{words} at {found[0]} × the motion" + f" ({', '.join(notes)})" * bool(notes)
+        yield f"moves by {Ends((min(sizes), max(sizes))):mm}"
+    searches, least = read_numbers(Scales, data.statements.get("scale")), np.inf
+    for state in ("falls", "dislocated", "mechanism"):
+        keys = state, f"{state} by all steps"
+        found = [x.states[key] for x in searches for key in keys if key in x.states]
+        if found and min(found) < least:  # a dislocation beyond a fall says nothing
+            least, ends = min(found), Ends((min(found), max(found)))
+            over = " and ".join(["motions"] * (len(searches) > 1) + ["time steps"])
+            notes = [f"{ends:#.3g} over {over}"] * (f"{ends[0]:#.3g}" != f"{ends[1]:#.3g}")
+            notes += [UNFINISHED] * any(x.unfinished for x in searches)
+            beside = f" ({', '.join(notes)})" * bool(notes)
+            yield f"{_STATES[state][1]} at {least:#.3g} × the motion{beside}"
 
 
 def _say_checks(data: ReportData) -> Iterator[str]:
     """Yield whether the checks of an assessment are met, and by how much."""
-    for name, demand, outcome, factor in list_checks(data):
-        kind = "displacement check" if demand.endswith(" m") else "check"
-        ratios = re.findall(r"\d+(?:\.\d+)?(?:e[-+]?\d+)?", factor)
-        ends = dict.fromkeys((min(ratios, key=float), max(ratios, key=float)))
-        met, by = "is met", f"{' to '.join(ends)} × the spectrum"
-        if "only with" in outcome:
+    for check in list_checks(data):
+        ratios = [x for x in (check.least, check.most, check.moved, check.bodies) if x is not None]
+        met, by = "is met", f"{format_ends(min(ratios), max(ratios))} × the spectrum"
+        if check.needed:
             met = "is not met under some assumptions on the fill"
-        elif "passes" not in outcome:
+        elif check.least < 1.0:
             met = "is not met"
-        elif moved := re.search(r"[\d.]+ by displacements", factor):
-            moves = _say_motion(data, float(factor.partition(" ")[0]))
-            met, by = "is met at rest" + " alone, and it moves" * bool(moves), moved[0]
-        of = name.partition(": ")[2].removesuffix(", right and left")
-        yield f"the {kind} of {of} {met} ({by})"
+        elif check.moved is not None:
+            moves = _say_motion(data, check.least)
+            met = "is met at rest" + " alone, and it moves" * bool(moves)
+            by = f"{check.moved:.3g} by displacements"
+        kind = "check" if check.linear else "displacement check"
+        yield f"the {kind} of {check.name} {met} ({by})"
 
 
 def _describe_peaks(runs: Iterable[History]) -> str:
@@ -193,54 +204,48 @@ def _describe_peaks(runs: Iterable[History]) -> str:
 
 def summarise_outcomes(data: ReportData, runs: Sequence[History]) -> str:
     """Return outcome, and doubts or range, of a run, or how many runs have each outcome."""
-    verdict = runs[0].verdict
     if len(runs) > 1:
         counts = Counter(run.verdict.outcome for run in runs)
         words = ", ".join(
             f"{verb} under {counts[outcome]}" for outcome, verb in _VERBS.items() if counts[outcome]
         )
         return f"{words} of {len(runs)} motions"
-    if verdict.fall is not None:
-        # lost blocks have a line of their own
-        verdict = replace(verdict, fall=replace(verdict.fall, time=None))
     own = runs[0].dataset.attrs.get("motion")
     ranges = {each.dataset.attrs.get("motion"): each for each in data.verdict_ranges}
     found = ranges.get(own)
     if found is None and len(data.runs) == 1:  # a range over several motions has no name
         found = next(iter(ranges.values()), None)
-    # a run cannot know that a range was computed after it; the conclusion says what was not varied
-    text = verdict.headline.removesuffix(f"; {NO_RANGE}")
-    if found is None:
-        return text
-    return f"{text}; {found.count}{found.unanswered}"
+    # lost blocks have a line of their own, and the conclusion says what was not varied
+    text = runs[0].verdict.brief
+    return text if found is None else f"{text}; {found.count}{found.unanswered}"
 
 
 def build_conclusion(data: ReportData) -> Section:
     """Build the section on the answer in sentences, its doubts, and demands and capacities."""
-    doubts: dict[str, list[str]] = {}
-    every = list_doubts(data)
-    stated = {text: result for result, text in reversed(every)}
-    for text, result in stated.items():
-        # a doubt of several results is stated once, without the motions of which it is true, too
-        if not text.startswith("under ") or text.partition(": ")[2] not in stated:
-            doubts.setdefault(result, []).insert(0, text)
+    doubts: dict[str, list[Doubt]] = {}
+    every, stated = list_doubts(data), set[str]()
+    # a doubt of several results is stated once, without the motions of which it is true, too
+    for result, doubt in sorted(every, key=lambda each: bool(each[1].place)):
+        if doubt.cause not in stated:
+            doubts.setdefault(result, []).append(doubt)
+        stated.add(doubt.cause)
     doubtful, decisive = [*dict.fromkeys(x for x, _ in every)], list_decisive_doubts(data, every)
-    rows = [
+    rows = []
+    for result, row in _capacity_rows(data):
         # what a bound from above fails it fails for certain
-        (name, demand, f"{outcome} (in doubt)" if in_doubt else outcome, factor)
-        for result, (name, demand, outcome, factor) in _capacity_rows(data)
-        for in_doubt in [result in (decisive if "fails" in outcome else doubtful)]
-    ]
+        fails = row.numbers.get("most", 1.0) < 1.0
+        in_doubt = " (in doubt)" * (result in (decisive if fails else doubtful))
+        rows.append((*row[:2], f"{row.outcome}{in_doubt}", row.factor))
     demand = data.case.report.get("demand", "")
     blocks: list[Any] = [TextBlock(sentence(f"demand, as stated: {demand}"))] if demand else []
-    for lead, texts in _build_paragraphs(data, rows, decisive).items():
+    for lead, texts in _build_paragraphs(data, decisive).items():
         sentences = [*map(sentence, texts)]
         if data.statements.keys() != {"rating"}:  # of a result that stands alone each is one
             sentences = [" ".join(sentences)] if sentences else []
         blocks += [TextBlock(each, lead=lead * (k == 0)) for k, each in enumerate(sentences)]
     for result in filter(doubts.get, doubtful):
         ordered = sorted(doubts[result], key=weigh)
-        shown = [sentence(text) for text in ordered[:MAX_DOUBTS]]
+        shown = [sentence(str(replace(x, remedy=""))) for x in ordered[:MAX_DOUBTS]]
         if more := len(doubts[result]) - len(shown):
             shown.append(f"{more} more: see section '{SECTIONS[result]}'.")
         blocks.append(TextBlock(f"In doubt, {result}: {' '.join(shown)}", "doubt"))
@@ -259,6 +264,11 @@ def _list_outdated(data: ReportData) -> Iterator[str]:
     listed = {} if data.folder is None else read_file_list(data.folder)
     shown = [name for name in SHOWN_RESULTS if data.list_parts(f"{name}.txt")]
     unstated = RESULTS.keys() - {*shown, *data.statements}
+    unstated |= {
+        name
+        for name in _NUMBERED & data.statements.keys()
+        if any(row.factor != "-" and not row.numbers for row in data.statements[name].rows)
+    }
     absent = {f"{name}.txt": RESULTS[name] for name in unstated}
     earlier = [
         f"{absent[name]} (run `archfem {command}` again)"
@@ -272,13 +282,11 @@ def _list_outdated(data: ReportData) -> Iterator[str]:
     if data.case.report.get("project") == PLACEHOLDER:
         yield "The name of the project is that of the template: fill in [report] of the case."
     if earlier:
-        made = "Not stated, for an earlier version of archfem or another case made it"
+        made = "Not stated in full, for an earlier version of archfem or another case made it"
         yield f"{made}: {', '.join(earlier)}."
 
 
-def _build_paragraphs(
-    data: ReportData, rows: Sequence[Row], doubtful: Sequence[str]
-) -> dict[str, list[str]]:
+def _build_paragraphs(data: ReportData, doubtful: Sequence[str]) -> dict[str, list[str]]:
     """Return the sentences of the answer by their leads: outcomes, margin, what may change it."""
     answer = [*_say_answer(data)]
     if not data.runs:
@@ -302,7 +310,7 @@ def _build_paragraphs(
         changes.append(f"no motion was run, though [{given[0]}] is in the case")
     return {
         "Does it stand?" if data.runs else "Result:": answer,
-        "By which margin?": [*_describe_margin(data, rows), *_say_vertical(data)],
+        "By which margin?": [*_describe_margin(data), *_say_vertical(data)],
         "What would change the answer?": changes,
     }
 
@@ -327,7 +335,7 @@ def _describe_ranges(ranges: Sequence[VerdictRange]) -> Iterator[str]:
     if moved := [each for each in ranges if each.displacements]:
         far = max(moved, key=lambda x: np.nanmax(x.dataset["displacement"].values[~x.falls]))
         most = f"it moves farthest under '{far.dataset.attrs.get('motion')}': " * (len(ranges) > 1)
-        yield most + far.displacements.partition(";")[0].replace("ments", "ments are", 1)
+        yield f"{most}largest displacements are {far.displacement_ends}"
 
 
 def _say_causes(ranges: Sequence[VerdictRange]) -> Iterator[str]:
@@ -340,101 +348,81 @@ def _say_causes(ranges: Sequence[VerdictRange]) -> Iterator[str]:
         yield f"under {join_words(motions)}: {text}" if len(ranges) > 1 else text
 
 
-def _describe_margin(data: ReportData, rows: Sequence[Row]) -> Iterator[str]:
+def _describe_margin(data: ReportData) -> Iterator[str]:
     """Yield the least factor on the demand of an earthquake, maybe as a range, and the others."""
-    apart = list[str]()
-    margins, checks = list[tuple[float, list[str]]](), list[tuple[float, list[str]]]()
-    for name, demand, outcome, factor in rows:
-        check, pushed = name.partition("assessment: ")[2], name in PUSHES
-        if factor == "-":
-            if pushed and data.runs:  # without runs it is the answer
-                apart.append(f"{name}, beside no demand: {outcome.partition(';')[0]}")
-            continue
-        least = float(factor.partition(" ")[0])
-        moves = _say_motion(data, least)
-        if check:
-            checks.append(_describe_check(data, (check, outcome, factor), moves))
-        elif pushed and demand.startswith("the site"):
-            bound = "at most " * ("(" in factor)  # the least found, without proof that none is less
-            over = " over what is assumed of the fill" * (" to " in factor)
-            size = f"{bound}{factor}"
-            of = " with elastic joints" if name == RESULTS["pushover"] else " as rigid blocks"
-            of *= bool(bound) or name == RESULTS["pushover"]
-            if moves and least >= 1.0:  # shaken it moves before
-                apart.append(f"a push of {size} times {demand}{over}{of} is no margin: {moves}")
-            else:
-                begins = f"a push of {size} times {demand}{over} begins to move it{of}"
-                then = moves if data.runs else "shaken it may begin to move at less"
-                apart += [f"{begins}, which is no collapse", *filter(None, [then])]
-    margins += _describe_scales(data, [row for row in rows if row[0] == RESULTS["scale"]])
-    for k, (_, (first, *others)) in enumerate(sorted([*margins, *sorted(checks)[:1]])):
+    checks = read_numbers(Ratios, data.statements.get("assessment"))
+    margins = [*sorted(_describe_check(data, each) for each in checks)[:1], *_describe_scales(data)]
+    for k, (_, (first, *others)) in enumerate(sorted(margins)):
         rank = ("the least margin is", "the next is", "then follows")[min(k, 2)]
         yield from [f"{rank} {first}", *others]
-    yield from apart
+    for name in filter({"limit", "pushover"}.__contains__, data.statements):
+        for push in read_numbers(PushFactors, data.statements[name]):
+            yield from _describe_push(data, name, push) if push.site else ()
+        for row in data.statements[name].rows:
+            if row.factor == "-" and data.runs:  # without runs it is the answer
+                yield f"{row.result}, beside no demand: {row.outcome}"
 
 
-def _describe_check(
-    data: ReportData, row: tuple[str, str, str], moves: str
-) -> tuple[float, list[str]]:
+def _describe_push(data: ReportData, name: str, push: PushFactors) -> Iterator[str]:
+    """Yield at which multiple of the site's acceleration a push begins to move a structure."""
+    elastic, moves = name == "pushover", _say_motion(data, push.least)
+    bounded = push.proved is not None  # the least found, without proof that none is less
+    of = " with elastic joints" if elastic else " as rigid blocks" * bounded
+    over = " over what is assumed of the fill" * (push.most > push.least)
+    size = f"a push of {'at most ' * bounded}{push} times {push.site}{over}"
+    if moves and push.least >= 1.0:  # shaken it moves before
+        yield f"{size}{of} is no margin: {moves}"
+        return
+    yield f"{size} begins to move it{of}, which is no collapse"
+    if then := moves if data.runs else "shaken it may begin to move at less":
+        yield then
+
+
+def _describe_check(data: ReportData, check: Ratios) -> tuple[float, list[str]]:
     """Return the ratio of a check of an assessment, and its sentences."""
-    check, outcome, factor = row
-    ratios, opened, bodies = factor.partition(" (")
-    over = " over what is assumed of the fill" * (" to " in factor)
-    least, by = float(factor.partition(" ")[0]), f"on {name_spectrum(data)}, by {check}"
-    moved = re.search(r"([\d.]+) by displacements", factor)
-    if moved and moves:  # what moves at less than the push that begins it is judged by how far
-        begins = f"the check passes for what is at rest, and {moves}"
-        return float(moved[1]), [f"{moved[1]} by displacements, {by}", begins]
-    begins = f"{ratios} times the spectrum begins to move it"
-    then = f"if it moved, it could be displaced by {moved[1]} times the demand" if moved else ""
-    _, only, assumed = outcome.partition(" only with ")
-    only = f", passed only with {assumed}" if only else ", which it fails" * (least < 1.0)
-    return least, [f"{ratios}{over}{opened}{bodies}, {by}{only}", *[begins, then] * bool(moved)]
+    over = " over what is assumed of the fill" * (check.most > check.least)
+    by, moves = f"on {name_spectrum(data)}, by {check.name}", _say_motion(data, check.least)
+    if check.moved is not None and moves:  # what moves at less than the push that begins it is
+        begins = f"the check passes for what is at rest, and {moves}"  # judged by how far
+        return check.moved, [f"{check.moved:.3g} by displacements, {by}", begins]
+    fails = f", passed only with {check.needed}" if check.needed else ""
+    fails = fails or ", which it fails" * (check.least < 1.0)
+    ends = format_ends(check.least, check.most)
+    texts = [f"{ends}{over}{check.beside}, {by}{fails}"]
+    if check.moved is not None:
+        texts.append(f"{ends} times the spectrum begins to move it")
+        texts.append(f"if it moved, it could be displaced by {check.moved:.3g} times the demand")
+    return check.least, texts
 
 
-# States that a search of scales finds, in the words of its outcome and of the conclusion
-_SCALED = {
-    "a mechanism": "moves as a mechanism",
-    "dislocated": "is dislocated",
-    "falls": "falls",
-    "first mechanism": "forms a mechanism",
-}
-
-
-def _list_scaled(outcome: str) -> dict[str, str]:
-    """List the states that a search of scales has found, each with its least scale."""
-    states = "|".join(_SCALED)
-    pattern = rf"({states}) (?:from|at) (?:[\d.]+ g \()?([\d.]+) ×( or less)?"
-    found = re.findall(pattern, outcome.partition(", the ")[0])
-    return {state: f"{scale} ×{less}" for state, scale, less in found}
-
-
-def _describe_scales(data: ReportData, rows: Sequence[Row]) -> Iterator[tuple[float, list[str]]]:
+def _describe_scales(data: ReportData) -> Iterator[tuple[float, list[str]]]:
     """Yield the least scale up to which it stands, what comes beyond, and motions without any."""
-    motions = [row[1].partition(",")[0] for row in rows]
-    named = list(zip(rows, motions, strict=True))
-    made = sorted((float(row[3]), name, row) for row, name in named if row[3] != "-")
+    searches = read_numbers(Scales, data.statements.get("scale"))
+    made = sorted((each for each in searches if each.held), key=lambda each: each.held)
     if not made:
         return
-    least, first, row = made[0]
-    found = {name: _list_scaled(row[2]) for _, name, row in made}
+    first, states = made[0], made[0].states
     # between the scales that were run nothing is known
-    met = [float(at.split()[0]) for state, at in found[first].items() if state != "a mechanism"]
-    unfinished = f" ({UNFINISHED})" * (UNFINISHED in row[2])
-    words = f"{row[3]}{unfinished} on {row[1]}{', which it fails' * (min(met, default=2.0) <= 1.0)}"
+    met = min((scale for state, scale in states.items() if "moves" not in state), default=np.inf)
+    words = f"{first.held:#.3g}" + f" ({UNFINISHED})" * first.unfinished
+    words += f" on '{first.motion}', PGA {first.pga:.2f} g" + ", which it fails" * (met <= 1.0)
     words += f", of {len(made)} motions" * (len(made) > 1)
-    ends = [f"{_SCALED[state]} from {scale} on" for state, scale in found[first].items()]
-    ends += [] if {"falls", "first mechanism"} & found[first].keys() else ["falls in no run"]
+    ends = [
+        f"{_STATES[state][0]} from {scale:#.3g} ×{' or less' * (f'{state} in all' in states)} on"
+        for state, scale in states.items()
+        if state in _STATES
+    ]
+    ends += [] if {"falls", "mechanism"} & states.keys() else ["falls in no run"]
     texts = [words, f"it {join_words(ends)}"]
-    falls = {name: float(x["falls"].split()[0]) for name, x in found.items() if "falls" in x}
-    if falls and (weakest := min(falls, key=lambda name: falls[name])) != first:
-        texts.append(f"it falls first under {weakest}, from {found[weakest]['falls']} on")
+    falls = {each.motion: each.states["falls"] for each in made if "falls" in each.states}
+    if falls and (weakest := min(falls, key=falls.__getitem__)) != first.motion:
+        texts.append(f"it falls first under '{weakest}', from {falls[weakest]:#.3g} × on")
     # a search without a scale that holds may have the least of all
-    if none := [name for row, name in named if row[3] == "-"]:
+    if none := [f"'{each.motion}'" for each in searches if not each.held]:
         texts.append(f"no scale is known up to which it stands under {join_words(none)}")
-    if left := [name for name in (f"'{pair}'" for pair in data.pairs) if name not in motions]:
+    if left := [f"'{pair}'" for pair in data.pairs if pair not in {x.motion for x in searches}]:
         texts.append(f"{join_words(left)} {'were' if left[1:] else 'was'} not scaled")
-    yield least, texts
+    yield first.held, texts
 
 
 def _say_motion(data: ReportData, factor: float) -> str:
@@ -492,19 +480,19 @@ def _capacity_rows(data: ReportData) -> Iterator[tuple[str, Row]]:
             steps = ", ".join(_list_ranges_of_steps(data))
             beside = f" (over {over} {steps})" * bool(steps)
             outcome += f"; displaced by up to {largest}{beside}, {residual} at the end"
-        yield HISTORIES, (HISTORIES, demand, outcome, "-")
+        yield HISTORIES, Row(HISTORIES, demand, outcome, "-", {})
     for computed in data.verdict_ranges:
         motion = computed.dataset.attrs.get("motion")
         name = f"{VARIATIONS} under '{motion}'" if motion else VARIATIONS
         outcome = "; ".join(filter(None, [computed.count, computed.displacements]))
-        yield VARIATIONS, (name, "the same motion", outcome + computed.unanswered, "-")
+        yield VARIATIONS, Row(name, "the same motion", outcome + computed.unanswered, "-", {})
     for result, statement in data.statements.items():
         of = f" of {name_spectrum(data)}" if result == "assessment" else ""
-        for name, demand, *others in statement.rows:
+        for row in statement.rows:
             beside = of
-            if data.runs and demand == "no demand given":
+            if data.runs and row.demand == "no demand given":
                 beside = f"; beside it motions of {_describe_peaks(data.runs.values())}"
-            yield RESULTS[result], (name, f"{demand}{beside}", *others)
+            yield RESULTS[result], row._replace(demand=f"{row.demand}{beside}")
 
 
 def _list_ranges_of_steps(data: ReportData) -> Iterator[str]:
@@ -519,8 +507,8 @@ def _list_ranges_of_steps(data: ReportData) -> Iterator[str]:
         runs = [run.verdict for run in data.runs.values() if run.dataset.attrs["motion"] == motion]
         if sizes and runs and runs[0].outcome in COLLAPSE_STATES[:2]:
             sizes.append(runs[0].displacement)
-            ends = f"{format_mm(min(sizes))} to {format_mm(max(sizes))}"
-            yield ends + f" under '{motion}'" * (len(data.runs) > 1)
+            under = f" under '{motion}'" * (len(data.runs) > 1)
+            yield f"{Ends((min(sizes), max(sizes))):mm}{under}"
 
 
 def _describe_outcomes(data: ReportData) -> Iterator[str]:
@@ -540,14 +528,14 @@ def _describe_outcomes(data: ReportData) -> Iterator[str]:
 
 def _describe_ends(data: ReportData) -> Iterator[str]:
     """Yield sentences on runs that were broken off, lost blocks, and those that still move."""
+    falls = {name: run.verdict.fall for name, run in data.runs.items()}
     for name, run in data.runs.items():
-        verdict = run.verdict
-        if verdict.incomplete:
-            yield f"The run under '{name}' {verdict.incomplete}."
-        if verdict.fall is not None and verdict.fall.blocks:
-            yield f"Under '{name}' it loses {describe_lost(verdict.fall)}."
-        if verdict.fall is not None and not verdict.fall.resting:
-            yield f"Blocks still move at the end of '{name}'."
+        if run.verdict.incomplete:
+            yield f"the run under '{name}' {run.verdict.incomplete}"
+    if lost := {f"'{name}'": fall for name, fall in falls.items() if fall and fall.blocks}:
+        yield f"under {join_words([*lost])} it loses {describe_lost([*lost.values()])}"
+    if moving := [f"'{name}'" for name, fall in falls.items() if fall and not fall.resting]:
+        yield f"blocks still move at the end of {join_words(moving)}"
 
 
 def describe_mechanism(verdict: Any) -> str:
@@ -559,10 +547,13 @@ def describe_mechanism(verdict: Any) -> str:
     return "none by any definition"
 
 
-def describe_lost(fall: CollapseState, max_names: int = 3) -> str:
-    """Return the number of lost blocks, the time of the first, and the first names."""
-    names = ", ".join([*fall.blocks[:max_names], *(["…"] if fall.blocks[max_names:] else [])])
-    return f"{len(fall.blocks)} blocks, the first at {fall.time:.2f} s: {names}"
+def describe_lost(falls: Sequence[CollapseState], max_names: int = 3) -> str:
+    """Return the number of lost blocks, the time of the first, and of one fall some names."""
+    counts, times = [len(fall.blocks) for fall in falls], [fall.time or 0.0 for fall in falls]
+    ends = (Ends((min(each), max(each))) for each in (counts, times))
+    text, blocks = "{} blocks, the first at {:.2f} s".format(*ends), falls[0].blocks
+    names = ", ".join([*blocks[:max_names], *["…"] * (len(blocks) > max_names)])
+    return text if len(falls) > 1 else f"{text}: {names}"
 
 
 def sentence(text: str) -> str:

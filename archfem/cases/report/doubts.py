@@ -1,37 +1,27 @@
 """Doubts and notes of the results in a report, and what was not varied."""
 
-import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from archfem.cases.answers import RESULTS, Row
+from archfem.cases.answers import RESULTS, Ratios, read_numbers
 from archfem.cases.report.motion_rules import note_checks
 from archfem.cases.report.report_data import ReportData
 from archfem.cases.report.study_findings import list_studied, read_study
-from archfem.dynamics.collapse_state import COLLAPSE_STATES, FALLEN_STATES
+from archfem.dynamics.collapse_state import COLLAPSE_STATES, FALLEN_STATES, RANGE_REMEDY
 from archfem.dynamics.history import History
 from archfem.dynamics.verdict_range import MAX_RATIO_OF_DISPLACEMENTS, VerdictRange
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import join_words
-from archfem.models.model import Doubt
-from archfem.units import STANDARD_GRAVITY, format_mm
+from archfem.models.model import Doubt, merge_doubts
+from archfem.statics.assessment_checks import UPPER_BOUND
+from archfem.units import STANDARD_GRAVITY
 
 # Ratio of the peaks of motions and spectrum beyond which they are different demands: those of
 # matched motions exceed the target by a tenth
 MAX_RATIO_OF_PEAKS = 1.25
-
-# Doubts that outweigh others, the first most: a conclusion states these before others
-_WEIGHTY = ("as rigid blocks none falls", "fall", "displace")
-
-# Numbers of a doubt that differ from run to run: names of joints end in whole ones
-_NUMBER = re.compile(
-    r"(\d+\.\d+(?:e[-+]?\d+)?|\d+(?= (?:mm|m|ms|s|g|%|of)\b)|(?<= of )\d+|\d+(?=%))"
-)
-
-# Numbers of a doubt beyond which their ranges over several motions would be hard to read
-MAX_RANGES = 2
 
 # Results of runs: histories, and their variations
 HISTORIES, VARIATIONS = "time histories", "variations"
@@ -42,111 +32,71 @@ def list_varied(data: ReportData) -> tuple[str, ...]:
     return data.verdict_ranges[0].properties if data.verdict_ranges else ()
 
 
-def list_doubts(data: ReportData) -> list[tuple[str, str]]:
-    """Return each result in doubt with its doubt, once; of runs with the number that have it."""
-    verdicts = [run.verdict for run in data.runs.values()]
-    doubts = [(HISTORIES, text) for text in _merge_doubts([v.doubts for v in verdicts])]
-    for found in data.verdict_ranges:
-        under = f"under '{found.dataset.attrs.get('motion')}': " * (len(data.verdict_ranges) > 1)
-        doubts += [(VARIATIONS, text) for text in _doubt_displacement(data, found)]
-        doubts += [(VARIATIONS, f"{under}{doubt.cause}") for doubt in found.doubts]
-    if data.verdict_ranges and (fill := list_elastic_fill(data)):
+def list_doubts(data: ReportData) -> list[tuple[str, Doubt]]:
+    """Return each result in doubt with its doubts, each kind once, of the runs that have it."""
+    ranges, doubts = data.verdict_ranges, [(HISTORIES, doubt) for doubt in _merge_runs(data)]
+    several = max(len(ranges), len(data.runs)) > 1
+    varied = list[Doubt]()
+    for found in ranges:
+        under = str(found.dataset.attrs.get("motion", "")) * several
+        own = [*_doubt_displacement(data, found), *found.doubts]
+        varied += [replace(doubt, place=under) for doubt in own]
+    doubts += [(VARIATIONS, doubt) for doubt in _merge_motions(varied)]
+    if ranges and (fill := list_elastic_fill(data)):
         text = f"variations take {', '.join(fill)} as rigid: as an elastic body it was not varied"
-        doubts.append((VARIATIONS, text))
+        doubts.append((VARIATIONS, Doubt(text)))
     for name, stated in data.statements.items():
-        own = _shorten_scales(stated.doubts) if name == "scale" else stated.doubts
-        doubts += [(RESULTS[name], doubt) for doubt in own]
-    return [*_merge_motions(dict.fromkeys(doubts))]
+        doubts += [(RESULTS[name], doubt) for doubt in _merge_motions(stated.doubts)]
+    return doubts
 
 
-def _shorten_scales(doubts: Sequence[str]) -> Iterator[str]:
-    """Yield doubts of searches without scales and steps; those of first falls as one range."""
-    ends, motions = list[str](), list[str]()
+def _merge_runs(data: ReportData) -> Iterator[Doubt]:
+    """Yield each kind of doubt of the runs once, with how many of several runs have it."""
+    verdicts = [run.verdict for run in data.runs.values()]
+    for same in _group_kinds(x for each in verdicts for x in each.doubts):
+        count = sum(any(doubt in same for doubt in each.doubts) for each in verdicts)
+        yield merge_doubts(same, f"{count} of {len(verdicts)} runs" * (len(verdicts) > 1))
+
+
+def _merge_motions(doubts: Iterable[Doubt]) -> Iterator[Doubt]:
+    """Yield each kind of doubt once, under all of its motions, which are the places of some."""
+    for same in _group_kinds(doubts):
+        motions = dict.fromkeys(f"'{doubt.place}'" for doubt in same if doubt.place)
+        yield merge_doubts(same, f"under {join_words([*motions])}" * bool(motions))
+
+
+def _group_kinds(doubts: Iterable[Doubt]) -> Iterable[list[Doubt]]:
+    """Return doubts in groups that differ in numbers alone."""
+    found: dict[tuple[str, ...], list[Doubt]] = {}
     for doubt in doubts:
-        motion = re.match(r"under ('[^']+'): ", doubt)
-        found = re.search(r"time steps find the first fall from ([\d.]+) to ([\d.]+) ×", doubt)
-        if found is None:
-            # at which scales stands with the result
-            yield re.sub(r"at [\d.]+ × by [\d.]+ ms(?: \(likewise [^)]*\))?: ", "", doubt, count=1)
-            continue
-        ends += found.groups()
-        motions += [motion[1]] if motion else []
-    if ends:
-        under = f"under {join_words(motions)} " * bool(motions)
-        low, high = min(ends, key=float), max(ends, key=float)
-        yield f"{under}it first falls between {low} and {high} × over its time steps"
+        found.setdefault(doubt.kind, []).append(doubt)
+    return found.values()
 
 
-def list_checks(data: ReportData) -> list[Row]:
-    """List the rows of the checks of an assessment; the linear one decides if it is alone."""
-    rows = [*data.statements["assessment"].rows] if "assessment" in data.statements else []
-    return [row for row in rows if "linear, q" not in row[0]] or rows
+def list_checks(data: ReportData) -> list[Ratios]:
+    """List the checks of an assessment; the linear one decides if it is alone."""
+    checks = read_numbers(Ratios, data.statements.get("assessment"))
+    return [check for check in checks if not check.linear] or checks
 
 
-def list_decisive_doubts(data: ReportData, doubts: Iterable[tuple[str, str]]) -> list[str]:
+def list_decisive_doubts(data: ReportData, doubts: Iterable[tuple[str, Doubt]]) -> list[str]:
     """List the results whose doubts may change the answer.
 
     A bound from above can not change checks that fail by it.
     """
-    outcomes = [outcome for _, _, outcome, _ in list_checks(data)]
-    failed = bool(outcomes) and not any("passes" in each for each in outcomes)
-    own = RESULTS["assessment"]
-    return list(
-        dict.fromkeys(
-            result
-            for result, text in doubts
-            if not (failed and result == own and "an upper bound" in text.lower())
-        )
-    )
+    checks, own = list_checks(data), RESULTS["assessment"]
+    failed = bool(checks) and all(check.most < 1.0 for check in checks)
+    bounds = [doubt for _, doubt in doubts if failed and UPPER_BOUND in doubt.values]
+    listed = (result for result, doubt in doubts if result != own or doubt not in bounds)
+    return list(dict.fromkeys(listed))
 
 
-def _merge_motions(doubts: Iterable[tuple[str, str]]) -> Iterator[tuple[str, str]]:
-    """Yield each doubt of a result once, with all motions under which it is true."""
-    found: dict[tuple[str, ...], list[tuple[str, str]]] = {}
-    for result, text in doubts:
-        named = re.search(r"under '([^']+)'", text)
-        plain = text.replace(named[0], "\0", 1) if named else text
-        kind = _NUMBER.split(plain)[::2] if named else [text]
-        found.setdefault((result, *kind), []).append((named[1] if named else "", plain))
-    for (result, *_), same in found.items():
-        motions, texts = ([*dict.fromkeys(column)] for column in zip(*same, strict=True))
-        first, *others = (f"'{motion}'" for motion in motions)
-        merged, differing = _merge_numbers(texts)
-        if differing > MAX_RANGES:
-            merged = f"{texts[0]}; likewise under {join_words(others)}".replace(
-                "\0", f"under {first}"
-            )
-        yield result, merged.replace("\0", f"under {join_words([first, *others])}")
+def weigh(doubt: Doubt) -> bool:
+    """Return the place of a doubt among others: those that a range answers are of the outcome."""
+    return not doubt.remedy.startswith(RANGE_REMEDY)
 
 
-def _merge_doubts(runs: Sequence[Iterable[Doubt]]) -> Iterator[str]:
-    """Yield each doubt of some runs once, with how many have it; that of a run alone as it is."""
-    found: dict[tuple[str, ...], list[str]] = {}
-    for cause in (cause for doubts in runs for cause in dict.fromkeys(x.cause for x in doubts)):
-        found.setdefault(tuple(_NUMBER.split(cause)[::2]), []).append(cause)
-    for texts in found.values():
-        merged, _ = _merge_numbers(texts)
-        yield f"{len(texts)} of {len(runs)} runs: {merged}" if len(runs) > 1 else merged
-
-
-def _merge_numbers(texts: Sequence[str]) -> tuple[str, int]:
-    """Return texts that differ in numbers alone as one, with their ranges, and how many differ."""
-    parts = [_NUMBER.split(text) for text in texts]
-    columns = [
-        sorted(set(column), key=float) for column in zip(*(x[1::2] for x in parts), strict=True)
-    ]
-    ranges = [" to ".join(dict.fromkeys((column[0], column[-1]))) for column in columns]
-    merged = parts[0]
-    merged[1::2] = ranges
-    return "".join(merged), sum(len(column) > 1 for column in columns)
-
-
-def weigh(doubt: str) -> int:
-    """Return the place of a doubt among others, by its words."""
-    return next((k for k, words in enumerate(_WEIGHTY) if words in doubt), len(_WEIGHTY))
-
-
-def _doubt_displacement(data: ReportData, found: VerdictRange) -> Iterator[str]:
+def _doubt_displacement(data: ReportData, found: VerdictRange) -> Iterator[Doubt]:
     """Yield how the unvaried run of the variations differs from the run under that motion."""
     motion, base = found.dataset.attrs.get("motion"), found.dataset.isel(run=0)
     if not motion or base["sampled"] or base["error"].item():
@@ -157,17 +107,13 @@ def _doubt_displacement(data: ReportData, found: VerdictRange) -> Iterator[str]:
             continue
         sizes = verdict.displacement, float(base["displacement"])
         fallen = [each in FALLEN_STATES for each in (verdict.outcome, base["outcome"].item())]
-        own, other = (
-            "fallen" if falls else f"displaced by up to {format_mm(size)}"
-            for falls, size in zip(fallen, sizes, strict=True)
-        )
+        own, other = ("falls" if falls else "is displaced by up to {:mm}" for falls in fallen)
         if fallen[0] != fallen[1] or (
             not fallen[0] and max(sizes) > MAX_RATIO_OF_DISPLACEMENTS * min(sizes)
         ):
-            yield (
-                f"the run under '{motion}' is {own}, the unvaried one of its variations, of "
-                f"other time steps or another fidelity, {other}"
-            )
+            held = (size for size, falls in zip(sizes, fallen, strict=True) if not falls)
+            words = f"the run {own}; unvaried, with another time step or fidelity, it {other}"
+            yield Doubt(words, RANGE_REMEDY, tuple(held))
 
 
 def list_notes(data: ReportData) -> dict[str, list[str]]:

@@ -1,7 +1,7 @@
 """Rules of a norm for suites of motions: what is required, what is found, and whether it is met."""
 
-import re
 from collections.abc import Iterator
+from csv import reader
 from inspect import signature
 from typing import NamedTuple
 
@@ -18,8 +18,8 @@ from archfem.motion.signal_processing import PLATEAU
 from archfem.units import STANDARD_GRAVITY
 from archfem.view.pages.document import Grid
 
-# Norms by their words in [report], with the name of their rule
-_NORMS = {r"EN ?1998|EC ?8|Eurocode 8": "EC8", r"NTC": "NTC-2018"}
+# Rules by the words of norms in [report], without spaces
+_NORMS = {"EN1998": "EC8", "EC8": "EC8", "EUROCODE8": "EC8", "NTC": "NTC-2018"}
 
 # Longest period up to which motions are compared beyond the rule, where blocks rock [s]
 LONGEST_PERIOD = 4.0
@@ -44,8 +44,8 @@ class Check(NamedTuple):
 
 def find_rule(data: ReportData) -> SelectionRule | None:
     """Return the rule for motions of the norm of a report; None if it is of another norm."""
-    norm = data.case.report.get("norm", "")
-    found = (rule for words, rule in _NORMS.items() if re.search(words, norm, re.IGNORECASE))
+    norm = data.case.report.get("norm", "").replace(" ", "").upper()
+    found = (rule for words, rule in _NORMS.items() if words in norm)
     return SELECTION_RULES.get(next(found, ""))
 
 
@@ -69,7 +69,7 @@ def _check_spectra(data: ReportData, rule: SelectionRule) -> Iterator[Check]:
     name = f"mean spectrum over the target, from {ratios} to {rule.longest_ratio:g} T₁"
     period, motions = find_period(data), [*data.motions.values()]
     if period is None:
-        yield Check(name, required, "the period T₁ is not among the results", None)
+        yield Check(name, required, "the period T₁ is unknown: run `archfem modes`", None)
     else:
         band = rule.band(period)
         periods = np.geomspace(*band, 120)
@@ -132,9 +132,9 @@ def _check_plateaus(data: ReportData) -> Iterator[Check]:
 
 def find_period(data: ReportData) -> float | None:
     """Return the period of the computed mode with the largest mass along x [s]."""
-    row = r"^\d+ +[\d.]+ Hz +([\d.]+) s +([\d.]+)%"
-    modes = re.findall(row, data.read_text("modes.txt") or "", re.MULTILINE)
-    return float(max(modes, key=lambda mode: float(mode[1]))[0]) if modes else None
+    _, *rows = reader((data.read_text("modes.csv") or "").splitlines() or [""])
+    modes = [(float(share), float(period)) for _, period, share, *_ in rows]
+    return max(modes)[1] if modes else None
 
 
 def tabulate_checks(data: ReportData) -> list[Grid]:

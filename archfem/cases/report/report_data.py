@@ -1,6 +1,5 @@
 """Data of a report: case, runs, files of the folder, and the model rebuilt for the player."""
 
-import json
 from collections.abc import Mapping
 from csv import reader
 from dataclasses import dataclass, replace
@@ -131,10 +130,8 @@ class ReportData:
         found: dict[str, dict[str, Statement]] = {name: {} for name in RESULTS}
         for name, by_pair in found.items():
             for pair, place in self.list_parts(f"{name}.json").items():
-                values = json.loads(self.read_text(place) or "{}")
-                # that of an earlier version may have others
-                if values.keys() == set(Statement._fields):
-                    by_pair[pair] = Statement(**values)
+                if stated := Statement.read(self.read_text(place) or "{}"):
+                    by_pair[pair] = stated
         return {name: _join_statements(by_pair) for name, by_pair in found.items() if by_pair}
 
     @cached_property
@@ -170,14 +167,15 @@ class ReportData:
 
 
 def _join_statements(by_pair: Mapping[str, Statement]) -> Statement:
-    """Join what is stated of a result under each pair of a suite; doubts are of their pair."""
+    """Join what is stated of a result under each pair of a suite, the place of its doubts."""
     named = [
         (f"under '{pair}': " if pair else "", statement) for pair, statement in by_pair.items()
     ]
     return Statement(
         [text for _, each in named for text in each.sentences],
         [row for _, each in named for row in each.rows],
-        [f"{under}{doubt}" for under, each in named for doubt in each.doubts],
+        # their place within a search stands with the result
+        [replace(x, place=pair) for pair, each in by_pair.items() for x in each.doubts],
         [f"{under}{note}" for under, each in named for note in each.notes],
     )
 

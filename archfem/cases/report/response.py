@@ -207,8 +207,8 @@ def _build_mechanism(data: ReportData, run: History) -> list[Any]:
         f"Outcome: {summarise_outcomes(data, [run])}",
         *(f"In doubt: {doubt.cause}" for doubt in verdict.doubts),
     ]
-    if fall is not None and fall.blocks:
-        lines.append(f"lost: {describe_lost(fall, len(fall.blocks))}")
+    if fall is not None and fall.blocks and len(data.runs) == 1:  # of several there is a table
+        lines.append(f"lost: {describe_lost([fall], len(fall.blocks))}")
     found = verdict.mechanisms.get("verified")
     lines.append(f"Mechanism: {f'verified, {found}' if found else describe_mechanism(verdict)}")
     # the assumptions name the law of closing, and whether it was varied
@@ -226,8 +226,16 @@ def _build_suite_response(data: ReportData) -> list[Any]:
     (head, rows), columns = result_text.tabulate_runs(data.runs), len(result_text.RUN_COLUMNS)
     # mechanisms are stated with each run
     caption = "Outcome, PGA, and the critical joint of each run"
-    table = Grid(head[:columns], [row[:columns] for row in rows[:-1]], caption)
-    return [table, *_build_envelopes(data)]
+    tables = [Grid(head[:columns], [row[:columns] for row in rows[:-1]], caption)]
+    falls = {name: run.verdict.fall for name, run in data.runs.items()}
+    lost = [
+        (name, f"{len(fall.blocks)}", f"{fall.time:.2f} s", join_names(fall.blocks))
+        for name, fall in falls.items()
+        if fall is not None and fall.blocks
+    ]
+    if lost:
+        tables.append(Grid(("run", "lost", "the first at", "blocks"), lost, "Lost blocks", "words"))
+    return [*tables, *_build_envelopes(data)]
 
 
 def build_check_section(data: ReportData) -> Section:

@@ -12,6 +12,7 @@ import numpy as np
 import xarray as xr
 
 from archfem._files import read_listed
+from archfem.cases.answers import Ratios, read_numbers
 from archfem.cases.defaults import describe_friction_margin
 from archfem.cases.report.conclusion import build_conclusion, sentence
 from archfem.cases.report.doubts import list_elastic_fill, list_varied
@@ -32,7 +33,7 @@ from archfem.cases.run import DRAWING_FILE
 from archfem.dynamics.collapse_state import DISLOCATION, FALLEN_STATES, shallowest_part
 from archfem.dynamics.history import SIGN_CONVENTION
 from archfem.dynamics.recorder import library_versions
-from archfem.dynamics.verdict_range import UNVARIED, VerdictRange
+from archfem.dynamics.verdict_range import VerdictRange
 from archfem.errors import InvalidInput
 from archfem.joints.criteria import assessed_joints
 from archfem.masonry.joint_closing import describe_closing
@@ -42,7 +43,7 @@ from archfem.units import MPa, format_mm, kN
 from archfem.view.pages.document import FigureBlock, Grid, Section, TextBlock
 from archfem.view.structure import draw_names, draw_structure, list_numbers
 from archfem.view.studies import draw_findings
-from archfem.view.style import Colour, limit_width
+from archfem.view.style import limit_width
 
 # Of figure and table, with the file of the figure
 _RISK_CAPTIONS = (
@@ -244,8 +245,6 @@ def _tabulate_parts(structure: Structure) -> Grid:
 def build_static_sections(data: ReportData) -> list[Section]:
     """Build the sections on modes, limit analysis, pushover, rating, assessment."""
     collapse = "Thrust line at collapse, and the mechanism of limit analysis over the structure."
-    if "; all else is of the least" in (data.read_text("limit.txt") or ""):
-        collapse = f"{collapse[:-1]}, under the assumption on the fill that has the least factor."
     curve = "Load factor over displacement, with the joints in the order of their first hinge."
     modes = data.read_result("modes", table="Modes about dead load: effective masses along x and y")
     return [
@@ -304,14 +303,12 @@ def _build_assessment(data: ReportData) -> list[Any]:
     caption = "(a) Mechanism at the displacement capacity, and (b) capacity curve with demand."
     texts = text.split("\n\n")
     names = sorted(name for name in data.files if name.startswith("assessment_"))
-    stated = data.statements.get("assessment")
-    if stated and len(names) == 2 and all(x.endswith("right and left") for x, *_ in stated.rows):
+    checks = read_numbers(Ratios, data.statements.get("assessment"))
+    if len(names) == 2 and all(len(each.directions) == 2 for each in checks):
         names = names[:1]
         mirrored = "\nleft: the mirror image, with the same numbers"
         texts = [texts[0], texts[1] + mirrored, *texts[3:]]
         caption = f"{caption[:-1]}, to the right."
-    if "all else is under one assumption: " in text:
-        caption = f"{caption[:-1]}, under the assumption on the fill that has the least margin."
     figures = [figure for name in names for figure in data.read_figure(name, caption)]
     return [TextBlock("\n\n".join(texts), "lines"), _define_assessment(data), *figures]
 
@@ -405,7 +402,7 @@ def _build_range(data: ReportData) -> list[Any]:
         named = f"Under '{pair}': {caption[:1].lower()}{caption[1:]}" if pair else caption
         # a command without an answer leaves its reason alone
         found = next(ranges) if place.replace(".txt", ".nc") in data.files else None
-        changes = [] if found is None else _build_single_changes(data, found, pair)
+        changes = [] if found is None else _tabulate_single_changes(data, found, pair)
         counted = "Dislocations" if found and found.is_dislocation_worst else "Falls"
         titled = table.format(counted)
         blocks = data.read_result(place.removesuffix(".txt"), named, table=titled)
@@ -417,38 +414,22 @@ def _build_range(data: ReportData) -> list[Any]:
     return built
 
 
-def _build_single_changes(data: ReportData, found: VerdictRange, pair: str) -> list[Any]:
-    """Build picture and table of the runs in which one property differs, the worst first."""
+def _tabulate_single_changes(data: ReportData, found: VerdictRange, pair: str) -> list[Grid]:
+    """Tabulate the runs in which one property differs, the worst first."""
     if not found.what_changes:
         return []
-    changes, under = found.single_changes, f" under '{pair}'" if pair else ""
-    sizes = [np.nan if x.outcome in FALLEN_STATES else 1e3 * found.measure(x) for x in changes]
-    first = next(k for k, each in enumerate(changes) if each.name == UNVARIED)
-    order = [first, *(k for k in range(len(changes)) if k != first)]
-    size = ("residual" if found.is_dislocation_worst else "largest") + " displacement"
-    table = xr.Dataset(
-        {size: ("case", [sizes[k] for k in order], {"units": "mm"})},
-        {"case": [changes[k].name for k in order]},
-    )
-    caption = f"{size.capitalize()} by each single change{under}"
-    caption += "; a fall has none" * any(np.isnan(sizes))
+    caption = "Single changes" + f" under '{pair}'" * bool(pair)
+    if found.is_dislocation_worst:
+        limit = DISLOCATION * shallowest_part(data.case.structure)[0]
+        caption += f", by the displacement at the end; beyond {format_mm(limit)} it is dislocated"
     head = ("single change", "outcome", "largest displacement", "at the end")
     rows = [
         # of a fall it is the way to the ground
         (each.name, each.outcome, *["-" if each.outcome in FALLEN_STATES else x for x in ends])
-        for each in changes
+        for each in found.single_changes
         for ends in [map(format_mm, (each.displacement, each.residual))]
     ]
-    drawn = []
-    with suppress(InvalidInput):  # all are equal, or fall
-        figure = draw_findings(table)
-        if found.is_dislocation_worst:
-            limit = DISLOCATION * shallowest_part(data.case.structure)[0]
-            figure.axes[0].axvline(1e3 * limit, color=Colour.HINGE, lw=1.2)
-            caption += f"; beyond the line, {format_mm(limit)}, it counts as dislocated"
-        drawn.append(FigureBlock.of(figure, f"{caption}."))
-    ranked = "by the residual displacement, " * found.is_dislocation_worst
-    return [*drawn, Grid(head, rows, f"Single changes{under}, {ranked}the worst first")]
+    return [Grid(head, rows, f"{caption}; the worst first")]
 
 
 def build_method_section(data: ReportData) -> Section:
