@@ -244,7 +244,7 @@ def test_a_range_is_of_each_motion_of_a_suite_and_replaces_none_of_another(
     for pair in ("first", "second"):
         assert re.search(rf"nder '{pair}' it falls in none of \d+ variations", words)
         assert f"variations under '{pair}'" in words
-        assert f"Single changes under '{pair}', the worst first" in words
+        assert f"Single changes under '{pair}'; the worst first" in words
 
 
 @pytest.mark.parametrize(
