@@ -8,6 +8,7 @@ import numpy as np
 
 from archfem._validation import check_choice, declared_keys, validate_methods
 from archfem.cases.motion_keys import build_spectrum
+from archfem.cases.structure_keys import find_table
 from archfem.cases.toml_file import Table, check_table, read_object
 from archfem.errors import InvalidInput
 from archfem.joints.criteria import Criteria
@@ -198,11 +199,11 @@ def assessment_keys() -> dict[str, Any]:
     return _keys_beside(kinematic_assessment)
 
 
-def find_given_strength(structure: Structure, materials: Table) -> float | None:
+def find_given_strength(structure: Structure, settings: Table) -> float | None:
     """Return the least strength that [materials] give for blocks at assessed joints [Pa]."""
-    blocks = [structure.blocks[number] for number in np.unique(structure.pairs[structure.judged])]
-    strengths = {block.material.name: block.material.strength for block in blocks}
-    given = [value for name, value in strengths.items() if "strength" in materials.get(name, ())]
+    numbers = np.unique(structure.pairs[structure.judged])
+    materials = {structure.blocks[number].material for number in numbers}
+    given = (x.strength for x in materials if "strength" in find_table(settings, x)[1])
     return min(filter(None, given), default=None)
 
 

@@ -150,7 +150,7 @@ class Case:
             raise InvalidInput("a case has either one motion or a suite: take out one of the two")
         structure = cached_structure(settings, folder)
         analysis = read_analysis(settings, structure, folder)
-        strength = analysis_keys.find_given_strength(structure, settings.get("materials", {}))
+        strength = analysis_keys.find_given_strength(structure, settings)
         limit = analysis_keys.parse_limit(settings.get("limit", {}), strength)
         assessed = settings.get("assessment", {})
         if output.get("animation", False) and analysis.record.fields_every is None:

@@ -8,9 +8,10 @@ from typing import NamedTuple
 from archfem._display import NOTE_MARK
 from archfem._validation import declared_keys
 from archfem.cases.case import Case
+from archfem.cases.structure_keys import PRESETS, find_table
 from archfem.cases.toml_file import Table, format_key
 from archfem.limit.instability import describe_friction, least_friction
-from archfem.masonry.joint_closing import FINISHED_KEYS, finish_range
+from archfem.masonry.joint_closing import finish_range
 from archfem.masonry.materials import Contact, Material
 from archfem.masonry.structure import Structure, join_names
 from archfem.units import GPa, MPa, kN, kPa, mm
@@ -69,11 +70,16 @@ class Default(NamedTuple):
 def list_default_keys(case: Case, item: Material | Contact) -> list[str]:
     """Return the deciding values of a material or contact that the case does not give."""
     section = "materials" if isinstance(item, Material) else "contacts"
-    given = case.settings.get(section, {}).get(item.name, {})
-    keys = DECIDING_VALUES[section]
-    if "finish" in given:
-        given = dict.fromkeys((*given, *FINISHED_KEYS))
-    return [key for key in keys if key not in given and getattr(item, key) is not None]
+    name, given = find_table(case.settings, item)
+    # other values follow from a finish, or from the shape
+    preset = PRESETS[section].get(name)
+    return [
+        key
+        for key in DECIDING_VALUES[section]
+        if key not in given
+        and getattr(item, key) is not None
+        and getattr(item, key) == getattr(preset, key, None)
+    ]
 
 
 def list_fill_values(case: Case) -> Iterator[tuple[str, str, bool]]:
@@ -107,7 +113,8 @@ def _list_properties(case: Case) -> Iterator[Default]:
         for key in list_default_keys(case, item):
             word, *_, reason = DECIDING_VALUES[section][key]
             words = f"{word} {value_text(section, key, getattr(item, key))}"
-            yield Default(item.name, words, f"{section}.{format_key(item.name)}.{key}", reason)
+            path = f"{section}.{format_key(find_table(case.settings, item)[0])}.{key}"
+            yield Default(item.name, words, path, reason)
 
 
 def _list_settings(case: Case) -> Iterator[Default]:
@@ -174,14 +181,15 @@ def explain_defaults(case: Case) -> str:
 
 def _explain_finishes(case: Case) -> Iterator[str]:
     """Explain each finish of the case in a line: its key, its law with the range, and sources."""
-    structure, tables = case.structure, case.settings.get("contacts", {})
+    structure = case.structure
     for contact, joint in {joint.contact: joint for joint in structure.joints}.items():
-        if (finish := tables.get(contact.name, {}).get("finish")) is None:
+        name, table = find_table(case.settings, contact)
+        if (finish := table.get("finish")) is None:
             continue
         ranges = list_finish_ranges(structure, contact, finish)
         values = ", ".join(f"{word} {text}" for word, text in ranges.values())
         sources = "; ".join(finish_range(structure, joint, finish).sources[:3])
-        yield f'contacts.{format_key(contact.name)}.finish = "{finish}": {values}; {sources}'
+        yield f'contacts.{format_key(name)}.finish = "{finish}": {values}; {sources}'
 
 
 def list_finish_ranges(

@@ -43,7 +43,7 @@ BRIDGE_PARTS: Table = {"arches": Arch, "piers": Pier, "sidewalls": Sidewall}
 CONTACT_KEYS = {**declared_keys(Contact), "finish": str}
 
 # Materials and contacts that no table need describe, by section
-_PRESETS: Mapping[str, Mapping[str, Any]] = {
+PRESETS: Mapping[str, Mapping[str, Any]] = {
     "materials": MATERIAL_PRESETS,
     "contacts": CONTACT_PRESETS,
 }
@@ -116,7 +116,7 @@ def _build_shape(settings: Table, folder: Path) -> Structure:
     fill = values.pop("fill", {})
     values = _resolve_names(functions[name], values, settings)
     # All tables are read, also unused ones: a misspelt name of a preset is an error then.
-    for section in _PRESETS:
+    for section in PRESETS:
         for key in settings.get(section, {}):
             _resolve_preset(settings, section, key)
     if name == "bridge":
@@ -271,7 +271,7 @@ def _call(function: Callable[..., Described], section: str, **values: Any) -> De
     parameters = inspect.signature(function).parameters.values()
     required = [key.name for key in parameters if key.default is key.empty]
     if missing := [key for key in required if key not in values]:
-        known = sorted(_PRESETS.get(section.partition(".")[0], ()))
+        known = sorted(PRESETS.get(section.partition(".")[0], ()))
         names = f"; tables of these names change what is there: {known}" if known else ""
         raise InvalidInput(
             f"{section} lacks {', '.join(missing)}: give them, or correct the name of the "
@@ -282,7 +282,7 @@ def _call(function: Callable[..., Described], section: str, **values: Any) -> De
 
 def _resolve_preset(settings: Table, section: str, name: str) -> Any:
     """Return a material or contact: a preset, or described or changed by a table of the case."""
-    tables, presets = settings.get(section, {}), _PRESETS[section]
+    tables, presets = settings.get(section, {}), PRESETS[section]
     cls: Callable[..., Any] = Material if section == "materials" else Contact
     if name not in presets and name not in tables:
         raise InvalidInput(
@@ -299,6 +299,21 @@ def _resolve_preset(settings: Table, section: str, name: str) -> Any:
     if values.get("law") is not None:
         values["law"] = _joint_law(values["law"], f"{section}.{name}.law")
     return _call(cls, f"{section}.{name}", **{"name": name, **values})
+
+
+def find_table(settings: Table, item: Material | Contact) -> tuple[str, Table]:
+    """Return key and content of the table of a material or contact; no content for a preset.
+
+    The key may differ from the name, which a table may give.
+    """
+    section = "materials" if isinstance(item, Material) else "contacts"
+    tables = settings.get(section, {})
+    keys = [key for key, table in tables.items() if table.get("name", key) == item.name]
+    known = [*keys, item.name] if item.name in PRESETS[section] else keys
+    equal = (key for key in known if _resolve_preset(settings, section, key) == item)
+    # what follows from a finish differs from stone to stone
+    key = next(equal, next(iter(keys), item.name))
+    return key, tables.get(key, {})
 
 
 def _read_finish(table: dict[str, Any], section: str) -> dict[str, Any]:
@@ -350,7 +365,7 @@ class _PresetNames:
     def name_of(self, item: Material | Contact) -> str:
         """Return the name of the table of a material or contact, which is added if it is new."""
         section = "materials" if isinstance(item, Material) else "contacts"
-        presets, number, name = _PRESETS[section], 1, item.name
+        presets, number, name = PRESETS[section], 1, item.name
         # a table changes a preset of its name key by key: what it leaves out would be the preset's
         while self.objects.get((section, name), item) != item or (
             name in presets and set(_list_fields(presets[name])) - set(_list_fields(item))
@@ -365,7 +380,7 @@ class _PresetNames:
         """Sections [materials] and [contacts]; presets as they are need no table."""
         sections: dict[str, Any] = {}
         for (section, name), item in self.objects.items():
-            if _PRESETS[section].get(name) != item:
+            if PRESETS[section].get(name) != item:
                 table = _list_fields(item)
                 if table.pop("name") != name:
                     table["name"] = item.name

@@ -21,6 +21,7 @@ from archfem._validation import check_integer, check_number, validate_arguments
 from archfem.cases.case import Case
 from archfem.cases.defaults import list_default_keys
 from archfem.cases.result_text import ResultTable
+from archfem.cases.structure_keys import find_table
 from archfem.cases.toml_file import Table, format_key
 from archfem.dynamics.analysis import Analysis, with_one_facet
 from archfem.dynamics.collapse_state import CollapseState, classify_collapse, doubt_soft_blocks
@@ -599,7 +600,8 @@ def _list_changed_weights(case: Case, found: Rating) -> Iterator[Change]:
     """Yield weights that the case does not give likewise."""
     for material in dict.fromkeys(block.material for block in found.structure.blocks):
         if "unit_weight" in list_default_keys(case, material):
-            key, name = f"materials.{format_key(material.name)}.unit_weight", material.name
+            key, name = find_table(case.settings, material)[0], material.name
+            key = f"materials.{format_key(key)}.unit_weight"
             for by, words in ((0.9, "a tenth lighter"), (1.1, "a tenth heavier")):
                 yield f"weight of {name}", f"{name} {words}", {key: by * material.unit_weight}
 

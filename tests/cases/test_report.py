@@ -27,6 +27,7 @@ from archfem.cases.report.sections import (
     _build_rating,
     build_input_section,
     build_sections,
+    build_structure_section,
 )
 from archfem.cases.result_text import ResultTable
 from archfem.cases.run import carry_out, replace_run
@@ -558,6 +559,58 @@ def test_every_input_has_its_mark():
     defaults = {each.words for each in list_defaults(af.Case.of(tables))}
     assert {"weight 20 kN/m³", "μ 0.6", "mechanism of 4 joints"} <= defaults
     assert "E 5 GPa" not in defaults
+
+
+@pytest.mark.parametrize("young", [30e9, 28e9])
+def test_a_value_is_given_by_the_table_of_its_material_whatever_its_name(young, tmp_path):
+    """`write` gives a table another key than the name where it leaves out a key of a preset."""
+    stone = af.Material(young, 0.2, 24034.5, None, "stone")
+    pier = af.column(breadth=1.0, heights=[1.0], material=stone)
+    case = af.Case.read(af.Analysis(pier, fidelity="rigid").write(tmp_path / "pier.toml"))
+    assert case.settings["materials"].keys() == {"stone 2"}
+    assert case.structure.blocks[1].material.name == "stone"
+    rows = {row[0]: row[1:] for row in tabulate_inputs(report_data.ReportData(case, {})).rows}
+    assert rows["stone: E"] == (f"{young / 1e9:g} GPa", "given")
+    assert rows["stone: weight"] == ("24.03 kN/m³", "given")
+    assert "materials" not in "".join(each.key for each in list_defaults(case))
+    # a strength under that key counts in limit analyses, too
+    case.settings["materials"]["stone 2"]["strength"] = "2 MPa"
+    assert af.Case.of(case.settings).limit.strength == 2e6
+
+
+def test_the_paper_is_cited_where_a_value_is_its_own_alone():
+    """The friction of a jointed fill follows from its angle, and no table has it."""
+    tables = tomllib.loads(BRIDGE)
+    tables["structure"]["fill"] = {"law": "jointed", "piece_size": 0.8, "friction_angle": 35}
+    rows = tabulate_inputs(report_data.ReportData(af.Case.of(tables), {})).rows
+    marks = {name: (value, mark) for name, value, mark in rows}
+    assert marks["stone: E"] == ("30 GPa (table 2 of Demirel and Aldemir (2021))", "default")
+    assert marks["fill: μ"] == (f"{np.tan(np.radians(35)):.4g}", "inferred")
+
+
+def test_materials_that_differ_in_weight_alone_stand_once():
+    blocks = [
+        {"outline": [[0, k], [1, k], [1, k + 1], [0, k + 1]], "name": f"b{k}", "material": f"m{k}"}
+        for k in range(4)
+    ]
+    blocks[0] |= {"fixed": True, "material": "stone"}
+    load = {"young": 3e10, "poisson": 0.2, "stands_for": "the wall above"}
+    weights = {f"m{k}": {**load, "unit_weight": f"{20 * k} kN/m³"} for k in (1, 2, 3)}
+    tables = {"structure": {"shape": "blocks", "blocks": blocks}, "materials": weights}
+    data = report_data.ReportData(af.Case.of({**tables, "model": {"fidelity": "rigid"}}), {})
+    rows = [row for row in tabulate_inputs(data).rows if row[0].startswith("m")]
+    assert rows[:3] == [
+        ("m1 and 2 more: stands also for", "the wall above", "given"),
+        ("m1 and 2 more: E", "30 GPa", "given"),
+        ("m1 and 2 more: weight", "20 kN/m³ to 60 kN/m³", "given"),
+    ]
+    assert not [row for row in rows if row[0].startswith("m2")]
+    extent = build_structure_section(data).pieces[0].text
+    assert "3 blocks also stand for 'the wall above', which counts by its weight" in extent
+    # one that differs in another value has rows of its own
+    weights["m2"]["young"] = 1e10
+    rows = tabulate_inputs(report_data.ReportData(af.Case.of(data.case.settings), {})).rows
+    assert {name for name, *_ in rows} > {"m2: weight", "m1 and 1 more: weight"}
 
 
 def test_stiffness_by_a_finish_is_inferred_and_numbers_have_their_units():

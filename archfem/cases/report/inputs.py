@@ -14,7 +14,13 @@ from archfem.cases.defaults import (
     value_text,
 )
 from archfem.cases.report.report_data import STATIC_RESULTS, ReportData
-from archfem.cases.structure_keys import BRIDGE_PARTS, keys_of_part, list_shapes, shape_keys
+from archfem.cases.structure_keys import (
+    BRIDGE_PARTS,
+    find_table,
+    keys_of_part,
+    list_shapes,
+    shape_keys,
+)
 from archfem.dynamics.schemes import EffectiveDamping, Rayleigh, interpret_damping
 from archfem.limit.collapse import collapse_factor
 from archfem.masonry.joint_closing import FINISHED_KEYS
@@ -55,6 +61,8 @@ _SOURCES = {
     "q": "Circolare 7/2019, C8.7.1.2.1.7",
     "confidence_factor": "of LC1, Circolare 7/2019, C8.5.4.1, from memory",
 }
+
+_WEIGHT = DECIDING_VALUES["materials"]["unit_weight"][0]
 
 # Properties that may be left out: name in texts, and unit
 _FURTHER_PROPERTIES = {
@@ -142,30 +150,51 @@ def describe_value(value: Any, kind: Any = None) -> str:
 
 
 def _property_rows(data: ReportData) -> Iterator[Row]:
-    """Yield the values of materials and contacts."""
-    case = data.case
-    items: list[Material | Contact] = [block.material for block in case.structure.blocks]
-    items += [joint.contact for joint in case.structure.joints]
+    """Yield the values of materials and contacts, equal ones once."""
+    structure, groups = data.case.structure, dict[Any, list[tuple[Material | Contact, list[Row]]]]()
+    items: list[Material | Contact] = [block.material for block in structure.blocks]
+    items += [joint.contact for joint in structure.joints]
     for item in dict.fromkeys(items):
-        section = "materials" if isinstance(item, Material) else "contacts"
-        defaults = list_default_keys(case, item)
-        given = case.settings.get(section, {}).get(item.name, {})
-        unused = _UNUSED | ({"strength"} - given.keys()) if data.is_static else set()
-        follows = {*FINISHED_KEYS} if "finish" in given else set()
-        for key, (word, *_, reason) in DECIDING_VALUES[section].items():
-            text, mark = value_text(section, key, getattr(item, key)), _mark(key in given)
-            if key in defaults:
-                text += f" ({reason.partition(';')[0]})"
-            if key not in unused | follows:
-                yield f"{item.name}: {word}", text, mark
-        if "finish" in given.keys() - unused and isinstance(item, Contact):
-            yield from _finish_rows(data, item, given["finish"])
-        for key, (word, unit, name) in _FURTHER_PROPERTIES.items():
-            if (key in given or getattr(item, key, None)) and key not in unused:
-                text = f"{getattr(item, key) / unit:g}{name}"
-                yield f"{item.name}: {word}", text, _mark(key in given)
-        if isinstance(item, Contact) and item.law is not None:
-            yield f"{item.name}: law", str(item.law), "given"
+        rows, load = [*_list_properties(data, item)], getattr(item, "stands_for", None)
+        # what carries more than itself may differ in weight alone from its neighbour
+        same = tuple(row for row in rows if load is None or row[0] != _WEIGHT)
+        groups.setdefault((type(item), load, same), []).append((item, rows))
+    for (_, load, _), group in groups.items():
+        (first, rows), *others = group
+        name = first.name + f" and {len(others)} more" * bool(others)
+        if load is not None:
+            yield f"{name}: stands also for", load, "given"
+        for word, text, mark in rows:
+            if word == _WEIGHT and load is not None:
+                weights = [each.unit_weight for each, _ in group if isinstance(each, Material)]
+                ends = [value_text("materials", "unit_weight", x) for x in sorted(weights)]
+                text = " to ".join(dict.fromkeys([ends[0], ends[-1]]))
+            yield f"{name}: {word}", text, mark
+
+
+def _list_properties(data: ReportData, item: Material | Contact) -> Iterator[Row]:
+    """Yield the values of a material or contact."""
+    section = "materials" if isinstance(item, Material) else "contacts"
+    defaults = list_default_keys(data.case, item)
+    _, given = find_table(data.case.settings, item)
+    unused = _UNUSED | ({"strength"} - given.keys()) if data.is_static else set()
+    follows = {*FINISHED_KEYS} if "finish" in given else set()
+    for key, (word, *_, reason) in DECIDING_VALUES[section].items():
+        value = getattr(item, key)
+        text, mark = value_text(section, key, value), _mark(key in given)
+        if key in defaults:
+            text += f" ({reason.partition(';')[0]})"
+        elif mark == "default" and value is not None:
+            mark = "inferred"  # from the shape
+        if key not in unused | follows:
+            yield word, text, mark
+    if "finish" in given.keys() - unused and isinstance(item, Contact):
+        yield from _finish_rows(data, item, given["finish"])
+    for key, (word, unit, name) in _FURTHER_PROPERTIES.items():
+        if (key in given or getattr(item, key, None)) and key not in unused:
+            yield word, f"{getattr(item, key) / unit:g}{name}", _mark(key in given)
+    if isinstance(item, Contact) and item.law is not None:
+        yield "law", str(item.law), "given"
 
 
 def _finish_rows(data: ReportData, contact: Contact, finish: str) -> Iterator[Row]:
@@ -174,9 +203,9 @@ def _finish_rows(data: ReportData, contact: Contact, finish: str) -> Iterator[Ro
     words = (
         "; rougher faces are stiffer under little stress, so that they may move less, and close "
     )
-    yield f"{contact.name}: finish", finish + f"{words}further" * rough, "given"
+    yield "finish", finish + f"{words}further" * rough, "given"
     for word, text in list_finish_ranges(data.case.structure, contact, finish).values():
-        yield f"{contact.name}: {word}", text, "inferred"
+        yield word, text, "inferred"
 
 
 def _command_rows(data: ReportData) -> Iterator[Row]:

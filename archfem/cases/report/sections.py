@@ -166,19 +166,9 @@ def _describe_joints(data: ReportData) -> str:
 def build_structure_section(data: ReportData) -> Section:
     """Build extent, parts, names of joints, thrust line, and joints and stress under dead load."""
     case, structure = data.case, data.case.structure
-    # the ground is no part of its size
-    moving = [structure.blocks[number] for number in structure.free]
-    (length, height), drawn = (
-        np.ptp(np.concatenate([block.drawn() for block in blocks]), axis=0)
-        for blocks in (moving, structure.blocks)
-    )
-    extent = (
-        f"{length:.3g} m long, {height:.3g} m high and {structure.width:g} m wide; "
-        f"{len(structure.free)} blocks that can move, weighing {structure.weight / kN:.4g} kN, and "
-        f"{len(structure.joints)} joints."
-    )
+    drawn = np.ptp(np.concatenate([block.drawn() for block in structure.blocks]), axis=0)
     blocks: list[Any] = [
-        TextBlock(extent),
+        TextBlock(_describe_extent(structure)),
         *_describe_drawing(data),
         _tabulate_parts(structure),
         # tables stand before figures, which leave room where they move to the next page
@@ -205,6 +195,25 @@ def build_structure_section(data: ReportData) -> Section:
     return Section("Structure and dead load", blocks + data.read_figure("free_body.png", caption))
 
 
+def _describe_extent(structure: Structure) -> str:
+    """Describe lengths, weight and numbers of what moves, and what blocks stand for besides."""
+    # the ground is no part of its size
+    moving = [structure.blocks[number] for number in structure.free]
+    length, height = np.ptp(np.concatenate([block.drawn() for block in moving]), axis=0)
+    text = (
+        f"{length:.3g} m long, {height:.3g} m high and {structure.width:g} m wide; {len(moving)} "
+        f"blocks that can move, weighing {structure.weight / kN:.4g} kN, and "
+        f"{len(structure.joints)} joints."
+    )
+    loads = Counter(filter(None, (block.material.stands_for for block in moving)))
+    for load, count in loads.items():
+        text += (
+            f" {count} block{'s' * (count > 1)} also stand{'s' * (count == 1)} for '{load}', which "
+            "counts by its weight, at the middle of each block, and not in these lengths."
+        )
+    return text
+
+
 def _describe_drawing(data: ReportData) -> list[TextBlock]:
     """Name the drawing of the blocks, its unit and tolerance, and how far corners were moved."""
     text = data.read_text(DRAWING_FILE)
@@ -224,7 +233,8 @@ def _tabulate_parts(structure: Structure) -> Grid:
         depths = [joint.depth for joint, own in assessed if own and joint.part == part]
         weight = structure.width * sum(block.area * block.material.unit_weight for block in free)
         row = [part or "–", blocks[0].role or "–", str(len(blocks)), str(len(blocks) - len(free))]
-        row.append(", ".join(dict.fromkeys(block.material.name for block in blocks)))
+        first, *others = dict.fromkeys(block.material.name for block in blocks)
+        row.append(f"{first} and {len(others)} more" if others[1:] else ", ".join([first, *others]))
         row.append(f"{weight / kN:.4g}")
         ends = dict.fromkeys(f"{choose(depths):.3g}" for choose in (min, max) if depths)
         row.append(" – ".join(ends) or "–")
