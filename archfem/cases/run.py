@@ -22,6 +22,7 @@ import xarray as xr
 from archfem import _files
 from archfem._display import call_late_bound
 from archfem._netcdf import read_dataset
+from archfem._typing import Array
 from archfem._validation import validate_arguments
 from archfem.cases.case import Case
 from archfem.cases.structure_keys import read_survey
@@ -53,6 +54,9 @@ CASE_FILE = "case.toml"
 DRAWING_FILE = "drawing.txt"  # file of the blocks, its unit, and how far corners were moved
 RATING_FILE = "rating.toml"  # [rating] as `archfem rate` took it
 HISTORY_FILE = "history.nc"
+
+# Whole motion of a run in its history: accelerations (sample, axis), and its step as attribute
+MOTION_VARIABLE = "whole_motion"
 
 # Integrates a motion of a case from its dead load, with damping, as `run_time_history` does.
 RunMotion = Callable[[Case, Motion, Equilibrium, Viscous | None], History]
@@ -368,6 +372,12 @@ def run_time_history(
         DidNotConverge: a step failed; `history` of the error is the record up to it.
     """
     attrs = {"case": case.text(), "inputs": case.hash_inputs()}
+
+    def complete(dataset: xr.Dataset) -> None:
+        dataset.attrs |= attrs
+        # a report measures all of the motion, which a run that falls does not follow to its end
+        dataset[MOTION_VARIABLE] = ("sample", "axis"), _tabulate_samples(motion), {"dt": motion.dt}
+
     given: Any = {} if damping is None else {"damping": damping}  # None would be undamped
     try:
         with log_prefix(case.title, motion.name):
@@ -375,10 +385,19 @@ def run_time_history(
     except DidNotConverge as error:
         # The partial history is saved like a complete one.
         if error.history is not None:
-            error.history.dataset.attrs |= attrs
+            complete(error.history.dataset)
         raise
-    run.dataset.attrs |= attrs
+    complete(run.dataset)
     return run
+
+
+def _tabulate_samples(motion: Motion) -> Array:
+    """Return both components of a motion at its own steps, zero after their ends (n, 2) [m/s²]."""
+    parts = [x for x in (motion.horizontal, motion.vertical) if x is not None]
+    samples = np.zeros((max(map(len, parts)), 2))
+    for column, part in enumerate(parts):
+        samples[: len(part), column] = part
+    return samples
 
 
 @contextmanager

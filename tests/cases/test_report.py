@@ -22,7 +22,11 @@ from archfem.cases.defaults import describe_defaults, list_defaults
 from archfem.cases.report import conclusion, report, report_data
 from archfem.cases.report.conclusion import build_conclusion, list_facts
 from archfem.cases.report.inputs import tabulate_inputs
-from archfem.cases.report.response import build_joint_section, supported_weight_ratio
+from archfem.cases.report.response import (
+    build_ground_section,
+    build_joint_section,
+    supported_weight_ratio,
+)
 from archfem.cases.report.sections import (
     _build_rating,
     build_input_section,
@@ -30,7 +34,7 @@ from archfem.cases.report.sections import (
     build_structure_section,
 )
 from archfem.cases.result_text import ResultTable
-from archfem.cases.run import carry_out, replace_run
+from archfem.cases.run import MOTION_VARIABLE, carry_out, replace_run
 from archfem.limit import rating
 from archfem.models.model import Doubt
 from archfem.statics.assessment_checks import UPPER_BOUND, AssessmentCheck
@@ -404,7 +408,7 @@ def test_supports_bear_the_weight(ring, caplog):
 def test_the_ground_of_a_run_is_that_which_was_applied(stack):
     motion = af.Motion.synthetic(seed=3, duration=1.0, pga=1.0)
     run = af.time_history(af.build(stack, fidelity="rigid"), motion, dt=0.005)
-    found = report_data.rebuild_motion(run, "ground")
+    found = report_data.read_motion(run, "ground")
     assert found.dt == pytest.approx(0.005)
     assert np.allclose(found.horizontal, run.dataset["ground"].values[:, 0], atol=1e-9)
     assert found.pga == pytest.approx(motion.pga)
@@ -957,8 +961,8 @@ def test_an_attempt_without_an_answer_states_its_reason(kept, unplotted, capsys,
     assert row in " ".join(words.replace("–", "-").split())
 
 
-def test_motions_are_measured_by_themselves_where_the_case_has_them(tmp_path, unplotted):
-    """A peak between two steps of the run; of a record that was changed, that of the steps."""
+def test_motions_are_measured_by_themselves_without_their_files(tmp_path, unplotted):
+    """A peak between two steps of the run, of a record that is gone."""
     record, path = tmp_path / "record.txt", tmp_path / "case.toml"
     np.savetxt(record, [0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0, 0.0, 0.0])
     text = CASE.partition("[suite]")[0]
@@ -967,17 +971,44 @@ def test_motions_are_measured_by_themselves_where_the_case_has_them(tmp_path, un
     case, folder = af.Case.read(path), tmp_path / "out"
     with replace_run(case, folder) as draft:
         list(carry_out(case, draft))
+    record.unlink()
     found = af.cases.open_results(folder)
-    (motion,) = report_data.ReportData(found.case, found.runs, folder).given_motions.values()
-    assert motion.pga == 2.0
+    (motion,) = report_data.ReportData(found.case, found.runs, folder).motions.values()
+    assert (motion.pga, motion.dt, motion.components) == (2.0, 0.005, ("horizontal",))
     words = words_of(found.report())
     assert "0.2039 g" in words
     assert "Steps of runs miss peaks: of 'record' 0 of 0.204 g." in words
-    record.write_text(record.read_text().replace("2.0", "3.0"))
-    changed = af.cases.open_results(folder)
-    assert not report_data.ReportData(changed.case, changed.runs, folder).given_motions
-    words = words_of(changed.report())
-    assert "Measures of the motions in the steps of the runs, for the records of record" in words
+
+
+def test_a_motion_is_measured_to_its_end_where_the_structure_falls_before(tmp_path, unplotted):
+    """A pulse that overturns a stone, and a stronger one after the fall."""
+    step, path = 0.005, tmp_path / "pulse.csv"
+    samples = np.zeros(4000)
+    samples[20:140] = 4.0
+    samples[-40:-20] = 6.0
+    np.savetxt(path, samples)
+    tables = {
+        "structure": {"shape": "column", "breadth": 0.2, "heights": [1.0]},
+        "model": {"fidelity": "rigid", "displacements": "large"},
+        "motion": {"file": str(path), "dt": step, "units": "m/s2"},
+    }
+    case = af.Case.of(tables)
+    (run,) = (each for each in af.cases.run_case(case) if isinstance(each, af.cases.Run))
+    assert run.history.verdict.outcome == "fallen"
+    assert run.history.time[-1] < step * 3900
+    data = report_data.ReportData(case, {"pulse": run.history})
+    grid, *_ = build_ground_section(data).pieces
+    row = dict(zip(grid.head, grid.rows[0], strict=True))
+    whole = case.ground_motion()
+    assert np.array_equal(data.motions["pulse"].horizontal, whole.horizontal)
+    assert list(row.values()) == result_text.tabulate_motions([whole]).rows[0]
+    # a file of an earlier version has the steps of the run alone, and the report says so
+    cut = replace(run.history, dataset=run.history.dataset.drop_vars(MOTION_VARIABLE))
+    data = report_data.ReportData(case, {"pulse": cut})
+    grid, *_, spectra = build_ground_section(data).pieces
+    assert data.motions["pulse"].pga < whole.pga
+    assert "those of pulse at the steps of the runs up to their ends" in grid.caption
+    assert "as applied, up to the end of the run" in spectra.caption
 
 
 def test_a_study_stands_in_a_report(kept, unplotted, tmp_path, capsys):

@@ -152,7 +152,6 @@ def test_a_report_of_several_runs_has_a_section_for_each(runs, piers, monkeypatc
     monkeypatch.setattr(response, "draw_envelopes", lambda *_: [])
     monkeypatch.setattr(response, "build_player", lambda *given: f"one of {given[-1]} players")
     case = SimpleNamespace(title="piers", structure=piers, suite=None, target=None, report={})
-    monkeypatch.setattr(report_data.ReportData, "given_motions", {})
     monkeypatch.setattr(response, "replace", lambda figure, **_: figure)
     one = report_data.ReportData(case, {"first": runs["first"]})
     assert one.dead["N"].values.tolist() == runs["first"].joints["N"].values[0].tolist()
@@ -343,8 +342,8 @@ def test_motions_of_a_suite_are_shown_before_they_were_scaled_and_reduced(monkey
     monkeypatch.setattr(response.FigureBlock, "of", lambda figure, caption: caption)
     motion = af.Motion(np.array([0.0, 1.0, -0.5]), 0.01)
     for given, factor in (({}, 1.0), ({"scale": 1.5, "reduction": 4.0}, 4.0 / 1.5)):
-        case = SimpleNamespace(suite=given, target=None)
-        (caption,) = response._build_spectra(case, [motion])
+        data = SimpleNamespace(case=SimpleNamespace(suite=given, target=None), cut_motions=[])
+        (caption,) = response._build_spectra(data, [motion])
         assert seen[-1].pairs[0].horizontal == pytest.approx(factor * motion.horizontal)
         assert (seen[-1].scale, seen[-1].reduction) == (
             given.get("scale", 1.0),
@@ -353,7 +352,8 @@ def test_motions_of_a_suite_are_shown_before_they_were_scaled_and_reduced(monkey
         assert ("R = 4;" in caption) == ("reduction" in given)
     for matched in (True, False):
         case = SimpleNamespace(suite={"matched": matched}, target="some")
-        assert len(response._build_spectra(case, [motion])) == (1 if matched else 2)
+        data = SimpleNamespace(case=case, cut_motions=[])
+        assert len(response._build_spectra(data, [motion])) == (1 if matched else 2)
 
 
 def test_sentences_begin_with_a_capital_and_end_with_one_stop():
@@ -366,7 +366,7 @@ def test_a_ground_motion_is_read_at_even_steps_from_its_first_to_its_last():
     times = 0.5 + np.array([0.0, 0.01, 0.015, 0.02, 0.03, 0.04, 0.05])
     ground = xr.DataArray(np.column_stack([3.0 * times, 0.0 * times]), dims=("time", "axis"))
     run = SimpleNamespace(time=times, dataset={"ground": ground})
-    found = report_data.rebuild_motion(run, "read")
+    found = report_data.read_motion(run, "read")
     assert found.dt == pytest.approx(0.01)
     assert found.horizontal == pytest.approx(3.0 * (0.5 + 0.01 * np.arange(6)))
     assert found.components == ("horizontal",)
@@ -376,14 +376,14 @@ def test_a_ground_motion_is_read_at_even_steps_from_its_first_to_its_last():
 def test_one_step_is_a_motion_too(times, dt):
     ground = xr.DataArray([[1.0, 0.0], [3.0, 0.0]][: len(times)])
     run = SimpleNamespace(time=np.array(times), dataset={"ground": ground})
-    found = report_data.rebuild_motion(run, "read")
+    found = report_data.read_motion(run, "read")
     assert (found.dt, found.horizontal.tolist()) == (dt, [1.0, 3.0][: len(times)])
 
 
 def test_two_steps_are_a_motion_of_their_interval():
     ground = xr.DataArray([[1.0, 0.0], [3.0, 0.0]])
     run = SimpleNamespace(time=np.array([2.0, 2.5]), dataset={"ground": ground})
-    found = report_data.rebuild_motion(run, "read")
+    found = report_data.read_motion(run, "read")
     assert (found.dt, found.horizontal.tolist()) == (0.5, [1.0, 3.0])
 
 

@@ -14,7 +14,7 @@ from archfem._display import DOUBT_MARK
 from archfem._files import check_listed, describe_deleted, group_of, path_inside, read_file_list
 from archfem.cases.answers import RESULTS, Statement, cut_remedy
 from archfem.cases.case import Case
-from archfem.cases.run import CASE_FILE, RATING_FILE
+from archfem.cases.run import CASE_FILE, MOTION_VARIABLE, RATING_FILE
 from archfem.cases.toml_file import Table, parse_tables
 from archfem.dynamics.history import History
 from archfem.dynamics.verdict_range import VerdictRange
@@ -54,24 +54,13 @@ class ReportData:
 
     @cached_property
     def motions(self) -> dict[str, Motion]:
-        """Ground motions as applied: those of the case, or else those at the steps of the runs."""
-        recorded = {name: rebuild_motion(run, name) for name, run in self.runs.items()}
-        return recorded | self.given_motions
+        """Ground motions as applied: the whole ones, or of earlier versions those at the steps."""
+        return {name: read_motion(run, name) for name, run in self.runs.items()}
 
     @cached_property
-    def given_motions(self) -> dict[str, Motion]:
-        """Motions of the case that the runs have followed; its files may be gone, or changed."""
-        try:
-            case = self.case if self.case.suite is None else self.case.alone(*self.runs)
-            given = [case.ground_motion()] if case.suite is None else case.ground_suite().motions
-        except ArchfemError:
-            return {}
-        return {
-            name: replace(motion, name=name)
-            for (name, run), motion in zip(self.runs.items(), given, strict=False)
-            if np.allclose(motion.at(run.time), run.dataset["ground"], atol=1e-9 * motion.pga)
-            and np.isclose(motion.pga, run.dataset.attrs.get("pga", motion.pga))
-        }
+    def cut_motions(self) -> list[str]:
+        """Names of motions that are known at the steps of their runs alone."""
+        return [name for name, run in self.runs.items() if MOTION_VARIABLE not in run.dataset]
 
     @cached_property
     def fidelity(self) -> str:
@@ -180,14 +169,18 @@ def _join_statements(by_pair: Mapping[str, Statement]) -> Statement:
     )
 
 
-def rebuild_motion(run: History, name: str) -> Motion:
-    """Return the recorded ground motion of a run, interpolated to even steps."""
+def read_motion(run: History, name: str) -> Motion:
+    """Return the motion of a run, or of earlier versions that at its steps, at even ones."""
     times, ground = run.time, run.dataset["ground"].values
-    # Adaptive and event steps are uneven; the median is the step of the record.
-    dt = float(np.median(np.diff(times))) if len(times) > 1 else 1.0
-    even = times[0] + dt * np.arange(round((times[-1] - times[0]) / dt) + 1)
-    horizontal, vertical = (np.interp(even, times, column) for column in ground.T)
-    return Motion(horizontal, dt, vertical if vertical.any() else None, name)
+    if MOTION_VARIABLE in run.dataset:
+        samples, dt = run.dataset[MOTION_VARIABLE].values, run.dataset[MOTION_VARIABLE].attrs["dt"]
+    else:
+        # Adaptive and event steps are uneven; the median is the step of the record.
+        dt = float(np.median(np.diff(times))) if len(times) > 1 else 1.0
+        even = times[0] + dt * np.arange(round((times[-1] - times[0]) / dt) + 1)
+        samples = np.column_stack([np.interp(even, times, column) for column in ground.T])
+    horizontal, vertical = samples.T
+    return Motion(horizontal, float(dt), vertical if vertical.any() else None, name)
 
 
 def build_player(case: Case, run: History, title: str, players: int = 1) -> Player:

@@ -52,11 +52,11 @@ def build_ground_section(data: ReportData) -> Section:
     if not motions:
         return Section("Ground motion", [])
     caption = "Measures of the motions as applied, at their own samples, without a correction"
-    if recorded := [name for name in data.runs if name not in data.given_motions]:
+    if data.cut_motions:
         caption = (
-            f"Measures of the motions in the steps of the runs, for the records of "
-            f"{join_names(recorded)} are not with the case: peaks between steps are left out, and "
-            "displacements drift"
+            f"Measures of the motions; those of {join_names(data.cut_motions)} at the steps of the "
+            "runs up to their ends, for an earlier version of archfem made these: peaks between "
+            "steps are left out, and displacements drift"
         )
     blocks: list[Any] = [Grid(*result_text.tabulate_motions(motions), caption)]
     blocks += tabulate_checks(data)
@@ -66,16 +66,16 @@ def build_ground_section(data: ReportData) -> Section:
         applied = "Ground motion as applied: acceleration, velocity and displacement."
         with limit_width(HALF_WIDTH):
             figures = [FigureBlock.of(draw_motion(motions[0]), applied)]
-            figures += _build_spectra(data.case, motions)
+            figures += _build_spectra(data, motions)
         blocks += [replace(figure, beside=True) for figure in figures]
     else:
-        blocks += _build_spectra(data.case, motions)
+        blocks += _build_spectra(data, motions)
     return Section("Ground motion" if len(motions) == 1 else "Ground motions", blocks)
 
 
 def _list_missed_peaks(data: ReportData, share: float = 0.98) -> Iterator[str]:
     """Yield the peaks of motions that the steps of their runs do not meet."""
-    for name, motion in data.given_motions.items():
+    for name, motion in data.motions.items():
         met = float(np.abs(data.runs[name].dataset["ground"].values[:, 0]).max())
         # a run that ended early has not met them all
         if met < share * motion.pga and data.runs[name].time[-1] > 0.999 * motion.duration:
@@ -83,15 +83,16 @@ def _list_missed_peaks(data: ReportData, share: float = 0.98) -> Iterator[str]:
             yield f"of '{name}' {peaks} g"
 
 
-def _build_spectra(case: Case, motions: list[Motion]) -> list[Any]:
+def _build_spectra(data: ReportData, motions: list[Motion]) -> list[Any]:
     """Build the response spectra, beside the target spectrum if there is one."""
+    case, cut = data.case, ", up to the end of the run" * bool(data.cut_motions)
+    caption = f"Response spectra, 5 % damped, as applied{cut}"
     if case.suite is None:
-        return [FigureBlock.of(draw_spectra(motions), "Response spectra, 5 % damped, as applied.")]
+        return [FigureBlock.of(draw_spectra(motions), f"{caption}.")]
     scale, reduction = case.suite.get("scale", 1.0), case.suite.get("reduction", 1.0)
     # The suite multiplies by scale and divides by R; recorded motions are as applied.
     pairs = tuple(motion.scaled(reduction / scale) for motion in motions)
     suite = Suite(case.suite.get("name", "suite"), pairs, scale=scale, reduction=reduction)
-    caption = "Response spectra, 5 % damped, as applied"
     if case.suite.get("matched", False):
         caption += "; matched from {:g} to {:g} s".format(*DEFAULT_BAND)
     if reduction != 1.0:
