@@ -222,7 +222,8 @@ def describe_dead_load(result: DeadLoadResult, *, explain: bool = False) -> str:
         heads = result.dead.joints.isel(joint=structure.heads)
         lines[-1] += f"; of head joints, which do not count, {_describe_largest(heads)}"
     lines += describe_friction_margin(result.case, structure)
-    lines += filter(None, [structure.assessment, defaults(result.case)])
+    lines += filter(None, [structure.assessment, structure.transverse_remark])
+    lines += filter(None, [defaults(result.case)])
     if result.strength_use is not None:
         lines.append(f"dead load: {strength_use_text(result.strength_use)}")
     return "\n".join([*lines, *(f"{DOUBT_MARK}{doubt}" for doubt in result.doubts)])

@@ -432,15 +432,45 @@ class Structure(ResultDisplay):
     def assessment(self) -> str:
         """Which joints are assessed, and what is not, in words; empty where all are."""
         names, parts = zip(*((joint.name, joint.part) for joint in self.joints), strict=True)
-        text = describe_assessment(names, parts, self.judged, self.heads)
-        walls = {parts[number] for number in np.flatnonzero(self.heads)}
-        levels = [y for block in self.blocks if block.part in walls for _, y in block.points]
-        height = max(levels, default=0.0) - min(levels, default=0.0)
-        if self.width >= height:  # no wall in bond, or one that is no slab
+        return describe_assessment(names, parts, self.judged, self.heads)
+
+    @cached_property
+    def transverse_push(self) -> tuple[float, str]:
+        """Push across the plane that begins to overturn a body [g], and which body, in words.
+
+        All blocks above a level turn as one body about the edge of the width there, held by nothing
+        else; or a strip of a wall in bond from bottom to top. The push is undefined (NaN) for a
+        single stack, which may be drawn across its plane.
+        """
+        blocks = [self.blocks[number] for number in self.free]
+        ends = np.array([[block.points.min(axis=0), block.points.max(axis=0)] for block in blocks])
+        bottom, ground = ends[:, 0, 1], ends[:, 0, 1].min()
+        if ends[:, 0, 0].max() < ends[:, 1, 0].min():
+            return np.nan, ""
+        weights = np.array([block.area * block.material.unit_weight for block in blocks])
+        heights = np.array([block.centroid[1] for block in blocks])
+        pushes = {}
+        for level in np.unique(bottom):
+            above = bottom >= level
+            arm = np.average(heights[above], weights=weights[above]) - level
+            words = "all of it" if level == ground else f"all above {level - ground:.3g} m"
+            pushes[words] = 0.5 * self.width / float(arm)
+        if self.heads.any():
+            pushes["a strip from bottom to top"] = self.width / float(np.ptp(ends[:, :, 1]))
+        body = min(pushes, key=pushes.__getitem__)
+        return pushes[body], body
+
+    @property
+    def transverse_remark(self) -> str:
+        """What is not checked across the plane, in words, with the push that overturns it."""
+        push, body = self.transverse_push
+        text = "nothing is checked across the plane of the drawing"
+        if np.isnan(push):
             return text
+        loaded = any(self.blocks[number].material.stands_for for number in self.free)
         return (
-            f"{text}; across its plane, where a wall is usually weaker: it overturns from "
-            f"thickness / height, {self.width / height:.3g} g, on"
+            f"{text}: held by nothing else, {body} begins to overturn at {push:.3g} g"
+            f"{' or less' * loaded}, by the width over twice the height of its centre"
         )
 
     @cached_property

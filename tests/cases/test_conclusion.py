@@ -450,3 +450,36 @@ def test_the_head_of_a_push_says_when_it_begins_to_move(case):
     vars(data)["statements"] = {"limit": answers.Statement(["limit analysis"], [row])}
     begins = "a push begins to move it at 0.5 times the site's 0.2 g"
     assert dict(conclusion.list_facts(data))["verdict"] == begins
+
+
+@pytest.mark.parametrize(("ag", "overturns"), [(0.1, False), (0.2, True)])
+def test_a_demand_that_overturns_it_across_its_plane_is_in_the_conclusion(ag, overturns):
+    """An arch on piers that overturns across its plane at 0.15 g; a site of 1.2 ag."""
+    tables = {
+        "structure": {
+            "shape": "arch_on_piers",
+            "radius": 1.5,
+            "thickness": 0.4,
+            "voussoirs": 9,
+            "courses": [1.0],
+            "pier_breadth": 1.0,
+            "width": 0.5,
+        },
+        "assessment": {
+            "spectrum": {"code": "NTC-2018", "ag": ag, "f0": 2.4, "tc_star": 0.32, "site": "B"}
+        },
+    }
+    case = af.Case.of(tables)
+    push, _ = case.structure.transverse_push
+    assert 0.12 < push < 0.24
+    data = ReportData(case, {})
+    vars(data)["statements"] = {"limit": answers.Statement([], [])}
+    (block,) = conclusion._build_transverse(data)
+    assert block.text.startswith("Nothing is checked across the plane of the drawing: held by")
+    assert (block.manner == "doubt") is overturns
+    assert (f"; the demand of {1.2 * ag:.3g} g is {1.2 * ag / push:.2g} times" in block.text) is (
+        overturns
+    )
+    # a vehicle is no earthquake
+    vars(data)["statements"] = {"rating": answers.Statement([], [])}
+    assert conclusion._build_transverse(data) == []

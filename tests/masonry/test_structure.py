@@ -1,6 +1,7 @@
 """Structures: orientation of joints, arrays of them, names, and refused structures."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -196,3 +197,40 @@ def test_faces_that_both_extend_beyond_a_joint_end_with_it():
     short = af.Structure(blocks[1:], (replace(joint, blocks=(0, 1)),))
     assert short.end_slips.tolist() == [[0.0, 0.0]]
     assert short.overlaps(np.array([0.1]))[0] == pytest.approx([0.2])
+
+
+def test_a_push_across_the_plane_overturns_all_from_the_ground_on():
+    """A wall on two columns, 0.5 m wide: its own height is no measure of what overturns."""
+    ground = ((-1, -1), (4, -1), (4, 0), (-1, 0))
+
+    def stand(height, **plinth):
+        corners = [(0, 0, 0.4, height), (2, 0, 2.4, height), (0, height, 2.4, height + 1)]
+        outlines = [((a, b), (c, b), (c, d), (a, d)) for a, b, c, d in corners]
+        blocks = [af.Block(ground, af.STONE, "ground", fixed=True)]
+        blocks += [af.Block(outline, af.STONE, f"b{k}") for k, outline in enumerate(outlines)]
+        blocks[1:3] = (replace(b, material=replace(af.STONE, **plinth)) for b in blocks[1:3])
+        return af.masonry.assembled(blocks, af.Contact(1e9, 4e8), width=0.5)
+
+    areas, heights = np.array([0.8, 0.8, 2.4]), np.array([1.0, 1.0, 2.5])
+    middle = (areas @ heights) / areas.sum()
+    assert stand(2).transverse_push == (pytest.approx(0.25 / middle), "all of it")
+    # on low and heavy columns the wall overturns alone
+    heavy = stand(0.2, unit_weight=1e6, stands_for="ballast")
+    assert heavy.transverse_push == (pytest.approx(0.25 / 0.5), "all above 0.2 m")
+    assert "begins to overturn at 0.5 g or less, by the width" in heavy.transverse_remark
+    # of a strip of a wall in bond the height counts, of a single stack nothing is known
+    column = af.column(breadth=0.5, heights=[2.0, 1.0])
+    assert np.isnan(column.transverse_push[0])
+    assert column.transverse_remark == "nothing is checked across the plane of the drawing"
+
+
+def test_a_strip_of_a_gable_overturns_before_the_gable_does():
+    """Three courses of stones in bond, the upper ones shorter."""
+    rows = [(0, (0, 1, 2, 3, 4)), (1, (0.5, 1.5, 2.5, 3.5)), (2, (1, 2, 3))]
+    blocks = [af.Block(((0, -1), (4, -1), (4, 0), (0, 0)), af.STONE, "ground", fixed=True)]
+    for level, cuts in rows:
+        for a, b in pairwise(cuts):
+            outline = ((a, level), (b, level), (b, level + 1), (a, level + 1))
+            blocks.append(af.Block(outline, af.STONE, f"{level} {a}", part="wall", role="pier"))
+    gable = af.masonry.assembled(blocks, af.Contact(1e9, 4e8), width=0.6)
+    assert gable.transverse_push == (pytest.approx(0.6 / 3.0), "a strip from bottom to top")

@@ -16,6 +16,7 @@ from archfem.cases.case import REPORT_KEYS
 from archfem.cases.report.doubts import (
     HISTORIES,
     VARIATIONS,
+    describe_transverse,
     list_checks,
     list_decisive_doubts,
     list_doubts,
@@ -243,6 +244,7 @@ def build_conclusion(data: ReportData) -> Section:
         if data.statements.keys() != {"rating"}:  # of a result that stands alone each is one
             sentences = [" ".join(sentences)] if sentences else []
         blocks += [TextBlock(each, lead=lead * (k == 0)) for k, each in enumerate(sentences)]
+    blocks += _build_transverse(data)
     for result in filter(doubts.get, doubtful):
         ordered = sorted(doubts[result], key=weigh)
         shown = [sentence(str(replace(x, remedy=""))) for x in ordered[:MAX_DOUBTS]]
@@ -257,6 +259,13 @@ def build_conclusion(data: ReportData) -> Section:
         blocks.append(Grid(head, rows, f"Demand and capacity{factors}", "words"))
     blocks += map(TextBlock, _list_outdated(data))
     return Section("Conclusion", [*blocks, _build_signatures(data.case.report)])
+
+
+def _build_transverse(data: ReportData) -> list[TextBlock]:
+    """Build the paragraph on what is not checked across the plane."""
+    text, overturns = describe_transverse(data)
+    manner = "doubt" if overturns else "plain"
+    return [TextBlock(sentence(text), manner, lead="Across its plane?")] if text else []
 
 
 def _list_outdated(data: ReportData) -> Iterator[str]:

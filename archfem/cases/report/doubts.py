@@ -10,6 +10,7 @@ from archfem.cases.answers import RESULTS, Ratios, read_numbers
 from archfem.cases.report.motion_rules import note_checks
 from archfem.cases.report.report_data import ReportData
 from archfem.cases.report.study_findings import list_studied, read_study
+from archfem.cases.result_text import site_acceleration
 from archfem.dynamics.collapse_state import COLLAPSE_STATES, FALLEN_STATES, RANGE_REMEDY
 from archfem.dynamics.history import History
 from archfem.dynamics.verdict_range import MAX_RATIO_OF_DISPLACEMENTS, VerdictRange
@@ -129,6 +130,26 @@ def list_notes(data: ReportData) -> dict[str, list[str]]:
                 "margin is not one on the demand of the time histories"
             )
     return notes
+
+
+def describe_transverse(data: ReportData) -> tuple[str, bool]:
+    """Say what is not checked across the plane, and whether the demand overturns it there.
+
+    It is empty where no result is of an earthquake.
+    """
+    structure = data.case.structure
+    if not data.runs and not data.statements.keys() - {"rating", "thickness"}:
+        return "", False
+    peaks = [*map(peak_of_ground, data.runs.values()), site_acceleration(data.case)]
+    known = [peak for peak in peaks if np.isfinite(peak)]
+    push, _ = structure.transverse_push
+    if not known or not push < max(known):
+        return structure.transverse_remark, False
+    times = max(known) / push
+    text = (
+        f"{structure.transverse_remark}; the demand of {max(known):.3g} g is {times:.2g} times that"
+    )
+    return text, True
 
 
 def list_elastic_fill(data: ReportData) -> list[str]:
