@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from archfem._validation import check_choice, declared_keys, validate_methods
+from archfem._validation import check_choice, check_number, declared_keys, validate_methods
 from archfem.cases.motion_keys import build_spectrum
 from archfem.cases.structure_keys import find_table
 from archfem.cases.toml_file import Table, check_table, read_object
@@ -54,6 +54,8 @@ class LimitAnalysis:
             the least that [materials] give; None, or infinite for "none", without crushing.
         fill: strength of the fill, or None.
         dead: loads beside self-weight that do not grow.
+        demand: peak acceleration of the ground that pushes are compared with [m/s²]; by default
+            that of the spectrum of [assessment], or of the target of [suite].
     """
 
     live: Sequence[Action]
@@ -61,6 +63,7 @@ class LimitAnalysis:
     strength: float | None = None
     fill: Fill | PlasticFill | None = None
     dead: Sequence[Action] = ()
+    demand: float | None = None
 
     @property
     def resistance(self) -> dict[str, Any]:
@@ -179,7 +182,7 @@ _LOAD_KEYS = declared_keys(BodyForce) | {"point": (dict, [dict]), "dead": [dict]
 
 def limit_keys() -> dict[str, Any]:
     """Return the keys of [limit]."""
-    return _keys_beside(collapse_factor, "live", "dead") | _LOAD_KEYS
+    return _keys_beside(collapse_factor, "live", "dead") | _LOAD_KEYS | {"demand": "m/s**2"}
 
 
 def pushover_keys() -> dict[str, Any]:
@@ -216,7 +219,9 @@ def parse_limit(table: Any, strength: float | None = None) -> LimitAnalysis:
     given = values.get("strength", strength)
     if "strength" in values and given is None:  # "none"
         given = np.inf
-    return LimitAnalysis(live, friction, given, fill, dead)
+    if (demand := values.get("demand")) is not None:
+        check_number(demand, "limit.demand [m/s²]", minimum=1e-3)
+    return LimitAnalysis(live, friction, given, fill, dead, demand)
 
 
 def parse_pushover(table: Any) -> PushoverSettings:

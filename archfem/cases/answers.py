@@ -35,6 +35,10 @@ RESULTS = {
 }
 
 
+# Demand of a push that is compared with none
+NO_DEMAND = "no demand given"
+
+
 class Row(NamedTuple):
     """One result among the capacities, in words, with the numbers that sentences are made of."""
 

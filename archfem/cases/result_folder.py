@@ -11,7 +11,7 @@ from pathlib import Path
 from archfem import _files
 from archfem._optional import can_film
 from archfem._validation import validate_arguments, validate_methods
-from archfem.cases.answers import state_outcome
+from archfem.cases.answers import NO_DEMAND, state_outcome
 from archfem.cases.case import Case
 from archfem.cases.provenance import list_input_files
 from archfem.cases.result_text import PushFactors, compare_push, compare_with_site
@@ -192,7 +192,7 @@ def limit_files(case: Case, collapse: Collapse, text: str, doubts: Sequence[str]
     joints = collapse.joints.to_dataframe()[columns].to_csv(index=False).rstrip()
     site = compare_with_site(case, collapse)
     # without a site the factor of a push would be read as one on a demand
-    demand = "no demand given" if collapse.push else "the given load"
+    demand = NO_DEMAND if collapse.push else "the given load"
     if not collapse.push and collapse.outcome is Outcome.COLLAPSES:
         site = PushFactors(*collapse.range)
     given = collapse.sentence, doubts, demand, site

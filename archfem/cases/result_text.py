@@ -391,7 +391,9 @@ def _compare_senses(found: Collapse, opposite: Collapse) -> str:
 
 
 def site_acceleration(case: Case) -> float:
-    """Return the ground acceleration of the site's spectrum [g]; undefined (NaN) without one."""
+    """Return the ground acceleration of [limit] or the site's spectrum [g]; else NaN."""
+    if case.limit.demand is not None:
+        return case.limit.demand / STANDARD_GRAVITY
     spectrum = case.assessment.spectrum or case.target
     return float(spectrum.horizontal(0.0)) if spectrum is not None else np.nan
 
@@ -462,8 +464,12 @@ def compare_push(case: Case, low: float, high: float, unit: float = 1.0) -> Push
     if np.isnan(ground):
         return None
     rock = getattr(spectrum, "ag", None)
-    size = f"{ground:.3g} g" if rock is None else f"{rock:.3g} g × S {ground / rock:.3g}"
-    return PushFactors(low * unit / ground, high * unit / ground, f"the site's {size}")
+    size = f"the site's {ground:.3g} g"
+    if case.limit.demand is not None:
+        size = f"the demand of {ground:.3g} g"
+    elif rock is not None:
+        size = f"the site's {rock:.3g} g × S {ground / rock:.3g}"
+    return PushFactors(low * unit / ground, high * unit / ground, size)
 
 
 def describe_pushover(push: Pushover) -> str:

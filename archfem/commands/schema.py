@@ -198,7 +198,7 @@ def _limit() -> Schema:
     """Return the schema of [limit]."""
     return _table(
         analysis_keys.limit_keys(),
-        (collapse_factor, BodyForce),
+        (analysis_keys.LimitAnalysis, collapse_factor, BodyForce),
         point=_one_or_several(_table_of(PointLoad)),
         friction=_choice(*analysis_keys.FRICTION_LAWS),
         fill=_fill(),

@@ -12,6 +12,8 @@ from archfem.cases import answers
 from archfem.cases.report import conclusion, doubts, sections
 from archfem.cases.report.report_data import ReportData
 from archfem.cases.result_text import PushFactors
+from archfem.cases.result_text import site_acceleration
+from archfem.cases.toml_file import format_tables
 from archfem.dynamics import VerdictRange
 from archfem.dynamics.collapse_state import RANGE_REMEDY
 from archfem.models.model import Doubt, read_doubts, write_doubts
@@ -483,3 +485,59 @@ def test_a_demand_that_overturns_it_across_its_plane_is_in_the_conclusion(ag, ov
     # a vehicle is no earthquake
     vars(data)["statements"] = {"rating": answers.Statement([], [])}
     assert conclusion._build_transverse(data) == []
+
+
+@pytest.mark.parametrize("demand", [None, "0.2 g"])
+def test_a_push_is_compared_with_a_demand_in_numbers_and_words_are_not_read(demand, tmp_path):
+    """A stone 0.5 m broad and 1 m high, which a push of 0.5 g overturns."""
+    tables = {
+        "title": "a stone",
+        "structure": {"shape": "column", "breadth": 0.5, "heights": [1.0]},
+        "contacts": {"stone to stone": {"friction": 0.8}},
+        "limit": {"horizontal": 1.0},
+        "report": {"demand": "0.3 g at the ground"},
+    }
+    if demand is not None:
+        tables["limit"]["demand"] = demand
+    path = tmp_path / "stone.toml"
+    path.write_text(format_tables(tables), encoding="utf-8")
+    assert af.commands.main(["limit", str(path), "--out", str(tmp_path / "out")]) == 0
+    found = af.cases.open_results(tmp_path / "out")
+    data = ReportData(found.case, {}, found.folder)
+    *blocks, table, _ = conclusion.build_conclusion(data).pieces
+    text = " ".join(block.text for block in blocks)
+    assert "Demand, as stated: 0.3 g at the ground." in text
+    verdict = dict(conclusion.list_facts(data))["verdict"]
+    ((_, shown, _, factor),) = table.rows
+    if demand is None:
+        assert (shown, factor) == (conclusion.UNCOMPARED, "-")
+        assert verdict.startswith(f"{conclusion.UNCOMPARED}: ")
+    else:
+        assert (shown, factor) == ("the demand of 0.2 g", "2.5")
+        assert verdict == "a push begins to move it at 2.5 times the demand of 0.2 g"
+        assert "A push of 2.5 times the demand of 0.2 g begins to move it" in text
+    assert answers.NO_DEMAND not in text + verdict + shown
+
+
+def test_runs_beyond_the_push_of_a_demand_say_nothing_of_it():
+    """A run of 0.3 g that moves; a push of twice the demand is more than that, or less."""
+    case = af.Case.of({"structure": {"shape": "column", "breadth": 0.5, "heights": [1.0]}})
+    data = data_of(case, a=verdict_of("stands", verified="rocks"))
+    run = data.runs["a"]
+    run.dataset.attrs["pga"] = 0.3 * 9.80665
+    assert conclusion._say_motion(data, 2.0, 0.2) == "in the runs it moves, and falls in none"
+    assert conclusion._say_motion(data, 2.0, 0.1) == ""
+    assert conclusion._say_motion(data, 2.0, np.nan) != ""
+
+
+def test_a_demand_of_limit_analysis_comes_before_that_of_the_site():
+    tables = {
+        "structure": {"shape": "column", "breadth": 0.5, "heights": [1.0]},
+        "limit": {"horizontal": 1.0, "demand": "2.5 m/s**2"},
+        "assessment": SPECTRUM,
+    }
+    assert site_acceleration(af.Case.of(tables)) == pytest.approx(2.5 / 9.80665)
+    del tables["limit"]["demand"]
+    assert site_acceleration(af.Case.of(tables)) == pytest.approx(0.2)
+    with pytest.raises(af.errors.InvalidInput, match=r"limit.demand"):
+        af.Case.of({**tables, "limit": {"horizontal": 1.0, "demand": 0.0}})

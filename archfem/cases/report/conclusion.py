@@ -11,7 +11,7 @@ import numpy as np
 
 from archfem._files import read_file_list
 from archfem.cases import result_text
-from archfem.cases.answers import RESULTS, Ratios, Row, Scales, read_numbers
+from archfem.cases.answers import NO_DEMAND, RESULTS, Ratios, Row, Scales, read_numbers
 from archfem.cases.case import REPORT_KEYS
 from archfem.cases.report.doubts import (
     HISTORIES,
@@ -30,7 +30,7 @@ from archfem.cases.report.doubts import (
 )
 from archfem.cases.report.report_data import SHOWN_RESULTS, ReportData
 from archfem.cases.report.study_findings import read_study, say_what_changes
-from archfem.cases.result_text import PushFactors, format_ends
+from archfem.cases.result_text import PushFactors, format_ends, site_acceleration
 from archfem.dynamics.collapse_state import COLLAPSE_STATES, FALLEN_STATES, CollapseState
 from archfem.dynamics.history import History
 from archfem.dynamics.motion_scaling import UNFINISHED
@@ -98,6 +98,9 @@ _NUMBERED = {"limit", "pushover", "assessment", "scale"}
 # What commands keep of results that they have not finished
 _BEGUN = {RESULTS["risk"]: "risk_samples.nc", RESULTS["verdict_range"]: "variations"}
 
+# Demand of a push beside one that the report states in words
+UNCOMPARED = "not compared with the demand, which [limit] does not give"
+
 # Project in the templates of new cases
 PLACEHOLDER = "Name of the project"
 
@@ -139,7 +142,7 @@ def _say_factors(data: ReportData) -> Iterator[str]:
     """Yield the factors of results without runs; those of checks and vehicles are said apart."""
     for result, row in _capacity_rows(data):
         said = result in (RESULTS["assessment"], RESULTS["rating"])
-        if said or (row.factor == "-" and row.demand != "no demand given"):
+        if said or (row.factor == "-" and row.demand not in (NO_DEMAND, UNCOMPARED)):
             continue
         text = f"{row.demand}: {row.outcome}" + f", factor {row.factor}" * (row.factor != "-")
         begins = result in PUSHES and row.numbers.get("site")
@@ -190,7 +193,7 @@ def _say_checks(data: ReportData) -> Iterator[str]:
         elif check.least < 1.0:
             met = "is not met"
         elif check.moved is not None:
-            moves = _say_motion(data, check.least)
+            moves = _say_motion(data, check.least, peak_of_spectrum(data))
             met = "is met at rest" + " alone, and it moves" * bool(moves)
             by = f"{check.moved:.3g} by displacements"
         kind = "check" if check.linear else "displacement check"
@@ -369,12 +372,14 @@ def _describe_margin(data: ReportData) -> Iterator[str]:
             yield from _describe_push(data, name, push) if push.site else ()
         for row in data.statements[name].rows:
             if row.factor == "-" and data.runs:  # without runs it is the answer
-                yield f"{row.result}, beside no demand: {row.outcome}"
+                beside = UNCOMPARED if data.case.report.get("demand") else "beside no demand"
+                yield f"{row.result}, {beside}: {row.outcome}"
 
 
 def _describe_push(data: ReportData, name: str, push: PushFactors) -> Iterator[str]:
     """Yield at which multiple of the site's acceleration a push begins to move a structure."""
-    elastic, moves = name == "pushover", _say_motion(data, push.least)
+    elastic = name == "pushover"
+    moves = _say_motion(data, push.least, site_acceleration(data.case))
     bounded = push.proved is not None  # the least found, without proof that none is less
     of = " with elastic joints" if elastic else " as rigid blocks" * bounded
     over = " over what is assumed of the fill" * (push.most > push.least)
@@ -390,7 +395,10 @@ def _describe_push(data: ReportData, name: str, push: PushFactors) -> Iterator[s
 def _describe_check(data: ReportData, check: Ratios) -> tuple[float, list[str]]:
     """Return the ratio of a check of an assessment, and its sentences."""
     over = " over what is assumed of the fill" * (check.most > check.least)
-    by, moves = f"on {name_spectrum(data)}, by {check.name}", _say_motion(data, check.least)
+    by, moves = (
+        f"on {name_spectrum(data)}, by {check.name}",
+        _say_motion(data, check.least, peak_of_spectrum(data)),
+    )
     if check.moved is not None and moves:  # what moves at less than the push that begins it is
         begins = f"the check passes for what is at rest, and {moves}"  # judged by how far
         return check.moved, [f"{check.moved:.3g} by displacements, {by}", begins]
@@ -434,12 +442,12 @@ def _describe_scales(data: ReportData) -> Iterator[tuple[float, list[str]]]:
     yield first.held, texts
 
 
-def _say_motion(data: ReportData, factor: float) -> str:
+def _say_motion(data: ReportData, factor: float, site: float) -> str:
     """Say that a structure moves in a run no stronger than a multiple of the site's acceleration.
 
     It is empty if it moves in none. Without a spectrum the runs are the demand.
     """
-    push = np.nan_to_num(factor * peak_of_spectrum(data), nan=np.inf)
+    push = np.nan_to_num(factor * site, nan=np.inf)
     runs = [run for run in data.runs.values() if peak_of_ground(run) <= push]
     verdicts = [run.verdict for run in runs]
     if not any(x.mechanisms.get("verified") or x.outcome in FALLEN_STATES for x in verdicts):
@@ -498,10 +506,12 @@ def _capacity_rows(data: ReportData) -> Iterator[tuple[str, Row]]:
     for result, statement in data.statements.items():
         of = f" of {name_spectrum(data)}" if result == "assessment" else ""
         for row in statement.rows:
-            beside = of
-            if data.runs and row.demand == "no demand given":
-                beside = f"; beside it motions of {_describe_peaks(data.runs.values())}"
-            yield RESULTS[result], row._replace(demand=f"{row.demand}{beside}")
+            demand = f"{row.demand}{of}"
+            if row.demand == NO_DEMAND:
+                demand = UNCOMPARED if data.case.report.get("demand") else NO_DEMAND
+                peaks = _describe_peaks(data.runs.values()) if data.runs else ""
+                demand += f"; beside it motions of {peaks}" * bool(peaks)
+            yield RESULTS[result], row._replace(demand=demand)
 
 
 def _list_ranges_of_steps(data: ReportData) -> Iterator[str]:
