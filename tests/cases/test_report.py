@@ -31,6 +31,7 @@ from archfem.cases.report.sections import (
     _build_rating,
     build_input_section,
     build_sections,
+    build_source_section,
     build_structure_section,
 )
 from archfem.cases.result_text import ResultTable
@@ -615,6 +616,21 @@ def test_materials_that_differ_in_weight_alone_stand_once():
     weights["m2"]["young"] = 1e10
     rows = tabulate_inputs(report_data.ReportData(af.Case.of(data.case.settings), {})).rows
     assert {name for name, *_ in rows} > {"m2: weight", "m1 and 1 more: weight"}
+
+
+def test_the_listed_case_has_seven_digits_and_is_still_one():
+    third = {"shape": "column", "breadth": 1.0 / 3.0, "heights": [1.0, 20.0 / 3.0]}
+    data = report_data.ReportData(af.Case.of({"structure": third, "title": "pier"}), {})
+    *_, note, listing = build_source_section(data).pieces
+    assert note.text.startswith("Numbers of the case to seven digits")
+    assert "breadth = 0.3333333\nheights = [1.0, 6.666667]" in listing.text
+    assert af.Case.of(tomllib.loads(listing.text)).structure.weight == pytest.approx(
+        data.case.structure.weight, rel=1e-6
+    )
+    data.case.settings["structure"] |= {"breadth": 0.25, "heights": [1.0, 2.0]}
+    *_, table, listing = build_source_section(data).pieces
+    assert table.kind == "grid"
+    assert "breadth = 0.25" in listing.text
 
 
 def test_stiffness_by_a_finish_is_inferred_and_numbers_have_their_units():

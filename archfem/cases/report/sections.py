@@ -1,7 +1,7 @@
 """Sections of a report: inputs, structure, capacity, further results, methods, sources."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import nullcontext, suppress
 from csv import reader
 from dataclasses import replace
@@ -30,6 +30,7 @@ from archfem.cases.report.response import (
 )
 from archfem.cases.report.study_findings import read_study, tabulate_study
 from archfem.cases.run import DRAWING_FILE
+from archfem.cases.toml_file import format_tables, parse_tables
 from archfem.dynamics.collapse_state import DISLOCATION, FALLEN_STATES, shallowest_part
 from archfem.dynamics.history import SIGN_CONVENTION
 from archfem.dynamics.recorder import library_versions
@@ -466,6 +467,20 @@ def build_source_section(data: ReportData) -> Section:
         for name, run in runs
         if "inputs" in run.dataset.attrs
     ]
-    rows.append(("SHA-256 of the case", sha256(data.case.text().encode()).hexdigest()))
-    blocks = [Grid((), rows), TextBlock(data.case.text(), "lines")]
+    text = data.case.text()
+    rows.append(("SHA-256 of the case", sha256(text.encode()).hexdigest()))
+    listed, note = format_tables(_round_numbers(parse_tables(text))), list[TextBlock]()
+    if listed.strip() != text.strip():
+        words = "Numbers of the case to seven digits; those of its digest are in `case.toml`."
+        note.append(TextBlock(words))
+    blocks = [Grid((), rows), *note, TextBlock(listed, "lines")]
     return Section("Versions, digests and the case as a file", blocks)
+
+
+def _round_numbers(value: Any) -> Any:
+    """Return a table with its numbers at seven digits, within a micrometre of a length of 10 m."""
+    if isinstance(value, Mapping):
+        return {key: _round_numbers(each) for key, each in value.items()}
+    if isinstance(value, list):
+        return [*map(_round_numbers, value)]
+    return float(f"{value:.7g}") if isinstance(value, float) else value

@@ -8,7 +8,14 @@ from chromium import BROWSER, browser, complaints, opened, printed
 
 import archfem as af
 from archfem.cases.run import carry_out, replace_run
-from archfem.view.pages.document import Document, Section, TextBlock, print_page
+from archfem.view.pages.document import (
+    Document,
+    Grid,
+    Section,
+    TextBlock,
+    print_page,
+    write_page,
+)
 from archfem.view.pages.player_data import Outlines
 from archfem.view.style import new_figure
 
@@ -280,6 +287,27 @@ def test_time_and_joint_of_the_player_are_set_by_keyboard(rocked, tmp_path):
         )
         readout = driver.find_element("css selector", ".player-readout").text
         assert model.structure.joints[-1].name in readout
+
+
+def test_no_page_is_left_blank_before_a_listing_or_after_a_short_table(tmp_path):
+    """A listing of more than a page; tables of one row and of two, above a heading."""
+    pypdf = pytest.importorskip("pypdf")
+    if BROWSER is None:
+        pytest.skip("there is no chromium")
+    short = [Grid(("a", "b"), [("row", "1")]), Grid(("a", "b"), [("row", "2"), ("row", "3")])]
+    listing = TextBlock("\n".join(f"line {k}" for k in range(600)), "lines")
+    sections = [
+        Section("Tables", [*[TextBlock("words " * 40)] * 12, *short]),
+        Section("Listing", [Grid(("a", "b"), [("row", f"{k}") for k in range(8)]), listing]),
+    ]
+    page = write_page(tmp_path / "page.html", Document("", "", [], sections).page)
+    pages = pypdf.PdfReader(print_page(page, tmp_path / "page.pdf")).pages
+    texts = [each.extract_text() for each in pages]
+    assert "row 3" in texts[0]
+    listed = [text for text in texts if "line " in text]
+    assert len(listed) > 1
+    assert "Listing" in listed[0]
+    assert all(len(text.split()) > 20 for text in texts)
 
 
 def test_a_report_is_printed_as_pdf(small, tmp_path):
