@@ -11,8 +11,7 @@ import archfem as af
 from archfem.cases import answers
 from archfem.cases.report import conclusion, doubts, sections
 from archfem.cases.report.report_data import ReportData
-from archfem.cases.result_text import PushFactors
-from archfem.cases.result_text import site_acceleration
+from archfem.cases.result_text import PushFactors, site_acceleration
 from archfem.cases.toml_file import format_tables
 from archfem.dynamics import VerdictRange
 from archfem.dynamics.collapse_state import RANGE_REMEDY

@@ -202,6 +202,7 @@ def test_demand_and_capacity_stand_beside_their_doubts(kept, undrawn):
         "were not varied, and displacements have no range.",
     ]
     assert texts[4:] == [
+        "Nothing is checked across the plane of the drawing.",
         "In doubt, limit analysis: A made one.",
         "In doubt, kinematic assessment: It is an upper bound.",
         "Note, kinematic assessment: Faces slide flat.",
