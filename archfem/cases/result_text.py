@@ -120,7 +120,8 @@ def tabulate_runs(runs: Mapping[str, History]) -> ResultTable:
         row.append(str(joints["name"].values[int(largest.values.argmax())]))
         row.append(format_ratio(float(joints["friction"].max())))
         row.append(f"{int(apart.sum())} joints" if apart.any() else "-")
-        sizes = map(format_mm, (verdict.displacement, verdict.residual))
+        sizes = [format_mm(verdict.displacement), format_mm(verdict.residual)]
+        sizes[1] += " (moving)" * (verdict.fall is not None and not verdict.fall.resting)
         row += ["-", "-"] if verdict.outcome in FALLEN_STATES else sizes  # the way to the ground
         row += [_mechanism_cell(verdict.mechanisms, definition) for definition in ALL_DEFINITIONS]
         rows.append([*row, f"{endings.get(run.ending, run.ending)} {run.time[-1]:.2f} s"])

@@ -32,6 +32,7 @@ from archfem.dynamics.rigid_body.simulation import (
     RigidBlockSimulation,
 )
 from archfem.dynamics.rigid_body.time_stepping import MAX_ENERGY_GAIN
+from archfem.dynamics.rocking_body import doubt_courses
 from archfem.dynamics.schemes import StiffnessDamping, Viscous
 from archfem.dynamics.separation import is_overturning, is_resting, swings_little
 from archfem.dynamics.state import State
@@ -117,12 +118,17 @@ def follow_fall(
         resting = is_resting(model, state, shaken=ending is not Ending.FINISHED)
         resting = resting or swings_little(history)
         fall = replace(classify_collapse(structure, [frame], origin), resting=resting)
+    # frames begin where blocks became loose, and a rocking block may have come back before
+    farthest = max(fall.displacement, float(history.dataset.attrs["displacement"]))
+    fall = replace(fall, displacement=farthest)
     # throughout the last fifth, in which a record changes its sign
     push = motion.horizontal * np.sign(motion.horizontal[-1])
     held = bool(push[-len(push) // 5 :].min() > 0.5 * np.abs(push).max())
     doubts += doubt_collapse(structure, fall, held)
     if fall.kind in FALLEN_STATES and whole:
         doubts += _doubt_joints(structure, motion, start.time)
+    if whole and start.time == 0.0 and ending is not Ending.EVENT:
+        doubts += doubt_courses(structure, fall, motion)
     return with_fall(history, fall).with_doubts((*history.doubts, *doubts))
 
 

@@ -203,8 +203,8 @@ class History(ResultDisplay):
         model of small displacements; damping that drags loose blocks; a missed tolerance of the
         steps; constant steps that are long for sliding; a fidelity that does not suit a block; a
         predicted error above its tolerance; a run that was broken off; soft blocks that fall in one
-        piece; and joints between stones that fail and are not assessed. The last need the
-        structure.
+        piece; a stack that as one rigid body falls, stands or moves otherwise; and joints between
+        stones that fail and are not assessed. The last need the structure.
         """
         text = str(self.dataset.attrs.get("doubts", "[]"))
         if not text.startswith("["):  # files of earlier versions have a line for each
@@ -534,9 +534,8 @@ def _check_structure(path: str | Path, dataset: xr.Dataset, structure: Structure
 
 def with_fall(history: History, fall: CollapseState) -> History:
     """Return a history with the state of collapse at its end."""
-    attrs = history.dataset.attrs
     dataset = history.dataset.assign_attrs(
-        displacement=max(float(attrs["displacement"]), fall.displacement),
+        displacement=fall.displacement,
         residual=fall.residual,
         fall=fall.kind,
         fall_time=np.nan if fall.time is None else fall.time,

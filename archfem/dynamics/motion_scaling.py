@@ -24,6 +24,7 @@ from archfem.dynamics.collapse_state import FALLEN_STATES, CollapseState, doubt_
 from archfem.dynamics.events import EveryMechanism, applicable_definitions
 from archfem.dynamics.history import Ending, History, first_mechanisms, partial_history
 from archfem.dynamics.recorder import Record
+from archfem.dynamics.rocking_body import find_rocking_body
 from archfem.dynamics.schemes import EffectiveDamping, Viscous
 from archfem.dynamics.solvers.integrator import Stepper
 from archfem.dynamics.time_history import time_history
@@ -427,12 +428,15 @@ class CollapseScale:
         pga: peak of the motion [m/s²].
         of_model: doubts that concern every run, whatever its scale.
         longer: runs made before, with steps too long for sliding; no bound rests on them.
+        as_one: smallest scale at which a stack falls as one rigid body, infinite for none; None of
+            other structures [-].
     """
 
     searches: dict[float, MechanismScales]
     pga: float | None = None
     of_model: tuple[Doubt, ...] = ()
     longer: dict[float, MechanismScales] = field(default_factory=dict)
+    as_one: float | None = None
 
     @property
     def sentence(self) -> str:
@@ -452,7 +456,11 @@ class CollapseScale:
             less = " or less" * ("moves in all" in self.states)
             met = f"a mechanism from {self.moves:#.3g} ×{less}, {met}"
         met = f"{UNFINISHED}, {met}" if self.interrupted else met
-        return _say_bracket("stands", self.held, self.pga, met)
+        text = _say_bracket("stands", self.held, self.pga, met)
+        if self.as_one is None:
+            return text
+        falls = f"falls from {self.as_one:#.3g} × on"
+        return f"{text}; as one rigid body it {falls if self.as_one < inf else 'falls at none'}"
 
     def __repr__(self) -> str:
         """Return this, how closely scales were run, and what was varied."""
@@ -755,4 +763,11 @@ def collapse_scale(
         longer |= searches
         steps = [shorter, 0.5 * shorter]
         searches = _search_steps(search, steps)
-    return CollapseScale(searches, motion.pga, doubt_soft_blocks(begin.model.structure), longer)
+    structure, body = begin.model.structure, find_rocking_body(begin.model.structure)
+    found = CollapseScale(searches, motion.pga, doubt_soft_blocks(structure), longer)
+    if body is None:
+        return found
+    largest = max(run.scale for made in searches.values() for run in made.runs)
+    # half of the push that turns it, which a vertical motion may lower
+    least = max(limits[0], 0.5 * body.start / max(motion.pga, 1e-3))
+    return replace(found, as_one=body.first_fall(motion, (min(least, largest), largest)))

@@ -121,9 +121,12 @@ class Verdict:
         lines = [self.headline, *(f"{DOUBT_MARK}{doubt}" for doubt in self.doubts)]
         lines += [self.assessed] if self.assessed else []
         if not np.isnan(self.displacement):
+            # what still rocks has no residual displacement
+            moves = self.fall is not None and not self.fall.resting
+            end = format_mm(self.residual) + " at the end, while blocks still move" * moves
             lines.append(
-                f"largest displacement of a corner {format_mm(self.displacement)}, residual "
-                f"{format_mm(self.residual)}; not varied"
+                f"largest displacement of a corner {format_mm(self.displacement)}, "
+                f"{'' if moves else 'residual '}{end}; not varied"
             )
         # definitions with the same mechanism share a line
         groups: dict[str, list[str]] = {}

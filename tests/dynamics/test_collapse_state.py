@@ -132,15 +132,22 @@ def test_a_kind_of_collapse_near_another_is_doubted(kind, displacement, residual
 
 
 @pytest.mark.parametrize(
-    ("kind", "resting", "doubted"),
-    [("stands", False, False), ("dislocated", True, False), ("dislocated", False, True)],
+    ("kind", "largest", "end", "resting", "doubted"),
+    [
+        ("stands", 0.009, 0.008, False, False),  # moves by less than would dislocate it, 10 mm
+        ("stands", 0.03, 0.008, False, True),
+        ("dislocated", 0.03, 0.02, True, False),
+        ("dislocated", 0.03, 0.012, False, True),
+    ],
 )
-def test_a_dislocation_of_blocks_that_still_move_is_doubted(kind, resting, doubted):
+def test_what_has_moved_far_and_does_not_rest_is_doubted(kind, largest, end, resting, doubted):
+    """In place of a residual displacement near its limit, which a phase of rocking is not."""
     column = af.column(breadth=0.1, heights=[0.3])
-    state = collapse_state.CollapseState(kind, None, (), 0.03, 0.02, resting)
+    state = collapse_state.CollapseState(kind, None, (), largest, end, resting)
     for held, remedy in ((False, "motion.rest=10"), (True, "hold the push longer")):
         doubts = list(collapse_state.doubt_collapse(column, state, held))
         assert [doubt.cause for doubt in doubts] == doubted * [
-            "blocks still move at the end: they may come back from 20 mm, or go farther"
+            "blocks still move at the end: they may come back from "
+            f"{1e3 * end:.0f} mm, or go farther"
         ]
         assert all(remedy in doubt.remedy for doubt in doubts)

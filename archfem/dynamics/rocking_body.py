@@ -1,0 +1,208 @@
+"""A stack of blocks as one rigid body that rocks on its weakest joint.
+
+A body of mass m and moment of inertia I about its centroid c turns by θ about an end P of its foot,
+with r = c - P turned by θ. With the ground's acceleration a and I_P = I + m r²,
+
+    I_P θ'' = m [r_y a_x - r_x (g + a_y)].
+
+Where θ returns to zero, the body lands on the other end Q without bouncing. The angular momentum
+about Q remains: θ' is multiplied by (I + m r_P·r_Q) / I_Q.
+
+References:
+    Housner, Bull. Seismol. Soc. Am. 53 (1963) 403.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import cos, hypot, inf, isfinite, log, pi, sin
+from typing import NamedTuple
+
+import numpy as np
+
+from archfem.dynamics.collapse_state import (
+    DISLOCATION,
+    FALLEN_STATES,
+    CollapseState,
+    shallowest_part,
+)
+from archfem.dynamics.rigid_body.bodies import masses_of
+from archfem.masonry.stiffness_ratio import find_yielding_blocks
+from archfem.masonry.structure import Structure
+from archfem.models.model import Doubt
+from archfem.motion.motion import Motion
+
+# Step of the integration, and time after a motion in which a body falls or comes to rest [s]: the
+# least pulses that overturn a block are those of exact integration to 0.1 %
+STEP, REST = 1e-3, 20.0
+
+# Ratio of scales that are run for the first fall [-]
+SCALE_RATIO = 1.05
+
+# Rotation from which a body is lost, as any block [rad]
+LOST = pi / 4.0
+
+
+class Rocking(NamedTuple):
+    """Response of a rocking body."""
+
+    time: float  # of its fall; infinite where it stands [s]
+    displacement: float  # the largest of a corner [m]
+
+
+@dataclass(frozen=True)
+class RockingBody:
+    """One rigid body on a foot, turning about its right or left end."""
+
+    joint: str  # name of the joint on which it rocks
+    arms: tuple[tuple[float, float], ...]  # from the right and the left end to the centroid [m]
+    inertia: float  # moment of inertia about the centroid, over the mass [m²]
+    reach: tuple[float, ...]  # distance of the farthest corner from these ends [m]
+    gravity: float  # [m/s²]
+    friction: float  # of the foot [-]
+
+    @property
+    def foot(self) -> tuple[float, float]:
+        """Direction of the foot, from its left to its right end (2,)."""
+        (right, high), (left, low) = self.arms
+        length = hypot(left - right, low - high)
+        return (left - right) / length, (low - high) / length
+
+    @property
+    def start(self) -> float:
+        """Least horizontal acceleration that turns it [m/s²]."""
+        return min(self.gravity * abs(x) / y for x, y in self.arms)
+
+    def rock(self, motion: Motion, scale: float = 1.0) -> Rocking | None:
+        """Return the response to a multiple of a motion; None if the body slides."""
+        steps = int((motion.duration + REST) / STEP)
+        ground = scale * motion.at(STEP * (np.arange(steps) + 0.5)) + (0.0, self.gravity)
+        shaken = np.flatnonzero(np.any(ground != (0.0, self.gravity), axis=1)).max(initial=0)
+        angle, speed, farthest, side = 0.0, 0.0, 0.0, 0
+        for k, (across, up) in enumerate(ground.tolist()):
+            is_still = angle == speed == 0.0
+            if is_still:
+                if k > shaken:
+                    break
+                x, y = self.arms[1]
+                side = int(y * across > x * up)  # about the left end, or else the right one
+            turn = self._accelerate((angle, speed, side), across, up)
+            if turn is None:
+                return None
+            if turn or not is_still:
+                angle, speed, side = self._advance(angle, speed, side, turn)
+                farthest = max(farthest, 2.0 * self.reach[side] * sin(0.5 * abs(angle)))
+                if abs(angle) > LOST:
+                    return Rocking(STEP * (k + 1), farthest)
+        return Rocking(inf, farthest)
+
+    def _accelerate(
+        self, state: tuple[float, float, int], across: float, up: float
+    ) -> float | None:
+        """Return θ'' under accelerations of ground and weight; None if the body slides or lifts."""
+        angle, speed, side = state
+        x, y = self.arms[side]
+        c, s = cos(angle), sin(angle)
+        x, y = x * c - y * s, x * s + y * c
+        turn = (y * across - x * up) / (self.inertia + x * x + y * y)
+        if angle == speed == 0.0 and turn * (2 * side - 1) <= 0.0:
+            turn = 0.0
+        # the force on the foot, over the mass, along it and normal to it
+        force = across - y * turn - x * speed**2, up + x * turn - y * speed**2
+        along = force[0] * self.foot[0] + force[1] * self.foot[1]
+        normal = force[1] * self.foot[0] - force[0] * self.foot[1]
+        return turn if abs(along) <= self.friction * normal else None
+
+    def _advance(
+        self, angle: float, speed: float, side: int, turn: float
+    ) -> tuple[float, float, int]:
+        """Return angle, speed and the end about which the body turns a step later."""
+        speed += STEP * turn
+        after = angle + STEP * speed
+        if angle == 0.0 or after * angle > 0.0:
+            return after, speed, side
+        (x, y), (other, high) = self.arms[side], self.arms[1 - side]
+        moment = self.inertia + other * other + high * high
+        share = angle / (angle - after)  # of the step until it lands
+        speed *= max(self.inertia + x * other + y * high, 0.0) / moment
+        # slower than what the weight stops within a step
+        if abs(speed) < STEP * self.gravity * abs(other) / moment:
+            return 0.0, 0.0, side
+        return (1.0 - share) * STEP * speed, speed, 1 - side
+
+    def first_fall(self, motion: Motion, between: tuple[float, float]) -> float | None:
+        """Return the smallest of some multiples of a motion at which it falls; None if it slides.
+
+        It is infinite if it falls at none [-].
+        """
+        lower, upper = between
+        scales = lower * SCALE_RATIO ** np.arange(np.ceil(np.log(upper / lower) / log(SCALE_RATIO)))
+        for scale in [*scales.tolist(), upper]:
+            if (found := self.rock(motion, scale)) is None:
+                return None
+            if isfinite(found.time):
+                return scale
+        return inf
+
+
+def doubt_courses(structure: Structure, fall: CollapseState, motion: Motion) -> Iterator[Doubt]:
+    """Yield a doubt of a stack that as one rigid body falls, stands or moves otherwise."""
+    if (body := find_rocking_body(structure)) is None:
+        return
+    remedy = (
+        "bonded, tall or stiff courses act as one body: state both, and compare with fewer courses "
+        "and stiffer joints"
+    )
+    one, falls = body.rock(motion), fall.kind in FALLEN_STATES
+    if one is None:
+        return
+    if isfinite(one.time) and not falls:
+        values = body.joint, one.time, fall.displacement
+        words = "as one rigid body on '{}' it falls, at {:.2f} s, and in courses it moves by {:mm}"
+        yield Doubt(words, remedy, values)
+    elif falls and not isfinite(one.time):
+        words = "as one rigid body on '{}' it does not fall, and moves by {:mm}"
+        yield Doubt(words, remedy, (body.joint, one.displacement))
+    elif not falls and one.displacement > max(
+        2.0 * fall.displacement, DISLOCATION * shallowest_part(structure)[0]
+    ):
+        words = "as one rigid body on '{}' it moves by {:mm}, and in courses by {:mm}"
+        yield Doubt(words, remedy, (body.joint, one.displacement, fall.displacement))
+
+
+def find_rocking_body(structure: Structure) -> RockingBody | None:
+    """Return the part of a stack above its weakest joint as one body.
+
+    It is None of other structures, and where joints resist tension.
+    """
+    stack = _list_stack(structure)
+    if stack is None or structure.tension.any() or find_yielding_blocks(structure):
+        return None
+    masses, centroids, bodies = masses_of(structure), structure.centroids, []
+    for k, (joint, _) in enumerate(stack):
+        own = [block for _, block in stack[k:]]
+        share = masses[own, 0] / masses[own, 0].sum()
+        centre = share @ centroids[own]
+        apart = ((centroids[own] - centre) ** 2).sum(axis=1)
+        inertia = masses[own, 1].sum() / masses[own, 0].sum() + share @ apart
+        ends = sorted(structure.ends[joint].tolist(), reverse=True)
+        corners = [point for block in own for point in structure.blocks[block].points.tolist()]
+        reach = tuple(max(hypot(x - a, y - b) for x, y in corners) for a, b in ends)
+        arms = tuple((float(centre[0] - a), float(centre[1] - b)) for a, b in ends)
+        given = structure.joints[joint].name, arms, float(inertia), reach, structure.gravity
+        bodies.append(RockingBody(*given, float(structure.friction[joint])))
+    return min(bodies, key=lambda body: body.start)
+
+
+def _list_stack(structure: Structure) -> list[tuple[int, int]] | None:
+    """Return joint and block of each course from the ground on; None unless there is one stack."""
+    stack, block = list[tuple[int, int]](), None
+    beside: dict[int, list[tuple[int, int]]] = {}
+    for number, (a, b) in enumerate(structure.pairs.tolist()):
+        beside.setdefault(a, []).append((number, b))
+        beside.setdefault(b, []).append((number, a))
+    onward = [x for k, each in beside.items() if structure.blocks[k].fixed for x in each]
+    while len(onward) == 1:
+        stack += onward
+        joint, block = onward[0]
+        onward = [each for each in beside[block] if each[0] != joint]
+    return stack if not onward and 2 <= len(stack) == len(structure.free) else None

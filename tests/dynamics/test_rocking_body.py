@@ -1,0 +1,174 @@
+"""A stack as one rigid body: against pulses integrated from impact to impact, and loose blocks."""
+
+from dataclasses import replace
+from math import inf, isfinite
+
+import numpy as np
+import pytest
+from loose_blocks import BREADTH, HEIGHT, G, floor, overturns, sine
+
+import archfem as af
+from archfem.dynamics import LooseBlocks, RigidBlockSimulation
+from archfem.dynamics.collapse_state import CollapseState
+from archfem.dynamics.rocking_body import doubt_courses, find_rocking_body
+
+# Frequency over p, half sines, and peak over g of the least, or last, pulse that overturns
+EDGES = [(1.0, 1, 0.33033), (8.0, 1, 1.20181), (2.0, 2, 0.30583), (3.0, 2, 0.88670)]
+
+
+def column(count=2, breadth=BREADTH, height=HEIGHT, **options):
+    return af.column(breadth=breadth, heights=[height / count] * count, **options)
+
+
+def stacked(*boxes):
+    """Boxes (left, bottom, right, top), of which each stands on the one before, on a floor."""
+    base = floor(boxes[0], friction=5.0)
+    blocks, joints = [*base.blocks], [*base.joints]
+    for k, (left, low, right, high) in enumerate(boxes[1:], 2):
+        corners = (left, low), (right, low), (right, high), (left, high)
+        blocks.append(replace(base.blocks[1], outline=corners, name=f"block {k}"))
+        inner, outer = max(left, boxes[k - 2][0]), min(right, boxes[k - 2][2])
+        between = {"blocks": (k - 1, k), "intrados": (inner, low), "extrados": (outer, low)}
+        joints.append(replace(base.joints[0], **between, name=f"joint {k}"))
+    return replace(base, blocks=tuple(blocks), joints=tuple(joints))
+
+
+def pulse(peak, period=1.0, rest=3.0):
+    """One sine from 0.5 s on, and rest [g, s]."""
+    times = np.arange(0.0, 0.5 + period + rest, 0.005)
+    shaken = (times >= 0.5) & (times < 0.5 + period)
+    return af.Motion(
+        np.where(shaken, peak * G * np.sin(2.0 * np.pi * (times - 0.5) / period), 0.0), 0.005
+    )
+
+
+@pytest.mark.parametrize(("ratio", "halves", "edge"), EDGES)
+def test_pulses_overturn_as_by_housner(ratio, halves, edge, verified):
+    """Within 0.2 %, the pulse that ceases to overturn at larger peaks too."""
+    body = find_rocking_body(replace(column(5), gravity=G))
+    assert body.start == pytest.approx(G * BREADTH / HEIGHT)
+    for factor in (0.998, 1.002):
+        one = body.rock(sine(ratio, factor * edge, halves, 1e-3))
+        assert isfinite(one.time) is overturns(ratio, factor * edge, halves)
+    case = f"stack as one body under {halves} half sines, ω/p = {ratio:g}: least peak [g]"
+    verified(case, edge, "rigid block integrated event by event", "the same", difference=2e-3)
+
+
+def test_a_body_of_unlike_courses_has_their_mass():
+    """Courses of 0.5 × 1 m with weights 3 and 1: y = 0.75 m; I / m by Steiner's theorem."""
+    stack = column(2, 0.5, 2.0)
+    light = replace(af.STONE, name="light", unit_weight=af.STONE.unit_weight / 3.0)
+    stack = replace(stack, blocks=(*stack.blocks[:2], replace(stack.blocks[2], material=light)))
+    body = find_rocking_body(stack)
+    assert body.arms == (pytest.approx((-0.25, 0.75)), pytest.approx((0.25, 0.75)))
+    steiner = (0.25**2 * 3.0 + 0.75**2) / 4.0
+    assert body.inertia == pytest.approx((0.5**2 + 1.0**2) / 12.0 + steiner)
+    assert body.reach == pytest.approx((np.hypot(0.5, 2.0),) * 2)
+
+
+@pytest.mark.parametrize("sense", [1.0, -1.0])
+def test_a_lopsided_body_rocks_as_one_loose_block(sense):
+    """An L, also lifted by a vertical motion: by the steps of loose blocks, to 2 % of the way."""
+    stack = stacked((0.0, 0.0, 0.6, 1.5), (0.0, 1.5, 0.9, 2.0))
+    outline = ((0.0, 0.0), (0.6, 0.0), (0.6, 1.5), (0.9, 1.5), (0.9, 2.0), (0.0, 2.0))
+    whole = replace(stack.blocks[1], outline=outline)
+    one = replace(stack, blocks=(stack.blocks[0], whole), joints=stack.joints[:1])
+    times = np.arange(0.0, 4.0, 0.005)
+    across = sense * 0.4 * G * np.sin(2.0 * np.pi * times / 0.6) * (times < 0.6)
+    motion = af.Motion(across, 0.005, vertical=0.5 * across)
+    turns = [
+        frame.poses[1, 2]
+        for frame in RigidBlockSimulation(one, dt=2.5e-4).frames(
+            LooseBlocks.as_built(one), 4.0, motion
+        )
+    ]
+    reach = [np.hypot(0.9, 2.0), np.hypot(0.6, 2.0)]  # from the left and the right end
+    farthest = max(2.0 * reach[int(turn < 0.0)] * np.sin(abs(turn) / 2.0) for turn in turns)
+    found = find_rocking_body(stack).rock(motion)
+    assert 0.02 < farthest < 0.5
+    assert found.displacement == pytest.approx(farthest, rel=0.02)
+
+
+def test_only_a_stack_that_rocks_is_one_body():
+    ring = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=7)
+    assert find_rocking_body(ring) is None
+    side = floor((0.0, 0.0, 0.5, 2.0), (2.0, 0.0, 2.5, 2.0))
+    assert find_rocking_body(side) is None
+    assert find_rocking_body(column(1)) is None
+    bonded = af.Contact(1e9, 4e8, 0.6, cohesion=1e5, tension=1e5)
+    assert find_rocking_body(column(3, contact=bonded)) is None
+
+
+@pytest.mark.parametrize(
+    ("friction", "peak", "slides"), [(0.24, 0.28, True), (0.4, 0.28, False), (0.4, 2.0, True)]
+)
+def test_a_body_that_slides_is_not_compared(friction, peak, slides):
+    """Breadth over height is 0.25: it slides before it turns, never, or while it turns."""
+    contact = af.Contact(1e9, 4e8, friction)
+    body = find_rocking_body(column(3, contact=contact))
+    assert (body.rock(pulse(peak)) is None) is slides
+    assert (body.first_fall(pulse(peak), (1.0, 1.1)) is None) is slides
+    assert body.rock(pulse(0.23)) == (inf, 0.0)
+    state = CollapseState("fallen", None, (), 0.1, 0.0, True)
+    assert bool([*doubt_courses(column(3, contact=contact), state, pulse(peak))]) is not slides
+
+
+def test_a_plinth_is_no_part_of_the_body_that_rocks():
+    body = find_rocking_body(
+        stacked((-1.0, 0.0, 1.0, 0.5), (-0.3, 0.5, 0.3, 2.9), (-0.3, 2.9, 0.3, 5.3))
+    )
+    assert body.joint == "joint 2"
+    assert body.start == pytest.approx(G * 0.3 / 2.4)
+
+
+def test_the_first_fall_is_found_to_a_step_of_the_scales():
+    """The half sine of ω/p = 1 overturns from 0.33033 g on."""
+    body = find_rocking_body(replace(column(3), gravity=G))
+    found = body.first_fall(sine(1.0, 1.0, 1, 1e-3), (0.1, 2.0))
+    assert 0.33033 < found < 1.05 * 0.3304
+    assert body.first_fall(sine(1.0, 1.0, 1, 1e-3), (0.1, 0.32)) == inf
+
+
+@pytest.mark.parametrize(
+    ("kind", "moved", "peak", "words"),
+    [
+        ("stands", 0.4, 0.25, "as one rigid body on 'joint 0' it falls, at 4.0"),
+        ("fallen", 5.0, 0.25, None),
+        ("fallen", 5.0, 0.16, "it does not fall, and moves by "),
+        ("stands", 0.24, 0.16, None),
+        ("stands", 0.17, 0.16, "and in courses by 170 mm"),
+        ("stands", 0.001, 0.105, None),  # as one body by less than a tenth of the depth
+    ],
+)
+def test_courses_are_doubted_where_one_body_does_otherwise(kind, moved, peak, words):
+    """A strip of 0.6 × 5.9 m under one sine: one body falls from 0.7 × 0.25 g on."""
+    strip = column(4, 0.6, 5.9)
+    state = CollapseState(kind, None, (), moved, 0.0, True)
+    doubts = [doubt.cause for doubt in doubt_courses(strip, state, pulse(peak))]
+    assert len(doubts) == (words is not None)
+    assert all(words in doubt for doubt in doubts)
+
+
+@pytest.mark.parametrize(("count", "doubted"), [(8, True), (2, False)])
+def test_a_run_says_what_one_body_does(count, doubted):
+    """Eight courses come back from 0.7 of their depth; two fall, as one body does."""
+    strip = af.Analysis(
+        column(count, 0.6, 5.9), fidelity="rigid", displacements="large", damping="effective"
+    )
+    run = strip.run(pulse(0.25, rest=5.0))
+    causes = [doubt.cause for doubt in run.doubts]
+    assert (run.fall.kind != "fallen") is doubted
+    assert any("as one rigid body" in cause for cause in causes) is doubted
+    # the largest displacement of the run, long before its end
+    assert any("of the depth of the shallowest part" in cause for cause in causes) is doubted
+
+
+def test_a_scale_of_a_stack_states_that_of_one_body():
+    """Of the half sine above; courses on stiff joints fall at the same scale to a tenth."""
+    stiff = af.Contact(1e11, 4e10, 5.0)
+    stack = replace(column(2, contact=stiff), gravity=G)
+    analysis = af.Analysis(stack, fidelity="rigid", displacements="large", damping="effective")
+    found = analysis.scale(sine(1.0, 0.3, 1, 1e-3).with_rest(3.0), dt=0.002, precision=0.1)
+    assert found.as_one == pytest.approx(1.10, rel=0.05)
+    assert found.upper == pytest.approx(1.10, rel=0.1)
+    assert f"; as one rigid body it falls from {found.as_one:#.3g} × on" in found.sentence
