@@ -69,6 +69,16 @@ class Ratios(NamedTuple):
         )
 
     @property
+    def decisive(self) -> float:
+        """The least ratio, with one weight a body too where that decides whether it passes [-]."""
+        return self.least if self.bodies is None or not self.by_split else self.bodies
+
+    @property
+    def by_split(self) -> bool:
+        """Whether it passes, and fails with one weight a body."""
+        return self.least >= 1.0 > (self.bodies or 1.0)
+
+    @property
     def beside(self) -> str:
         """The other ratios, in brackets."""
         texts = {"by displacements": self.moved, "with one weight a body": self.bodies}
@@ -220,11 +230,11 @@ def state_assessments(found: Mapping[str, KinematicAssessment], lines: Sequence[
 def list_ratios(found: KinematicAssessment) -> list[tuple[AssessmentCheck, Ratios]]:
     """List the checks of an assessment with their ratios; with one weight a body if it is less."""
     listed = []
-    for check, whole in zip(found.checks, (found.of_bodies or found).checks, strict=True):
+    for check in found.checks:
         over = check.over_fill
         ends = (check.ratio, check.ratio) if over is None else over.ends
         moved = check.moved if check.at_rest and not over else None
-        bodies = whole.ratio if whole.ratio < 0.999 * check.least else None
+        bodies = check.bodies if (check.bodies or np.inf) < 0.999 * check.least else None
         needed, linear = over.needed if over else "", check.unit != "m"
         listed.append((check, Ratios(check.name, (), *ends, needed, linear, moved, bodies)))
     return listed
@@ -233,12 +243,13 @@ def list_ratios(found: KinematicAssessment) -> list[tuple[AssessmentCheck, Ratio
 def describe_margin(found: Iterable[KinematicAssessment]) -> str:
     """Describe the least ratio of all checks, and its range over what is assumed of a fill."""
     listed = [each for result in found for each in list_ratios(result)]
-    check, ratios = min(listed, key=lambda each: each[0].least)
+    check, ratios = min(listed, key=lambda each: each[1].decisive)
     same = [x.over_fill for x, _ in listed if x.name == check.name and x.over_fill is not None]
     if same:
         over = FillRange.least_of(same)
-        text = f"{over.describe(digits=3)}{ratios.beside}"
-        return f"least margin {text}, by {check.name}: {over.outcome}"
+        text, outcome = f"{over.describe(digits=3)}{ratios.beside}", over.outcome
+        outcome = check.outcome if outcome == "passes" else outcome
+        return f"least margin {text}, by {check.name}: {outcome}"
     return f"least margin {ratios}, by {check.name}: {check.outcome}"
 
 

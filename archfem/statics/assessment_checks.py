@@ -26,6 +26,9 @@ from archfem.motion.motion import Motion
 from archfem.motion.response_spectra import response_spectrum
 from archfem.units import STANDARD_GRAVITY
 
+# Outcome of a check that passes with the weights of single blocks alone
+BY_SPLIT = "passes or fails by the split of weights"
+
 # Value of a doubt about ratios that are no less than the true one
 UPPER_BOUND = "an upper bound"
 
@@ -110,6 +113,8 @@ class AssessmentCheck:
             checked.
         source: clause of the code.
         over_fill: ratios over all assumptions on a fill; None without one.
+        bodies: ratio with one weight for each body that moves as one, at its centroid; None where
+            each body has one anyhow.
     """
 
     name: str
@@ -120,18 +125,30 @@ class AssessmentCheck:
     period: float
     source: str
     over_fill: FillRange | None = None
+    bodies: float | None = None
 
     @property
     def passes(self) -> bool:
-        """Whether the spectrum as given is withstood under every assumption on a fill."""
+        """Whether the spectrum is withstood under every assumption on a fill, and by any split."""
         return self.outcome == "passes"
 
     @property
     def outcome(self) -> str:
-        """Whether it "passes" or "fails", or the assumptions on a fill with which alone it does."""
+        """Whether it "passes" or "fails", or that assumptions on a fill or on weights decide."""
+        found = "passes" if self.ratio >= 1.0 else "fails"
         if self.over_fill is not None:
-            return self.over_fill.outcome
-        return "passes" if self.ratio >= 1.0 else "fails"
+            found = self.over_fill.outcome
+        is_split = self.bodies is not None and self.bodies < 1.0
+        return BY_SPLIT if found == "passes" and is_split else found
+
+    def doubt_split(self) -> list[Doubt]:
+        """Return the doubt of a check that passes with the weights of single blocks alone."""
+        if self.outcome != BY_SPLIT:
+            return []
+        words = "{} passes with weights at the centroids of blocks, and with one weight for each "
+        words += "body that moves as one it fails: {:.3g}"
+        remedy = "bonded or tall courses move as one body: take this ratio"
+        return [Doubt(words, remedy, (self.name, self.bodies))]
 
     @property
     def ratios(self) -> str:

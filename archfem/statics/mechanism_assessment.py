@@ -159,7 +159,8 @@ class KinematicAssessment(ResultDisplay):
     def passes(self) -> bool:
         """Whether the displacement check passes, or without it the linear one.
 
-        It must pass under every assumption on a fill: `checks[-1].over_fill` has the range.
+        It must pass under every assumption on a fill, `checks[-1].over_fill` having the range, and
+        with one weight for each body too.
         """
         return self.checks[-1].passes
 
@@ -237,13 +238,14 @@ class KinematicAssessment(ResultDisplay):
 
     @property
     def _split_note(self) -> list[str]:
-        """Note on the weights where a body has several blocks: no doubt."""
-        if not ((whole := self.of_bodies) and whole.e_star > 1.001 * self.e_star):
+        """Note on the weights where a body has several blocks."""
+        ratios = [f"{x.bodies:.3g} by {x.name}" for x in self.checks if x.bodies is not None]
+        if not ratios or self.of_bodies is None:
             return []
-        ratios = join_names([f"{check.ratio:.3g} by {check.name}" for check in whole.checks])
         return [
             "weights are at the centroids of blocks: one for each body that moves as one gives "
-            f"e* = {whole.e_star:.3f}, and the spectrum may be as strong as {ratios}"
+            f"e* = {self.of_bodies.e_star:.3f}, and the spectrum may be as strong as "
+            f"{join_names(ratios)}"
         ]
 
 
@@ -632,7 +634,7 @@ class _Oscillator:
         name = f"linear, q = {q:g}, FC = {self.confidence_factor:g}"
         capacity = q * a_0 / self.confidence_factor
         source = "Circolare 7/2019, C8.7.1.2.1.5 and C8.7.1.2.1.7, eq. C8.7.1.8"
-        return KinematicAssessment(
+        found = KinematicAssessment(
             structure,
             self.spectrum,
             self.placed.direction,
@@ -651,7 +653,10 @@ class _Oscillator:
             path,
             tuple(self.notes(alpha_0)),
             tuple(self.doubts),
-            None if self.by_body else replace(self, by_body=True).assess(q),
+            None,
+        )
+        return (
+            found if self.by_body else _split_weights(found, replace(self, by_body=True).assess(q))
         )
 
     def _secant_period(self, displacement: float) -> float:
@@ -674,3 +679,15 @@ class _Oscillator:
         ratio = max(capacity / demand, starts)
         period = float(period)
         return AssessmentCheck(rules.name, capacity, demand, "m", ratio, period, rules.source)
+
+
+def _split_weights(found: KinematicAssessment, whole: KinematicAssessment) -> KinematicAssessment:
+    """Return an assessment with the ratios of one weight a body, and doubts where these fail."""
+    found = replace(found, of_bodies=whole)
+    if whole.e_star > 1.001 * found.e_star:
+        found = replace(found, linear=replace(found.linear, bodies=whole.linear.ratio))
+        if found.displacement is not None and whole.displacement is not None:
+            moved = replace(found.displacement, bodies=whole.displacement.ratio)
+            found = replace(found, displacement=moved)
+    split = [doubt for check in found.checks for doubt in check.doubt_split()]
+    return replace(found, doubts=(*found.doubts, *split))

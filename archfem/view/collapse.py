@@ -25,6 +25,7 @@ from archfem.limit.vehicles import MovingLoad
 from archfem.masonry.loads import PointLoad
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import Structure, rigid_motion_matrix
+from archfem.statics.assessment_checks import BY_SPLIT, AssessmentCheck
 from archfem.statics.mechanism_assessment import KinematicAssessment
 from archfem.view.joint_marks import Marker, outline_moving_blocks, scale_motion
 from archfem.view.positions import FallingBlocks
@@ -397,10 +398,19 @@ def _draw_capacity_curve(axes: Axes, found: KinematicAssessment) -> None:
     axes.plot([check.demand], [slope * check.demand], "D", label=label, **style)
     style_axes(axes, "spectral displacement d* [m]", "spectral acceleration a* [m/s²]")
     axes.set(xlim=(0.0, 1.1 * max(last, check.demand)), ylim=(0.0, top))
-    # assumptions on a fill are in the text
-    outcome = check.outcome.replace("only with", "with some assumptions,").partition(",")[0]
     rest = ", at which it begins to move" if check.at_rest else ""
-    set_title(axes, f"{check.name}: {outcome}, ratio {check.ratios}{rest}")
+    titles = [f"{_title_check(check)}{rest}"]
+    titles += [] if found.linear.passes else [_title_check(found.linear)]
+    set_title(axes, "; ".join(titles))
+
+
+def _title_check(check: AssessmentCheck) -> str:
+    """Return outcome and ratio of a check in a few words; assumptions on a fill are in the text."""
+    some = check.over_fill is not None and check.over_fill.needed
+    if check.outcome == BY_SPLIT:
+        return f"{check.name}: {check.outcome}, ratio {check.bodies:.3g} to {check.ratios}"
+    outcome = "passes with some assumptions" if some else check.outcome
+    return f"{check.name}: {outcome}, ratio {check.ratios}"
 
 
 def draw_capacity(

@@ -114,14 +114,13 @@ def test_a_suite_has_a_report_with_a_player_for_each_pair(kept, capsys):
 
 CHECKS = [
     AssessmentCheck("linear, q = 2, FC = 1.35", 8.212, 2.844, "m/s²", 8.212 / 2.844, np.nan, ""),
-    AssessmentCheck("a code", 0.11, 0.22, "m", 0.5, 1.178, ""),
+    AssessmentCheck("a code", 0.11, 0.22, "m", 0.5, 1.178, "", bodies=0.45),
 ]
 
 
 def state_each(hazard):
     """Statements by command and file, of results that were made up."""
-    bodies = SimpleNamespace(checks=[CHECKS[0], replace(CHECKS[1], ratio=0.45)])
-    assessed = SimpleNamespace(checks=CHECKS, notes=("faces slide flat",), of_bodies=bodies)
+    assessed = SimpleNamespace(checks=CHECKS, notes=("faces slide flat",))
     assessed.doubts = (Doubt("it is {}", "compare it with a run", (UPPER_BOUND,)),)
     place = "passes without all, with 2 axles at -0.1, 1.1 m"
     found = SimpleNamespace(hazard=hazard, doubts=(), sentence="falls at 0.002 a year")
@@ -273,7 +272,7 @@ def test_a_rate_is_stated_beside_the_hazard_at_its_return_periods():
 
 def test_a_check_that_passes_at_rest_says_so():
     resting = replace(CHECKS[1], ratio=1.5)
-    found = SimpleNamespace(checks=[resting], notes=(), doubts=(), of_bodies=None)
+    found = SimpleNamespace(checks=[resting], notes=(), doubts=())
     (row,) = answers.state_assessments({"right": found}, []).rows
     outcome = "0.11 m, passes, for the mechanism does not begin to move"
     assert row[:4] == ("assessment: a code, right", "0.22 m", outcome, "1.5 (0.5 by displacements)")

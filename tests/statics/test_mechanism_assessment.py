@@ -9,8 +9,9 @@ from backfilled import SOIL, arch_bridge, rectangle, retaining_wall, slender_bri
 from bonded import bonded_wall
 
 import archfem as af
+from archfem.cases.answers import describe_margin, list_ratios
 from archfem.statics import LIMIT_STATES, AssessmentCheck, LimitState, mechanism_assessment
-from archfem.statics.assessment_checks import UPPER_BOUND, spectral_acceleration
+from archfem.statics.assessment_checks import BY_SPLIT, UPPER_BOUND, spectral_acceleration
 
 G = 9.81
 SPECTRUM = af.motion.Ntc2018(ag=0.25, f0=2.4, tc_star=0.32, site="B")
@@ -643,3 +644,24 @@ def test_courses_that_move_as_one_raise_both_ratios(verified):
     stated = f"as strong as {found[0]:.3g} by linear, q = 2, FC = 1.35, {found[1]:.3g} by NTC-2018"
     assert f"gives e* = 1.000, and the spectrum may be {stated}" in str(split)
     assert "weights are at the centroids" not in str(whole)
+
+
+@pytest.mark.parametrize(("scale", "count"), [(0.5, 0), (1.0, 1), (2.0, 1), (4.0, 0)])
+def test_a_check_that_one_weight_a_body_fails_is_no_pass(scale, count):
+    """Eight courses against one block: only where both pass, or fail, is the answer sure."""
+    site = af.motion.Ntc2018(ag=0.25 * scale, f0=2.4, tc_star=0.32, site="B")
+    whole, split = (
+        af.kinematic_assessment(af.column(breadth=0.5, heights=[1.8 / n] * n), site) for n in (1, 8)
+    )
+    outcomes = {(True, True): "passes", (True, False): BY_SPLIT, (False, False): "fails"}
+    for one, courses in zip(whole.checks, split.checks, strict=True):
+        assert courses.outcome == outcomes[courses.ratio >= 1.0, one.ratio >= 1.0]
+    unsure = [check for check in split.checks if check.outcome == BY_SPLIT]
+    assert len(unsure) == len(split.doubts) == count
+    assert all(check.name in str(split.doubts[0]) for check in unsure)
+    assert split.passes is whole.passes is (scale == 0.5)
+    assert (BY_SPLIT in split.plot().axes[1].get_title().replace("\n", " ")) is bool(unsure)
+    said, listed = describe_margin([split]), dict(list_ratios(split))
+    assert said.endswith({0.5: "passes", 1.0: BY_SPLIT}.get(scale, "fails"))
+    assert any(ratios.by_split for ratios in listed.values()) is bool(unsure)
+    assert not whole.doubts

@@ -192,6 +192,8 @@ def _say_checks(data: ReportData) -> Iterator[str]:
             met = "is not met under some assumptions on the fill"
         elif check.least < 1.0:
             met = "is not met"
+        elif check.by_split:
+            met = "is met or not by the split of weights"
         elif check.moved is not None:
             moves = _say_motion(data, check.least, peak_of_spectrum(data))
             met = "is met at rest" + " alone, and it moves" * bool(moves)
@@ -404,12 +406,13 @@ def _describe_check(data: ReportData, check: Ratios) -> tuple[float, list[str]]:
         return check.moved, [f"{check.moved:.3g} by displacements, {by}", begins]
     fails = f", passed only with {check.needed}" if check.needed else ""
     fails = fails or ", which it fails" * (check.least < 1.0)
+    fails = fails or ", which it fails with one weight a body" * check.by_split
     ends = format_ends(check.least, check.most)
     texts = [f"{ends}{over}{check.beside}, {by}{fails}"]
     if check.moved is not None:
         texts.append(f"{ends} times the spectrum begins to move it")
         texts.append(f"if it moved, it could be displaced by {check.moved:.3g} times the demand")
-    return check.least, texts
+    return check.decisive, texts
 
 
 def _describe_scales(data: ReportData) -> Iterator[tuple[float, list[str]]]:
