@@ -556,10 +556,14 @@ class CollapseScale:
 
     @property
     def states(self) -> dict[str, float]:
-        """Smallest scales at which it moves, is dislocated and falls, by all steps too [-]."""
+        """Smallest scales at which it moves, is dislocated and falls [-].
+
+        Those of a fall are of any step, of all steps, and of one rigid body.
+        """
         scales = {"moves": self.moves if self.moves <= self.held else inf}
         scales |= {"dislocated": self.dislocated, "falls": self._least_fall}
         scales["falls by all steps"] = self.upper
+        scales["falls as one"] = inf if self.as_one is None else self.as_one
         if self.moves == min((run.scale for run in self._runs), default=inf):
             scales["moves in all"] = scales["moves"]  # and maybe at smaller ones
         return {state: scale for state, scale in scales.items() if scale < inf}

@@ -655,9 +655,7 @@ class _Oscillator:
             tuple(self.doubts),
             None,
         )
-        return (
-            found if self.by_body else _split_weights(found, replace(self, by_body=True).assess(q))
-        )
+        return found if self.by_body else _split_weights(found, replace(self, by_body=True), q)
 
     def _secant_period(self, displacement: float) -> float:
         """Return the secant period of the capacity curve at a displacement [s]."""
@@ -681,9 +679,11 @@ class _Oscillator:
         return AssessmentCheck(rules.name, capacity, demand, "m", ratio, period, rules.source)
 
 
-def _split_weights(found: KinematicAssessment, whole: KinematicAssessment) -> KinematicAssessment:
+def _split_weights(
+    found: KinematicAssessment, of_bodies: _Oscillator, q: float
+) -> KinematicAssessment:
     """Return an assessment with the ratios of one weight a body, and doubts where these fail."""
-    found = replace(found, of_bodies=whole)
+    found = replace(found, of_bodies=(whole := of_bodies.assess(q)))
     if whole.e_star > 1.001 * found.e_star:
         found = replace(found, linear=replace(found.linear, bodies=whole.linear.ratio))
         if found.displacement is not None and whole.displacement is not None:

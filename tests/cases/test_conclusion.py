@@ -196,7 +196,7 @@ def test_the_margin_of_scales_ends_where_it_is_dislocated(case):
         "the least margin is 1.38 on 'a', PGA 0.20 g, of 2 motions",
         "it moves as a mechanism from 0.850 × or less on, is dislocated from 1.41 × on and falls "
         "from 4.50 × on",
-        "it falls first under 'b', from 2.10 × on",
+        "over the motions it falls from 0.2 g ('c', 1.00 ×) to 0.9 g ('a', 4.50 ×) of PGA on",
         "no scale is known up to which it stands under 'c'",
         "'d' was not scaled",
     ]
@@ -211,6 +211,51 @@ def test_the_margin_of_scales_ends_where_it_is_dislocated(case):
         assert say_margin(data, scale=state("scale", begun))[0] == (
             f"the least margin is 0.700 (search unfinished) on 'a', PGA 0.20 g{fails}"
         )
+
+
+def test_what_fails_under_a_motion_that_was_not_scaled_has_a_margin_below_one(case):
+    """Of runs of 2 m/s²; a state that another motion reaches at a larger scale is no first one."""
+    data = data_of(case, a=verdict_of(), b=verdict_of("dislocated"), c=verdict_of())
+    vars(data)["pairs"] = ("a", "b", "c")
+    assert say_margin(data, scale=state("scale", scales("a", 1.4, dislocated=2.0, falls=4.0))) == [
+        "the least margin is below 1 on 'b', PGA 0.20 g, under which it is dislocated, and which "
+        "was not scaled",
+        "the next is 1.40 on 'a', PGA 0.20 g",
+        "it is dislocated from 2.00 × on and falls from 4.00 × on",
+        "'c' was not scaled",
+    ]
+    assert dict(conclusion.list_facts(data))["verdict"] == (
+        "is dislocated but stands under 1, stands under 2 of 3 motions, moves by 100 mm, first "
+        "falls at 4.00 × 'a', 0.8 g, is first dislocated at 1.00 × 'b', 0.204 to 0.4 g (or less, "
+        "1.00 to 2.00 × over motions and time steps)"
+    )
+
+
+def test_a_motion_that_fells_it_at_a_smaller_scale_is_not_robust(case):
+    """As shaken it stands, or is dislocated; what is as weak only above 1 × says nothing."""
+    data = data_of(case, a=verdict_of(), b=verdict_of("dislocated"), c=verdict_of())
+    found = (
+        scales("a", 0.8, falls=0.895),
+        scales("b", 0.7, dislocated=0.75, falls=0.9),
+        scales("c", 1.1, falls=1.2),
+    )
+    vars(data)["statements"] = {"scale": state("scale", *found)}
+    said = (
+        "under 'a' it stands at 1.00 ×, but falls at 0.895 ×: not robust; under 'b' it is "
+        "dislocated at 1.00 ×, but falls at 0.900 ×: not robust"
+    )
+    assert said in dict(conclusion.list_facts(data))["verdict"]
+    assert said in conclusion.build_conclusion(data).pieces[0].text
+    assert "not robust" not in str(say_margin(data, scale=state("scale", found[2])))
+
+
+def test_the_margin_of_a_stack_names_that_of_one_body(case):
+    found = scales("a", 1.4, falls=1.5, falls_as_one=0.677)
+    assert say_margin(data_of(case), scale=state("scale", found)) == [
+        "the least margin is 1.40 on 'a', PGA 0.20 g",
+        "it falls from 1.50 × on",
+        "as one rigid body it falls from 0.677 × 'a' on",
+    ]
 
 
 def test_the_answer_has_displacements_the_first_fall_and_the_checks(case):
@@ -233,8 +278,9 @@ def test_the_answer_has_displacements_the_first_fall_and_the_checks(case):
         "scale": searched,
     }
     answer = (
-        "moves by 60 to 80 mm, first falls at 1.30 × the motion (1.30 to 1.51 over motions and "
-        "time steps); the displacement check of damage is not met (0.488 to 0.592 × the spectrum)"
+        "moves by 60 to 80 mm, first falls at 1.30 × 'a', 0.26 to 0.282 g (1.30 to 1.51 × over "
+        "motions and time steps); the displacement check of damage is not met (0.488 to 0.592 × "
+        "the spectrum)"
     )
     facts = dict(conclusion.list_facts(data))
     assert facts["verdict"] == f"stands under 2 of 2 motions, {answer}"
@@ -251,7 +297,7 @@ def test_the_answer_has_displacements_the_first_fall_and_the_checks(case):
     for at, said in (1.2, True), (1.35, False):
         parted = first._replace(states={"dislocated": at, "falls": 1.3})
         data.statements["scale"] = state("scale", parted, other)
-        words = f", is first dislocated at {at:.2f} × the motion; "
+        words = f", is first dislocated at {at:.2f} × 'a', {0.2 * at:.3g} g; "
         assert (words in dict(conclusion.list_facts(data))["verdict"]) == said
     data.statements["scale"] = state("scale", first._replace(unfinished=True), other)
     facts = dict(conclusion.list_facts(data))

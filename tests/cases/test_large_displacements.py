@@ -138,7 +138,7 @@ def test_a_range_in_the_folder_stands_in_place_of_what_a_run_cannot_know(held):
     varied = "motion, lengths, stiffness, friction, damping, size of the motions, time step"
     assert (
         f" M{varied[1:]} and fidelity were not varied, and displacements have no range."
-        in without[-1]
+        in without[-2]
     )
     data = ReportData(data.case, data.runs)
     vars(data)["verdict_ranges"] = (af.dynamics.VerdictRange(xr.Dataset(rows, attrs=attrs)),)

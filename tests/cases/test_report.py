@@ -271,7 +271,7 @@ def test_a_rate_is_stated_beside_the_hazard_at_its_return_periods():
 
 
 def test_a_check_that_passes_at_rest_says_so():
-    resting = replace(CHECKS[1], ratio=1.5)
+    resting = replace(CHECKS[1], ratio=1.5, bodies=None)
     found = SimpleNamespace(checks=[resting], notes=(), doubts=())
     (row,) = answers.state_assessments({"right": found}, []).rows
     outcome = "0.11 m, passes, for the mechanism does not begin to move"

@@ -67,23 +67,38 @@ def test_cases_with_doubts_stand_before_others():
     [
         (
             (),
-            "in the study none of 9 cases falls, and 'case 8' raises the residual displacement "
-            "most, from 1 mm to 9 mm",
+            "in the study under 'first' and 'second' none of 9 cases falls, and 'case 8' raises the "
+            "residual displacement most, from 1 mm to 9 mm",
         ),
         (
             [8],
-            "in the study 1 of 9 cases falls: 'case 8', under 1 of 2 motions; of the others "
+            "in the study under 'first' and 'second' 1 of 9 cases falls: 'case 8', under 1 of 2 "
+            "motions; of the others "
             "'case 7' raises the residual displacement most, from 1 mm to 8 mm",
         ),
         (
             range(1, 9),
-            "in the study 8 of 9 cases fall: 'case 1', under 1 of 2 motions; 'case 2', under 1 of "
-            "2 motions; 'case 3', under 1 of 2 motions; 'case 4', under 1 of 2 motions and 4 more",
+            "in the study under 'first' and 'second' 8 of 9 cases fall: 'case 1', under 1 of 2 "
+            "motions; 'case 2', under 1 of 2 motions; 'case 3', under 1 of 2 motions; 'case 4', "
+            "under 1 of 2 motions and 4 more",
         ),
     ],
 )
 def test_one_sentence_says_what_changes_the_answer(falls, words):
     assert [*study_findings.say_what_changes(study(falls, 9))] == [words]
+
+
+@pytest.mark.parametrize(
+    ("pairs", "under"),
+    [(["m1"] * 6, " under 'm1'"), ([*"abcdef"], " under 6 motions"), (None, "")],
+)
+def test_a_study_names_its_motions(pairs, under):
+    table = study(cases=3).table.drop_vars("pair")
+    table = table if pairs is None else table.assign_coords(pair=("point", pairs))
+    found = study_findings.collect_findings("Lengths", "", table)
+    said = f"in the study{under} none of 3 cases falls, and 'case 2' raises"
+    assert next(study_findings.say_what_changes(found)).startswith(said)
+    assert study_findings.tabulate_study(found).caption.startswith(f"Study: Lengths{under}")
 
 
 def test_a_row_has_the_largest_of_each_column_and_noise_is_no_finding():
@@ -106,7 +121,9 @@ def test_a_row_has_the_largest_of_each_column_and_noise_is_no_finding():
         ["as is", "80 mm", "11.8 mm", "stands"],
         ["thin", "87 mm", "11.9 mm", "stands"],
     ]
-    assert [*study_findings.say_what_changes(found)] == ["in the study none of 2 cases falls"]
+    assert [*study_findings.say_what_changes(found)] == [
+        "in the study under 'a' and 'b' none of 2 cases falls"
+    ]
     table["largest_displacement"][3] = 0.109
     (text,) = study_findings.say_what_changes(study_findings.collect_findings("", "", table))
     assert text.endswith(", and 'thin' raises the largest displacement most, from 80 mm to 109 mm")

@@ -7,6 +7,7 @@
     report          HTML report of a case
     report_data     case, runs and files of a report
     response        sections on ground motions, runs and their checks
+    scales          scales and peaks of motions at which a structure fails
     study_findings  the worst of each case of a study, and what changes the answer
     sections        the other sections: inputs, structure, capacity, further results, sources
 

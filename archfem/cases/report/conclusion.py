@@ -11,7 +11,7 @@ import numpy as np
 
 from archfem._files import read_file_list
 from archfem.cases import result_text
-from archfem.cases.answers import NO_DEMAND, RESULTS, Ratios, Row, Scales, read_numbers
+from archfem.cases.answers import NO_DEMAND, RESULTS, Ratios, Row, read_numbers
 from archfem.cases.case import REPORT_KEYS
 from archfem.cases.report.doubts import (
     HISTORIES,
@@ -29,11 +29,11 @@ from archfem.cases.report.doubts import (
     weigh,
 )
 from archfem.cases.report.report_data import SHOWN_RESULTS, ReportData
+from archfem.cases.report.scales import describe_scales, say_first_failure, say_fragile
 from archfem.cases.report.study_findings import read_study, say_what_changes
 from archfem.cases.result_text import PushFactors, format_ends, site_acceleration
 from archfem.dynamics.collapse_state import COLLAPSE_STATES, FALLEN_STATES, CollapseState
 from archfem.dynamics.history import History
-from archfem.dynamics.motion_scaling import UNFINISHED
 from archfem.dynamics.verdict_range import (
     HALF_STEP,
     UNVARIED,
@@ -73,14 +73,6 @@ SECTIONS = {
     RESULTS["assessment"]: "Kinematic assessment",
     RESULTS["scale"]: "Scale of the motion",
     RESULTS["risk"]: "Annual rate of collapse",
-}
-
-# States that a search of scales finds, in the words of margin and answer
-_STATES = {
-    "moves": ("moves as a mechanism", ""),
-    "dislocated": ("is dislocated", "is first dislocated"),
-    "falls": ("falls", "first falls"),
-    "mechanism": ("forms a mechanism", "first forms a mechanism"),
 }
 
 # Fidelity of the variations of a verdict
@@ -134,7 +126,7 @@ def list_facts(data: ReportData) -> list[tuple[str, str]]:
     ranges = [x for x in data.verdict_ranges if x.decisive.any()] if len(runs) > 1 else []
     ranges.sort(key=lambda x: (x.falls.sum(), x.dislocated.sum()))
     others += [x.count for x in ranges[-1:]]
-    verdict = "; ".join([did, *others, *_say_checks(data)])
+    verdict = "; ".join([did, *others, *say_fragile(data), *_say_checks(data)])
     return [*signed, ("verdict", verdict), *doubts, *blocks, *peak]
 
 
@@ -170,17 +162,7 @@ def _say_movement(data: ReportData) -> Iterator[str]:
     sizes = [x.displacement for x in verdicts if x.outcome in COLLAPSE_STATES[:2]]
     if sizes and np.isfinite(sizes).all():
         yield f"moves by {Ends((min(sizes), max(sizes))):mm}"
-    searches, least = read_numbers(Scales, data.statements.get("scale")), np.inf
-    for state in ("falls", "dislocated", "mechanism"):
-        keys = state, f"{state} by all steps"
-        found = [x.states[key] for x in searches for key in keys if key in x.states]
-        if found and min(found) < least:  # a dislocation beyond a fall says nothing
-            least, ends = min(found), Ends((min(found), max(found)))
-            over = " and ".join(["motions"] * (len(searches) > 1) + ["time steps"])
-            notes = [f"{ends:#.3g} over {over}"] * (f"{ends[0]:#.3g}" != f"{ends[1]:#.3g}")
-            notes += [UNFINISHED] * any(x.unfinished for x in searches)
-            beside = f" ({', '.join(notes)})" * bool(notes)
-            yield f"{_STATES[state][1]} at {least:#.3g} × the motion{beside}"
+    yield from say_first_failure(data)
 
 
 def _say_checks(data: ReportData) -> Iterator[str]:
@@ -335,7 +317,7 @@ def _say_answer(data: ReportData) -> Iterator[str]:
     moved = ", ".join(_say_movement(data)) if done else ""
     joint = ", " if len(done) == 1 else "; it "
     text = "; it ".join(done) + f"{joint}{moved}" * bool(moved)
-    clauses = [*([f"the structure {text}"] if done else []), *_say_checks(data)]
+    clauses = [*([f"the structure {text}"] if done else []), *say_fragile(data), *_say_checks(data)]
     yield from ["; ".join(clauses)] if clauses else []
 
 
@@ -365,7 +347,7 @@ def _say_causes(ranges: Sequence[VerdictRange]) -> Iterator[str]:
 def _describe_margin(data: ReportData) -> Iterator[str]:
     """Yield the least factor on the demand of an earthquake, maybe as a range, and the others."""
     checks = read_numbers(Ratios, data.statements.get("assessment"))
-    margins = [*sorted(_describe_check(data, each) for each in checks)[:1], *_describe_scales(data)]
+    margins = [*sorted(_describe_check(data, each) for each in checks)[:1], *describe_scales(data)]
     for k, (_, (first, *others)) in enumerate(sorted(margins)):
         rank = ("the least margin is", "the next is", "then follows")[min(k, 2)]
         yield from [f"{rank} {first}", *others]
@@ -413,36 +395,6 @@ def _describe_check(data: ReportData, check: Ratios) -> tuple[float, list[str]]:
         texts.append(f"{ends} times the spectrum begins to move it")
         texts.append(f"if it moved, it could be displaced by {check.moved:.3g} times the demand")
     return check.decisive, texts
-
-
-def _describe_scales(data: ReportData) -> Iterator[tuple[float, list[str]]]:
-    """Yield the least scale up to which it stands, what comes beyond, and motions without any."""
-    searches = read_numbers(Scales, data.statements.get("scale"))
-    made = sorted((each for each in searches if each.held), key=lambda each: each.held)
-    if not made:
-        return
-    first, states = made[0], made[0].states
-    # between the scales that were run nothing is known
-    met = min((scale for state, scale in states.items() if "moves" not in state), default=np.inf)
-    words = f"{first.held:#.3g}" + f" ({UNFINISHED})" * first.unfinished
-    words += f" on '{first.motion}', PGA {first.pga:.2f} g" + ", which it fails" * (met <= 1.0)
-    words += f", of {len(made)} motions" * (len(made) > 1)
-    ends = [
-        f"{_STATES[state][0]} from {scale:#.3g} ×{' or less' * (f'{state} in all' in states)} on"
-        for state, scale in states.items()
-        if state in _STATES
-    ]
-    ends += [] if {"falls", "mechanism"} & states.keys() else ["falls in no run"]
-    texts = [words, f"it {join_words(ends)}"]
-    falls = {each.motion: each.states["falls"] for each in made if "falls" in each.states}
-    if falls and (weakest := min(falls, key=falls.__getitem__)) != first.motion:
-        texts.append(f"it falls first under '{weakest}', from {falls[weakest]:#.3g} × on")
-    # a search without a scale that holds may have the least of all
-    if none := [f"'{each.motion}'" for each in searches if not each.held]:
-        texts.append(f"no scale is known up to which it stands under {join_words(none)}")
-    if left := [f"'{pair}'" for pair in data.pairs if pair not in {x.motion for x in searches}]:
-        texts.append(f"{join_words(left)} {'were' if left[1:] else 'was'} not scaled")
-    yield first.held, texts
 
 
 def _say_motion(data: ReportData, factor: float, site: float) -> str:

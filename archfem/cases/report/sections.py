@@ -378,7 +378,7 @@ def _build_study(data: ReportData) -> list[Any]:
     """Build table and picture of a study: of a comparison of cases those that it has written."""
     if (found := read_study(data)) is None:
         return []
-    caption = f"Study: {found.title}"
+    caption = f"Study: {found.title}{found.under}"
     if not len(found.worst):
         place = data.study or data.folder
         assert place is not None  # where the study was read

@@ -14,6 +14,7 @@ from archfem._netcdf import read_dataset
 from archfem.cases.report.report_data import ReportData
 from archfem.dynamics.collapse_state import COLLAPSE_STATES, FALLEN_STATES
 from archfem.errors import InvalidInput
+from archfem.masonry.structure import join_words
 from archfem.units import format_mm
 from archfem.view.pages.document import Grid
 
@@ -26,8 +27,9 @@ MAX_CASES = 24
 MIN_CHANGE = 0.1  # of a finding that is worth a sentence [-]
 MAX_NAMES = 4  # of cases in a sentence
 
-# Coordinates that number points, or are motions of one case
-_NO_CASE = {"point", "sample", "variation", "pair", "suite.pair"}
+# Coordinates that are motions of one case, and those that number points too
+_MOTIONS = ("pair", "suite.pair")
+_NO_CASE = {"point", "sample", "variation", *_MOTIONS}
 
 # What a key of a case varies, in the words of the conclusion
 _VARIED = {
@@ -67,6 +69,15 @@ class StudyFindings:
     def decides(self) -> str:
         """Name of the finding by which cases are compared."""
         return self.names[0]
+
+    @property
+    def under(self) -> str:
+        """Under which motions of a suite the cases were run, in words; "" without a suite."""
+        found = [self.table[name].values for name in _MOTIONS if name in self.table.coords]
+        names = [*dict.fromkeys(f"'{name}'" for each in found for name in each.ravel().tolist())]
+        if len(names) > MAX_NAMES:
+            return f" under {len(names)} motions"
+        return f" under {join_words(names)}" if names else ""
 
     def label(self, row: Any) -> str:
         """Return the name of the case of a row."""
@@ -117,7 +128,7 @@ def tabulate_study(found: StudyFindings) -> Grid:
     """Tabulate the worst point of each case: those that fall first, then those with doubts."""
     ranks = ["rank", *(["doubts"] if "doubts" in found.worst else [])]
     order = found.worst.sort_values(ranks, ascending=[True, False][: len(ranks)], kind="stable")
-    pair = next((name for name in ("pair", "suite.pair") if name in order), "")
+    pair = next((name for name in _MOTIONS if name in order), "")
     several = pair not in ("", *found.keys) and order["runs"].max() > 1
     state = "fall" in order and any(order["fall"])
     head = [_label_finding(found.table, name) for name in (*found.keys, *found.names)]
@@ -128,7 +139,7 @@ def tabulate_study(found: StudyFindings) -> Grid:
         cells += [_format_finding(row, name) for name in found.names]
         count = f", in {row['falls']} of {row['runs']}" if several and row["falls"] else ""
         rows.append([*cells, f"{row['fall']}{count}"] if state else cells)
-    caption = f"Study: {found.title}"
+    caption = f"Study: {found.title}{found.under}"
     caption += "; of each case the worst of each column over its motions" if several else ""
     if left := order.iloc[MAX_CASES:].to_dict("records"):
         falls = sum(row["falls"] > 0 for row in left)
@@ -165,13 +176,14 @@ def say_what_changes(found: StudyFindings) -> Iterator[str]:
         if row["falls"]
     ]
     more = f" and {len(falling) - MAX_NAMES} more" * (len(falling) > MAX_NAMES)
-    text, then = f"in the study none of {len(rows)} cases falls", ", and "
+    study = f"in the study{found.under}"
+    text, then = f"{study} none of {len(rows)} cases falls", ", and "
     if falling:
         count = f"{len(falling)} of {len(rows)} cases fall{'s' * (len(falling) == 1)}"
-        text = f"in the study {count}: {'; '.join(falling[:MAX_NAMES])}{more}"
+        text = f"{study} {count}: {'; '.join(falling[:MAX_NAMES])}{more}"
         then = "; of the others "
     elif "fall" not in found.table:
-        text, then = "", "in the study "
+        text, then = "", f"{study} "
     others = [row for row in rows if not row["falls"] and np.isfinite(row[name])]
     compared = _compare_cases(found, others) if len(others) > 1 else ""
     yield from filter(None, [f"{text}{then}{compared}" if compared else text])

@@ -1,0 +1,134 @@
+"""Scaled motions in a report: at which scale, and at which peak, a structure first fails."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from archfem.cases.answers import Scales, read_numbers
+from archfem.cases.report.doubts import peak_of_ground
+from archfem.cases.report.report_data import ReportData
+from archfem.dynamics.collapse_state import COLLAPSE_STATES
+from archfem.dynamics.history import History
+from archfem.dynamics.motion_scaling import UNFINISHED
+from archfem.masonry.structure import join_words
+from archfem.models.model import Ends
+
+# States that a search of scales finds, in the words of margin and answer
+_STATES = {
+    "moves": ("moves as a mechanism", ""),
+    "dislocated": ("is dislocated", "is first dislocated"),
+    "falls": ("falls", "first falls"),
+    "mechanism": ("forms a mechanism", "first forms a mechanism"),
+}
+
+# The same of runs that are not scaled, by their outcomes
+_FAILURES = {
+    "fallen": "falls",
+    "partly fallen": "falls",
+    "dislocated": "dislocated",
+    "mechanism": "mechanism",
+}
+
+
+def list_scales(data: ReportData) -> list[Scales]:
+    """List what searches of scales have found, by motion."""
+    return read_numbers(Scales, data.statements.get("scale"))
+
+
+def _name_runs(data: ReportData) -> dict[str, History]:
+    """Return the runs by the names of their motions."""
+    return {str(run.dataset.attrs.get("motion", k)): run for k, run in data.runs.items()}
+
+
+def _list_unscaled(data: ReportData) -> dict[str, tuple[str, float]]:
+    """Return state and peak [g] of failures under motions that are not scaled as others are."""
+    scaled = {each.motion for each in list_scales(data)}
+    runs = {name: run for name, run in _name_runs(data).items() if scaled and name not in scaled}
+    states = {name: _FAILURES.get(run.verdict.outcome) for name, run in runs.items()}
+    return {name: (x, peak_of_ground(runs[name])) for name, x in states.items() if x is not None}
+
+
+def say_first_failure(data: ReportData) -> Iterator[str]:
+    """Yield the least scale at which it falls, or is dislocated before, and peaks over motions."""
+    searches, unscaled, least = list_scales(data), _list_unscaled(data), np.inf
+    several = len(searches) + len(unscaled) > 1
+    for state in ("falls", "dislocated", "mechanism"):
+        first = {x.motion: (x.states[state], x.pga) for x in searches if state in x.states}
+        first |= {name: (1.0, peak) for name, (found, peak) in unscaled.items() if found == state}
+        by_all = f"{state} by all steps"
+        scales = [scale for scale, _ in first.values()]
+        scales += [x.states[by_all] for x in searches if by_all in x.states]
+        if not first or min(scales) >= least:  # a dislocation beyond a fall says nothing
+            continue
+        least, ends = min(scales), Ends((min(scales), max(scales)))
+        name = min(first, key=lambda motion: first[motion][0])
+        peaks = sorted(scale * peak for scale, peak in first.values())
+        over = " and ".join(["motions"] * several + ["time steps"])
+        notes = ["or less"] * (name in unscaled)
+        notes += [f"{ends:#.3g} × over {over}"] * (f"{ends[0]:#.3g}" != f"{ends[1]:#.3g}")
+        notes += [UNFINISHED] * any(x.unfinished for x in searches)
+        motion = f"'{name}'" if several else "the motion"
+        peak = f"{Ends((peaks[0], peaks[-1])):.3g} g"
+        beside = f" ({', '.join(notes)})" * bool(notes)
+        yield f"{_STATES[state][1]} at {least:#.3g} × {motion}, {peak}{beside}"
+
+
+def say_fragile(data: ReportData) -> Iterator[str]:
+    """Yield a sentence on each motion that it withstands, and at a smaller scale does not."""
+    runs = _name_runs(data)
+    for search in list_scales(data):
+        outcome = runs[search.motion].verdict.outcome if search.motion in runs else ""
+        weaker = [
+            (search.states[state], _STATES[state][0])
+            for state in ("falls", "dislocated")
+            if search.states.get(state, 1.0) < 1.0 and _FAILURES.get(outcome) != state
+        ]
+        if weaker and outcome in COLLAPSE_STATES[:2]:
+            does = "stands" if outcome == COLLAPSE_STATES[0] else _STATES["dislocated"][0]
+            listed = join_words([f"{words} at {scale:#.3g} ×" for scale, words in weaker])
+            yield f"under '{search.motion}' it {does} at 1.00 ×, but {listed}: not robust"
+
+
+def describe_scales(data: ReportData) -> Iterator[tuple[float, list[str]]]:
+    """Yield the least scale up to which it stands, what comes beyond, and motions without any."""
+    searches, unscaled = list_scales(data), _list_unscaled(data)
+    for name, (state, peak) in unscaled.items():
+        fails = f"under which it {_STATES[state][0]}, and which was not scaled"
+        yield np.nextafter(1.0, 0.0), [f"below 1 on '{name}', PGA {peak:.2f} g, {fails}"]
+    made = sorted((each for each in searches if each.held), key=lambda each: each.held)
+    if not made:
+        return
+    first, states = made[0], made[0].states
+    # between the scales that were run nothing is known
+    failing = {"dislocated", "falls", "mechanism"} & states.keys()
+    met = min((states[state] for state in failing), default=np.inf)
+    words = f"{first.held:#.3g}" + f" ({UNFINISHED})" * first.unfinished
+    words += f" on '{first.motion}', PGA {first.pga:.2f} g" + ", which it fails" * (met <= 1.0)
+    words += f", of {len(made)} motions" * (len(made) > 1)
+    ends = [
+        f"{_STATES[state][0]} from {scale:#.3g} ×{' or less' * (f'{state} in all' in states)} on"
+        for state, scale in states.items()
+        if state in _STATES
+    ]
+    ends += [] if {"falls", "mechanism"} & states.keys() else ["falls in no run"]
+    texts = [words, f"it {join_words(ends)}", *_compare_motions(searches)]
+    # a search without a scale that holds may have the least of all
+    if none := [f"'{each.motion}'" for each in searches if not each.held]:
+        texts.append(f"no scale is known up to which it stands under {join_words(none)}")
+    known = {each.motion for each in searches} | unscaled.keys()
+    if left := [f"'{pair}'" for pair in data.pairs if pair not in known]:
+        texts.append(f"{join_words(left)} {'were' if left[1:] else 'was'} not scaled")
+    yield first.held, texts
+
+
+def _compare_motions(searches: list[Scales]) -> Iterator[str]:
+    """Yield the peaks from which some motions fell it, and the first fall as one rigid body."""
+    falls = {x.states["falls"] * x.pga: x for x in searches if "falls" in x.states}
+    if len(falls) > 1:
+        ends = [(peak, falls[peak]) for peak in (min(falls), max(falls))]
+        texts = [f"{peak:.3g} g ('{x.motion}', {x.states['falls']:#.3g} ×)" for peak, x in ends]
+        yield f"over the motions it falls from {' to '.join(texts)} of PGA on"
+    as_one = {x.motion: x.states["falls as one"] for x in searches if "falls as one" in x.states}
+    if as_one:
+        motion = min(as_one, key=as_one.__getitem__)
+        yield f"as one rigid body it falls from {as_one[motion]:#.3g} × '{motion}' on"
