@@ -95,6 +95,13 @@ class NamedMotion:
         """Whether each joint slides."""
         return self.touching & (abs(self.gaps[2]) > self.least)
 
+    @property
+    def slides_within(self) -> bool:
+        """Whether moving blocks slide on each other, by much of the largest displacement."""
+        within = self.sliding & (self.bodies[self.structure.pairs] >= 0).all(axis=1)
+        largest = self.blocks.largest_displacement(self.motion)
+        return bool(np.abs(self.gaps[2][within]).max(initial=0.0) > FAST * largest)
+
     @cached_property
     def bodies(self) -> Numbers:
         """Body of each block, -1 for the ground."""
@@ -201,8 +208,8 @@ class NamedMotion:
         toe, mover, _ = min(base, key=lambda row: np.hypot(*self.contacts[row[0]] - mean.centre))
         places = mean.centre, mean.middle
         slip, reach = (np.hypot(*self.contacts[toe] - place) for place in places)
-        # the slip of the toe over the motion of the centroid
-        if slip > 0.33 * reach:
+        # the slip of the toe over the motion of the centroid; and joints within a wedge
+        if slip > 0.33 * reach or (is_low and self.slides_within):
             if is_low and len(self.moving) > 1 and not is_whole:
                 return f"toe wedge of {count(len(self.moving), 'stone')}, turning and sliding"
             return f"combined overturning and sliding of {subject}"

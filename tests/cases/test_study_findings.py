@@ -67,8 +67,8 @@ def test_cases_with_doubts_stand_before_others():
     [
         (
             (),
-            "in the study under 'first' and 'second' none of 9 cases falls, and 'case 8' raises the "
-            "residual displacement most, from 1 mm to 9 mm",
+            "in the study under 'first' and 'second' none of 9 cases falls, and 'case 8' raises "
+            "the residual displacement most, from 1 mm to 9 mm",
         ),
         (
             [8],
