@@ -60,7 +60,14 @@ ASSUMED_STRENGTH = 5e6
 
 # Factors of a rating that its outcome is made of, in other states of fill and stones
 _PRESSURES = ("without_pressure", "full_pressure", "without_backing", "without_either")
-_STATES = (*_PRESSURES, "crushing", "by_pressure")
+_STATES = (*_PRESSURES, "by_pressure")
+
+# Prefix of the states in which stones crush at the assumed strength
+_CRUSHING = "crushing "
+
+# What a rating assumes of fill and stones
+_PRESSURE, _BACKING = "the pressure of the fill", "the backing"
+_HARD_STONES = "stones that do not crush"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -94,13 +101,14 @@ class Rating(ResultDisplay):
         without_backing: least factor without the backing of a `Fill`; NaN without one, and where
             the bridge then does not stand.
         without_either: least factor without backing and without pressure; NaN likewise.
-        crushing: least factor with stones of `ASSUMED_STRENGTH`, where joints do not crush; else
-            NaN, and with a plastic fill.
+        crushing: least factors with stones of `ASSUMED_STRENGTH`, where joints do not crush:
+            "factor", of a plastic fill as weight and pressure, and those of other states by their
+            names above; else none.
         by_pressure: least factor with a plastic fill as weight and pressure (`Fill`) of its
             strength, which the four states above have then too; else NaN.
         by_cs454: least factors of a vehicle of one's own with those of CS 454 [-], 1.9 and 1.8 on
-            the worst axle: "factor", and those of other states by their names above; else none, and
-            with a plastic fill.
+            the worst axle: "factor", "crushing" and those of other states by their names above;
+            else none, and with a plastic fill.
         fill: strength of the fill, or None.
         missing: "live" and "impact" where neither the vehicle nor its user gave them.
     """
@@ -121,9 +129,9 @@ class Rating(ResultDisplay):
     deepest: float = np.nan
     without_backing: float = np.nan
     without_either: float = np.nan
-    crushing: float = np.nan
+    crushing: Mapping[str, float] = field(default_factory=dict)
     by_pressure: float = np.nan
-    by_cs454: Mapping[str, float] = field(default_factory=dict)
+    by_cs454: Mapping[str, Any] = field(default_factory=dict)
     fill: Fill | PlasticFill | None = None
     missing: Sequence[str] = ()
 
@@ -167,11 +175,11 @@ class Rating(ResultDisplay):
     @property
     def _verdict(self) -> str:
         """Whether it passes, and with which parts of a bridge alone."""
-        if not self.passes:
-            return "does not stand under its own weight" if np.isnan(self.factor) else "fails"
-        needed = [f"the {part}" for part in [self._needs()] if part]
-        needed += ["stones that do not crush"] if self.crushing < 1.0 else []
-        return f"passes only with {' and '.join(needed)}" if needed else "passes"
+        if np.isnan(self.factor):
+            return "does not stand under its own weight"
+        needed = self._needs() if self.passes else ""
+        words = "passes" if self.passes else "fails"
+        return f"{words} only with {needed}" if needed else words
 
     @property
     def headline(self) -> str:
@@ -190,29 +198,44 @@ class Rating(ResultDisplay):
         """Of which state of the fill a number alone is, in words."""
         return ", with the fill as given" if self.fill is not None else ""
 
-    def _needs(self) -> str:
-        """Return the parts of the fill without which the bridge fails, in words."""
-        if self.fill is None:
-            return ""
-        if isinstance(self.fill, PlasticFill) and not self.by_pressure >= 1.0:
-            return "fill as a plastic body"
-        without = {"pressure of the fill": self.without_pressure}
+    def _list_states(self) -> dict[tuple[str, ...], float]:
+        """Return the least factor without each set of the assumed parts of fill and stones [-].
+
+        It is NaN where the bridge then does not stand.
+        """
+        own = self.by_pressure if isinstance(self.fill, PlasticFill) else self.factor
+        known = {key: getattr(self, key) for key in _PRESSURES} | {"factor": own}
+        names: dict[tuple[str, ...], str] = {(): "factor"}
+        if self.fill is not None:
+            names[_PRESSURE,] = "without_pressure"
         if self._has_backing:
-            without["backing"] = self.without_backing
-        needed = [part for part, factor in without.items() if not factor >= 1.0]
-        if not needed and len(without) == 2 and not self.without_either >= 1.0:
-            return " or the ".join(without)
-        return " and the ".join(needed)
+            names |= {(_BACKING,): "without_backing", (_PRESSURE, _BACKING): "without_either"}
+        states = {parts: known[name] for parts, name in names.items()}
+        if self.crushing:
+            states |= {(*x, _HARD_STONES): self.crushing[key] for x, key in names.items()}
+        return states
+
+    def _needs(self) -> str:
+        """Return the parts of fill and stones without which the bridge fails, in words."""
+        if isinstance(self.fill, PlasticFill) and not self.by_pressure >= 1.0:
+            return "the fill as a plastic body"
+        cuts, states = list[tuple[str, ...]](), self._list_states()
+        for parts in sorted(states, key=len):
+            if not states[parts] >= 1.0 and not any({*cut} <= {*parts} for cut in cuts):
+                cuts.append(parts)
+        single = [part for part, *others in cuts if not others]
+        several = [" or ".join(cut) for cut in cuts if len(cut) > 1]
+        return ", and ".join(filter(None, [" and ".join(single), *several]))
 
     def _say_range(self) -> str:
-        """Return the least and the greatest factor over the states of the fill, in words."""
-        if np.isnan(self.full_pressure):
+        """Return the least and the greatest factor over all that is assumed, in words."""
+        factors = [self.factor, *self._list_states().values()]
+        if not np.isnan(self.full_pressure):
+            factors += [self.full_pressure]
+        elif not self.crushing:
             return ""
-        factors = [self.factor, self.without_pressure, self.full_pressure]
-        factors += [self.without_backing, self.without_either] if self._has_backing else []
-        factors += [self.by_pressure] if isinstance(self.fill, PlasticFill) else []
-        least = "none" if np.isnan(factors).any() else f"{min(factors):.4g}"
-        return f"the factor is {least} to {np.nanmax(factors):.4g} over what is assumed of the fill"
+        subjects = [*["the fill"] * (self.fill is not None), *["the stones"] * bool(self.crushing)]
+        return f"the factor is {_say_ends(factors)} over what is assumed of {join_words(subjects)}"
 
     def _rule_text(self) -> str:
         """Return the factor with the width by rule and the code's whole load, if it is known."""
@@ -353,10 +376,16 @@ class Rating(ResultDisplay):
 
     @property
     def crushing_text(self) -> str:
-        """Factor with an assumed strength of the stones where none counts, in words; else empty."""
-        if np.isnan(self.crushing):
+        """Factors with an assumed strength of the stones where none counts, in words, or ""."""
+        if not self.crushing:
             return ""
-        return f"at {ASSUMED_STRENGTH / MPa:g} MPa the least factor is {self.crushing:.4g}"
+        first, *others = self.crushing.values()
+        words = f"the least factor is {first:.4g}"
+        words = "the bridge does not stand" if np.isnan(first) else words
+        law = " with the fill as weight and pressure" * isinstance(self.fill, PlasticFill)
+        ends = f"{_say_ends([first, *others])} over what is assumed of the fill"
+        beside = f" ({ends})" * bool(others)
+        return f"at {ASSUMED_STRENGTH / MPa:g} MPa {words}{law}{beside}"
 
     @property
     def by_codes(self) -> dict[str, "Rating"]:
@@ -367,12 +396,14 @@ class Rating(ResultDisplay):
         """
         if np.isnan(self.factor):
             return {}
-        found, code = dict[str, Mapping[str, float]](), VEHICLES["CS454-single"]
+        found, code = dict[str, Mapping[str, Any]](), VEHICLES["CS454-single"]
         # the dynamic factor is not on a distributed load, and may be on one axle alone
         products = self.vehicle.list_products(self.structure, self.live, self.missing)
         for name, product in products.items() if self._is_multiple else ():
             share = self.live * self.impact / product
-            found[name] = {x: share * getattr(self, x) for x in ("factor", "by_rule", *_STATES)}
+            of: Any = {x: share * getattr(self, x) for x in ("factor", "by_rule", *_STATES)}
+            crushing = {state: share * factor for state, factor in self.crushing.items()}
+            found[name] = of | {"crushing": crushing}
         if self.by_cs454:
             live, impact = code.factors
             words = f"by CS 454 ({live:g}, and {impact:g} on the worst axle, from memory)"
@@ -384,11 +415,11 @@ class Rating(ResultDisplay):
         """Whether the factor with other factors on the vehicle is a multiple of this one."""
         return not self.area_load and (self.impact == 1.0 or self.vehicle.impact_on == "all axles")
 
-    def _with_factors(self, of: Mapping[str, float]) -> "Rating":
+    def _with_factors(self, of: Mapping[str, Any]) -> "Rating":
         """Return this with the factors, in each state, of another code on the same vehicle."""
         moving = replace(self.moving, worst=replace(self.moving.worst, factor=of["factor"]))
         states: dict[str, Any] = {each: of.get(each, np.nan) for each in ("by_rule", *_STATES)}
-        return replace(self, moving=moving, missing=(), **states)
+        return replace(self, moving=moving, missing=(), crushing=of["crushing"], **states)
 
     def describe_codes(self) -> list[str]:
         """Return the lines on a vehicle of one's own with the factors of codes, if it is one."""
@@ -439,6 +470,13 @@ class Rating(ResultDisplay):
         if self.geometric < 1.0:
             text += f", below 1: joints are too thin by {100.0 * (1.0 - self.geometric):.2g} %"
         return text
+
+
+def _say_ends(factors: Sequence[float]) -> str:
+    """Return the least and the greatest of some factors; "none" where one is undefined."""
+    known = [factor for factor in factors if not np.isnan(factor)]
+    least = f"{min(known):.4g}" if len(known) == len(factors) else "none"
+    return f"{least} to {max(known):.4g}" if known else least
 
 
 def _name_places(places: Collection[float]) -> str:
@@ -541,7 +579,10 @@ def rate(  # noqa: PLR0913  (factors of the check, and the strength of the bridg
         # mechanisms are much the same whichever axle has the impact of CS 454
         count = 32 if key else 32 * len(rows)
         found = _find_least_factors(weighted, positions, loads, by * area_load, states, count)
-        more |= {key: found} if key else found
+        crushed = [name for name in states if name.startswith(_CRUSHING)]
+        table = {x.removeprefix(_CRUSHING): found.pop(x, np.nan) for x in crushed}
+        every = {**found, "crushing": table}
+        more |= {key: every} if key else every
     factors = live, impact, dead, width, area_load
     more["missing"] = missing
     return Rating(structure, driven, *factors, moving, geometric, by_rule, **more)
@@ -652,22 +693,24 @@ def _further_searches(
 
 
 def _other_states(options: dict[str, Any]) -> dict[str, dict[str, Any]]:
-    """Return the options with other pressures of a fill, without backing, with crushing."""
-    states: dict[str, dict[str, Any]] = {}
-    if np.isinf(options["strength"]) and not isinstance(options["fill"], PlasticFill):
-        states["crushing"] = options | {"strength": ASSUMED_STRENGTH}
-    if (fill := as_pressure(options["fill"])) is None:
-        return states
-    fills = {
-        "without_pressure": change_fill(fill, mobilisation=0.0, active=0.0),
-        "full_pressure": change_fill(fill, mobilisation=1.0),
-    }
+    """Return the options with other pressures of a fill, without backing, all with crushing too."""
+    fill, fills = as_pressure(options["fill"]), dict[str, Fill]()
+    if fill is not None:
+        fills = {
+            "without_pressure": change_fill(fill, mobilisation=0.0, active=0.0),
+            "full_pressure": change_fill(fill, mobilisation=1.0),
+        }
+        if fill.backing is not None:
+            fills["without_backing"] = change_fill(fill, backing=None)
+            fills["without_either"] = change_fill(fills["without_pressure"], backing=None)
+    states = {name: options | {"fill": other} for name, other in fills.items()}
     if fill is not options["fill"]:
-        fills["by_pressure"] = fill
-    if fill.backing is not None:
-        fills["without_backing"] = change_fill(fill, backing=None)
-        fills["without_either"] = change_fill(fills["without_pressure"], backing=None)
-    return states | {name: options | {"fill": other} for name, other in fills.items()}
+        states["by_pressure"] = options | {"fill": fill}
+    if np.isinf(options["strength"]):
+        soft = options | {"strength": ASSUMED_STRENGTH}
+        crushed = {"factor": fill, **fills}
+        states |= {f"{_CRUSHING}{x}": soft | {"fill": other} for x, other in crushed.items()}
+    return states
 
 
 def _find_least_factors(

@@ -493,8 +493,10 @@ def vary_rating(
         known |= {"all of its passive pressure": found.full_pressure}
         none = {"limit.fill.mobilisation": 0.0, "limit.fill.active": 0.0}
         listed.append(("pressure", "no pressure of the fill", none))
-    crushing = {f"stones of {ASSUMED_STRENGTH / MPa:g} MPa that crush": found.crushing}
-    known |= crushing if np.isfinite(found.crushing) else {}
+    if found.crushing:
+        name = f"stones of {ASSUMED_STRENGTH / MPa:g} MPa that crush"
+        known[name] = np.nan_to_num(found.crushing["factor"])
+        listed.append(("strength", name, {"limit.strength": ASSUMED_STRENGTH}))
     known |= _rate_changed(case, found, changes, folder)
     if known.keys() >= changes.keys():
         known |= _rate_changed(case, found, {ALL_AT_ONCE: _merge_worst(listed, known)}, folder)

@@ -135,17 +135,79 @@ def test_a_strength_that_is_not_given_is_stated_by_hand():
         [crushes * force**2, force * (2.0 * crushes * weight + arm), crushes * weight**2 - moment]
     )
     expected = float(roots.max())
-    assert found.crushing == pytest.approx(expected, rel=1e-4)  # by tangents
-    assert found.crushing < 0.995 * found.factor
+    assert found.crushing == {"factor": pytest.approx(expected, rel=1e-4)}  # by tangents
+    assert expected < 0.995 * found.factor
+    ends = f"{expected:.4g} to {found.factor:.4g} over what is assumed of the stones"
+    assert f"; the factor is {ends}" in found.outcome
     words = f"(56 MPa of the preset is not given); at 5 MPa the least factor is {expected:.4g}"
     assert words in str(found)
     given = af.rate(stone, axle, width=2.0, strength=5e6)
     assert given.factor == pytest.approx(expected, rel=1e-4)
-    assert np.isnan(given.crushing)
-    soft = replace(found, live=1.35, impact=1.2, crushing=0.9)
+    assert not given.crushing
+    soft = replace(found, live=1.35, impact=1.2, crushing={"factor": 0.9})
     assert replace(soft, moving=_scaled(soft.moving, 3.0)).outcome.startswith(
         "passes only with stones that do not crush"
     )
+
+
+def test_doubts_about_fill_and_stones_are_combined(monkeypatch):
+    """Against the rating with the strength: it fails where neither is as given, if both are not."""
+    monkeypatch.setattr(rating, "_places_along", lambda *_: (3.5, 4.0, 4.5, 5.0))
+    bridge, axle = arch_bridge(voussoirs=9, thickness=0.5), Vehicle("axle", (4e5,), impact=1.0)
+    fill = replace(GRAVEL, backing=0.3)
+    found, soft = (
+        af.rate(bridge, axle, live=1.0, fill=fill, strength=strength) for strength in (None, 5e6)
+    )
+    states = ("without_pressure", "full_pressure", "without_backing", "without_either")
+    expected = {state: getattr(soft, state) for state in ("factor", *states)}
+    assert found.crushing == pytest.approx(expected, rel=1e-4)
+    # an axle that either of the two carries, of a bridge without backing
+    low, high = soft.without_either, min(found.without_either, soft.without_backing)
+    assert low < 0.98 * high
+    heavier = af.rate(bridge, axle, live=(low * high) ** 0.5, fill=GRAVEL)
+    words = "passes only with the pressure of the fill or stones that do not crush; the factor is "
+    ends = f"{low / heavier.live:.4g} to {heavier.full_pressure:.4g} over what is assumed of the "
+    assert heavier.outcome == f"{words}{ends}fill and the stones"
+    walking = heavier.by_codes["alone at walking pace (1.1 × 1, from memory)"]
+    assert walking.crushing["factor"] == pytest.approx(soft.without_backing / 1.1, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("low", "words"),
+    [
+        ({}, "passes"),
+        ({"stones": 0.9}, "passes only with stones that do not crush"),
+        ({"stones": np.nan}, "passes only with stones that do not crush"),
+        ({"pressure": 0.9}, "passes only with the pressure of the fill"),
+        (
+            {"pressure": 0.9, "stones": 0.9},
+            "passes only with the pressure of the fill and stones that do not crush",
+        ),
+        (
+            {"stones": 0.9, "pressure, backing": 0.9},
+            "passes only with stones that do not crush, and the pressure of the fill or the "
+            "backing",
+        ),
+        (
+            {"pressure, backing, stones": 0.9},
+            "passes only with the pressure of the fill or the backing or stones that do not crush",
+        ),
+    ],
+)
+def test_a_verdict_names_the_least_that_it_needs(lorry_rating, low, words):
+    """Without more parts a bridge carries no more: factors by the set of parts left out."""
+    names = {"": "factor", "pressure": "without_pressure"}
+    names |= {"backing": "without_backing", "pressure, backing": "without_either"}
+
+    def least(parts):
+        return min((x for key, x in low.items() if {*key.split(", ")} <= {*parts}), default=1.5)
+
+    of_fill = {name: least(key.split(", ")) for key, name in names.items()}
+    crushing = {name: least([*key.split(", "), "stones"]) for key, name in names.items()}
+    moving = _scaled(lorry_rating.moving, of_fill.pop("factor") / lorry_rating.factor)
+    fill = replace(GRAVEL, backing=0.5)
+    found = replace(lorry_rating, missing=(), fill=fill, crushing=crushing, **of_fill)
+    assert replace(found, moving=moving).short_outcome == words
 
 
 def _scaled(moving, share):
@@ -571,7 +633,7 @@ def test_a_vehicle_without_factors_passes_on_a_condition(vehicle, given, missing
     driven = {"own": own, "by span": by_span, "LM2": light, "alone": alone}[vehicle]
     found = af.rate(stone, replace(driven, wheels=10.0, lane=10.0), dead=10.0, **given)
     condition = f" if the code's {missing} is at most {found.factor:.4g}" if missing else ""
-    assert str(found).splitlines()[0].endswith(f"(the vehicle's middle), passes{condition}")
+    assert f"(the vehicle's middle), passes{condition}; the factor is" in repr(found)
     (live, impact) = (line for line in str(found).splitlines() if line[:6] in ("live l", "impact"))
     assert ("(none" in live) == ("live" in missing)
     assert ("(none" in impact) == ("impact" in missing)
@@ -609,7 +671,7 @@ def test_factors_of_codes_are_stated_with_outcome_and_range():
     least = f"{alone.without_either:.4g} to {alone.full_pressure:.4g} over what is assumed"
     assert least in bare.by_codes[names[2]].outcome
     # in each state of fill and stones, by the nearest bounds alone
-    for state in ("factor", *rating._STATES[:-1]):
+    for state in ("factor", "crushing", *rating._PRESSURES):
         assert given.by_cs454[state] == pytest.approx(getattr(by_cs454, state), rel=1e-3), state
     of_code = given.by_codes[code]
     assert of_code.factor == given.by_cs454["factor"]
