@@ -181,25 +181,26 @@ def state_scale(
 
 
 def state_ratings(rated: Sequence[tuple[Rating, Sequence[str]]]) -> Statement:
-    """State the factor of each vehicle, by codes too; sentences are of the first."""
-    rows, first = [], rated[0][0]
+    """State the factor of each vehicle, by codes too, least first; sentences are of the first."""
+    rows, first = list[tuple[float, Row]](), rated[0][0]
     for found, _ in rated:
         for code, each in {"": found, **found.by_codes}.items():
             demand, words = f"{found.vehicle.name} {code}".strip(), each.short_outcome
             at = f", {each.place}" if each is found else ""
             factor = "-" if np.isnan(each.factor) else f"{each.factor:.4g}"
-            rows.append(Row("rating", demand, f"{words}{at}", factor, {"outcome": words}))
+            row = Row("rating", demand, f"{words}{at}", factor, {"outcome": words})
+            rows.append((each.factor, row))
     sentences = [repr(first)]
     if not np.isnan(first.factor):
         outcome, *others = first.clauses
         outcome = f"rating for {first.vehicle.name}: factor {first.factor:.4g}, {outcome}"
         sentences = [outcome, *others, f"worst {first.place}"]
     if len(rated) > 1:
-        least = min((found for found, _ in rated), key=lambda each: each.factor)
-        words = f"{least.vehicle.name} has the least factor, {least.factor:.4g}"
-        sentences.append(f"of {len(rated)} vehicles {words}")
+        sentences.append(f"of {len(rated)} vehicles it has the least factor")
     sentences += [*first.describe_codes(), *first.describe_pressure(), *first.describe_backing()]
-    return Statement(sentences, rows).with_lines([line for _, own in rated for line in own])
+    least_first = [row for _, row in sorted(rows, key=lambda each: each[0])]
+    stated = Statement(sentences, least_first)
+    return stated.with_lines([line for _, own in rated for line in own])
 
 
 def state_assessments(found: Mapping[str, KinematicAssessment], lines: Sequence[str]) -> Statement:

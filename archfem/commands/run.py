@@ -317,11 +317,14 @@ def rate(options: argparse.Namespace) -> int:
     case = Case.read(options.case, options.changes)
     rating = {**case.settings.get("rating", {}), **given}
     tables = name_vehicles(options.vehicles, rating)
-    ratings, table = _rate_each(case, tables)
-    (first, lines), varied, stated = ratings[0], None, state_ratings(ratings)
+    rated = _rate_each(case, tables)
+    ratings, (first, _, table), varied = [each[:2] for each in rated], rated[0], None
+    stated = state_ratings(ratings)
     interrupted = len(ratings) < len(tables) and not np.isnan(first.factor)
     if options.vary and not interrupted and not np.isnan(first.factor):
-        varied, sentences, doubts = _vary(case, table, first, options.out)
+        # the one whose outcome other properties change first
+        found, lines, own = min(rated, key=lambda each: abs(np.log(max(each[0].factor, 1e-9))))
+        varied, sentences, doubts = _vary(case, own, found, options.out)
         interrupted = len(doubts) > 0
         lines[:0] = [*sentences, *doubts]
         stated = stated._replace(sentences=[*stated.sentences, *sentences]).with_lines(doubts)
@@ -342,13 +345,13 @@ def rate(options: argparse.Namespace) -> int:
 
 
 def _vary(
-    case: Case, table: Mapping[str, Any], first: Rating, out: str | None
+    case: Case, table: Mapping[str, Any], found: Rating, out: str | None
 ) -> tuple[result_text.ResultTable, list[str], list[str]]:
     """Return table and sentences of the variations of a rating, and those that Ctrl-C left out."""
     from archfem.studies.variations import vary_rating
 
     folder = None if out is None else path_inside(Path(out), "rating_variations")
-    varied, sentences, left = vary_rating(case, table, first, folder)
+    varied, sentences, left = vary_rating(case, table, found, folder)
     remedy = "give --out, which keeps the others"
     if folder is not None:
         remedy = f"run the same command again, which continues from {folder}"
@@ -358,8 +361,8 @@ def _vary(
 
 def _rate_each(
     case: Case, tables: Sequence[Mapping[str, Any]]
-) -> tuple[list[tuple[Rating, list[str]]], Mapping[str, Any]]:
-    """Return ratings with doubts, one's own vehicles before those of codes; table of the first.
+) -> list[tuple[Rating, list[str], Mapping[str, Any]]]:
+    """Return ratings with their doubts and tables, that of the least factor first.
 
     Those before Ctrl-C are returned, if there are any.
     """
@@ -382,8 +385,7 @@ def _rate_each(
             progress.show(f"{found.vehicle.name}: {found.headline.partition(',')[0]}", 1)
             if np.isnan(found.factor):  # whatever the vehicle
                 break
-    rated.sort(key=lambda each: (isinstance(each[2]["vehicle"], str), each[0].factor))
-    return [(found, doubts) for found, doubts, _ in rated], rated[0][2]
+    return sorted(rated, key=lambda each: each[0].factor)
 
 
 def mesh(options: argparse.Namespace) -> None:

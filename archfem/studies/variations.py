@@ -505,7 +505,9 @@ def vary_rating(
     rows = [[name, f"{known[name]:.4g}".replace("nan", "-")] for name in order]
     rows += [[name, "not computed"] for name in late]
     rows = [[name, "does not stand" if cell == "0" else cell] for name, cell in rows]
-    return ResultTable(["with", "factor"], rows), _say_spreads(listed, known, len(late)), len(late)
+    name = found.vehicle.name
+    words = _say_spreads(name, listed, known, len(late))
+    return ResultTable([f"{name} with", "factor"], rows), words, len(late)
 
 
 def _merge_worst(listed: Sequence[Change], known: Mapping[str, float]) -> dict[str, Any]:
@@ -517,7 +519,9 @@ def _merge_worst(listed: Sequence[Change], known: Mapping[str, float]) -> dict[s
     return {key: value for _, change in worst.values() for key, value in change.items()}
 
 
-def _say_spreads(listed: Sequence[Change], known: Mapping[str, float], late: int) -> list[str]:
+def _say_spreads(
+    vehicle: str, listed: Sequence[Change], known: Mapping[str, float], late: int
+) -> list[str]:
     """Return the range of single changes, all at once, and the first quantity to measure."""
     given = known["the values of the case"]
     single = {k: x for k, x in known.items() if k != ALL_AT_ONCE and np.isfinite(x)}
@@ -525,8 +529,9 @@ def _say_spreads(listed: Sequence[Change], known: Mapping[str, float], late: int
     missing = f"; {late} variations were not computed" if late else ""
     at_once = f"; {ALL_AT_ONCE} {known[ALL_AT_ONCE]:.4g}" if ALL_AT_ONCE in known else ""
     range_text = (
-        f"one property at a time changes the factor of {given:.4g} to {single[least]:.4g} "
-        f"({least}) at least and {single[most]:.4g} ({most}) at most{at_once}{missing}"
+        f"one property at a time changes the factor of {vehicle}, {given:.4g}, to "
+        f"{single[least]:.4g} ({least}) at least and {single[most]:.4g} ({most}) at most"
+        f"{at_once}{missing}"
     )
     ends = dict[str, list[float]]()
     for subject, name, _ in listed:
@@ -535,7 +540,7 @@ def _say_spreads(listed: Sequence[Change], known: Mapping[str, float], late: int
             ends.setdefault(subject, [given]).append(single[name])
     first = sorted(ends, key=lambda subject: -float(np.ptp(ends[subject])))[:3]
     spreads = (f"{each} ({min(ends[each]):.4g} to {max(ends[each]):.4g})" for each in first)
-    return [range_text, *([f"measure first: {', '.join(spreads)}"] if first else [])]
+    return [range_text, *([f"measure first, for {vehicle}: {', '.join(spreads)}"] if first else [])]
 
 
 def _rate_changed(

@@ -884,7 +884,7 @@ def test_of_several_vehicles_a_table_has_the_factors(small, undrawn):
         texts = "vehicle  factor", "Rating of 'it'", "Rating of other"
         files = {"rating.txt": "\n\n".join(texts), "vehicles.csv": "\n".join(rows)}
         files["rating.toml"] = '[rating]\nvehicle = "LM71"'
-        files["rating_variations.csv"] = "with,factor\nrings a tenth thinner,1.3"
+        files["rating_variations.csv"] = "LM71 with,factor\nrings a tenth thinner,1.3"
         write_files(files, draft)
         for name in ("vehicles", "places", "rating"):
             (draft / f"{name}.png").write_bytes(b"\x89PNG" + bytes(20))
@@ -893,7 +893,8 @@ def test_of_several_vehicles_a_table_has_the_factors(small, undrawn):
     assert every.caption == "Factor of each vehicle over its place."
     assert places.caption == "Each vehicle at its worst place."
     assert varied.rows == [["rings a tenth thinner", "1.3"]]
-    assert varied.caption == "Factor with one property changed at a time, LM71"
+    assert varied.caption == "Factor with one property changed at a time"
+    assert varied.head == ["LM71 with", "factor"]
     assert figure.caption.endswith("mechanism at the worst place, LM71")
     assert data.read_table("rating") == {"vehicle": "LM71, LM1"}
     assert (grid.head, grid.rows) == (["vehicle", "factor"], [["LM71", "1.5"], ["LM1", "1.9"]])

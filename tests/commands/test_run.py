@@ -15,6 +15,7 @@ import xarray as xr
 from pages import read_page
 
 import archfem as af
+from archfem.cases.result_text import ResultTable
 from archfem.cases.run import carry_out
 from archfem.commands import margin
 from archfem.commands.run import print_results
@@ -800,7 +801,7 @@ def test_a_rating_that_is_stopped_at_once_keeps_nothing(tmp_path, monkeypatch, c
 
 
 def test_vehicles_are_rated_together(tmp_path, unplotted, capsys, monkeypatch):
-    """The case's own first, by name, though another is worse; then the worst first."""
+    """The case's own by name; the worst is first, of the picture and the table too."""
     path, out = tmp_path / "ring.toml", tmp_path / "out"
     own = '{ name = "cart", axles = ["3 kN"] }, { name = "van", axles = ["9 kN"] }'
     strong = LIMIT + 'strength = "none"\n'
@@ -811,11 +812,10 @@ def test_vehicles_are_rated_together(tmp_path, unplotted, capsys, monkeypatch):
     said = capsys.readouterr().out
     rows = pd.read_csv(out / "vehicles.csv")
     assert (out / "vehicles.png").exists()
-    assert rows["vehicle"][0] == "cart"
-    assert {*rows["vehicle"][1:]} == {"LM1", "HL93-tandem", "HL93-truck"}
-    assert (np.diff(rows["factor"][1:]) >= 0.0).all()
-    assert rows["factor"][0] > rows["factor"][1]
-    case, stated = af.Case.read(path), []
+    assert {*rows["vehicle"]} == {"cart", "LM1", "HL93-tandem", "HL93-truck"}
+    assert (np.diff(rows["factor"]) >= 0.0).all()
+    assert rows["vehicle"][0] == "LM1"
+    case, stated, factors = af.Case.read(path), [], {}
     for _, (name, _, factor, *_) in rows.iterrows():
         vehicle = case.rating["vehicle"] if name == "cart" else name
         found = af.rate(case.structure, vehicle)
@@ -825,21 +825,21 @@ def test_vehicles_are_rated_together(tmp_path, unplotted, capsys, monkeypatch):
         assert {*lines} <= {*said.splitlines()}
         shared = "every x is that of the case and the picture; "
         assert said.count(shared) == 1
-        if name == "cart":
+        factors |= {name: found.factor}
+        factors |= {f"{name} {code}": each.factor for code, each in found.by_codes.items()}
+        if name == "LM1":
             outcome, *others = found.clauses
             stated += [f"rating for {name}: factor {found.factor:.4g}, {outcome}", *others]
-            least = f"{rows['vehicle'][1]} has the least factor, {rows['factor'][1]:.4g}"
-            stated += [f"worst {found.place}", f"of 4 vehicles {least}", *found.describe_codes()]
+            stated += [f"worst {found.place}", "of 4 vehicles it has the least factor"]
+            stated += found.describe_codes()
             assert (out / "rating.csv").read_text().strip() == found.table()
             table = tomllib.loads((out / "rating.toml").read_text())["rating"]
-            assert table["vehicle"]["name"] == name
-            codes = [f"cart {code}" for code in found.by_codes]
-    # a conclusion has sentences of the first, by codes too, and rows of all
+            assert table["vehicle"] == name
+    # a conclusion has sentences of the first, by codes too, and rows of all, the worst first
     kept = json.loads((out / "rating.json").read_text())
     assert kept["sentences"] == stated
-    names = [*rows["vehicle"]]
-    assert [row[1] for row in kept["rows"]] == [names[0], *codes, *names[1:]]
-    assert len(codes) == 4
+    assert [row[1] for row in kept["rows"]] == sorted(factors, key=factors.get)
+    assert len(factors) == 4 + 4
     assert "left out: a second lorry that meets the vehicle" in str(kept["notes"])
     text = (out / "rating.txt").read_text().strip()
     assert text in said
@@ -847,13 +847,14 @@ def test_vehicles_are_rated_together(tmp_path, unplotted, capsys, monkeypatch):
     assert [line.split()[0] for line in table[1:]] == [*rows["vehicle"]]
     # without places, ranges and conditions, which files and texts have
     assert max(map(len, table)) < 140
-    assert table[1].endswith(" passes, without partial factors")
+    assert table[4].startswith("cart ")
+    assert table[4].endswith(" passes, without partial factors")
     assert af.commands.main(["rate", str(path), "--out", str(out)]) == 0
     assert [*pd.read_csv(out / "vehicles.csv")["vehicle"]] == ["van", "cart"]
     # a code's vehicle is no one's own, though the case names it first
     path.write_text(path.read_text().replace(own, f'"LM1", {own}'))
     assert af.commands.main(["rate", str(path), "--out", str(out)]) == 0
-    assert [*pd.read_csv(out / "vehicles.csv")["vehicle"]] == ["van", "cart", "LM1"]
+    assert [*pd.read_csv(out / "vehicles.csv")["vehicle"]] == ["LM1", "van", "cart"]
     path.write_text(path.read_text().replace('"LM1", ', ""))
     assert af.commands.main(["rate", str(path), "--vehicle", "bus"]) == 1
     said = capsys.readouterr().err
@@ -864,6 +865,30 @@ def test_vehicles_are_rated_together(tmp_path, unplotted, capsys, monkeypatch):
         each.name for each in out.iterdir()
     }
     assert "van" in (out / "rating.toml").read_text()
+
+
+def test_the_vehicle_that_decides_is_varied(tmp_path, unplotted, monkeypatch):
+    """Its factor is the nearest to 1: of a worse one other properties would change no outcome."""
+    path, out = tmp_path / "ring.toml", tmp_path / "out"
+    loads = {"lighter": 25, "light": 50, "heavy": 180}
+    own = [f'{{ name = "{name}", axles = ["{load} kN"] }}' for name, load in loads.items()]
+    path.write_text(f"{LIMIT.replace('= 17', '= 7')}[rating]\nvehicle = [{', '.join(own)}]\n")
+    monkeypatch.setattr("archfem.limit.rating._places_along", lambda *_: (0.9, 1.2))
+    seen = []
+
+    def vary(case, table, found, folder):
+        seen.append((table["vehicle"]["name"], found.vehicle.name))
+        return ResultTable(["light with", "factor"], [["it", "1"]]), ["measure first: it"], 0
+
+    monkeypatch.setattr("archfem.studies.variations.vary_rating", vary)
+    assert af.commands.main(["rate", str(path), "--vary", "--out", str(out)]) == 3
+    rows = pd.read_csv(out / "vehicles.csv").set_index("vehicle")["factor"]
+    assert [*rows.index] == ["heavy", "light", "lighter"]
+    decides = (rows.apply(np.log)).abs().idxmin()
+    assert seen == [(decides, decides)] == [("light", "light")]
+    texts = (out / "rating.txt").read_text().split("\n\n")
+    (varied,) = (text for text in texts if "measure first" in text)
+    assert varied.startswith("Rating of 'a ring pushed over' for light: ")
 
 
 def test_a_bridge_that_does_not_stand_is_rated_for_no_vehicle(tmp_path, unplotted, capsys):

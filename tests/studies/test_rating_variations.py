@@ -78,7 +78,8 @@ def test_each_row_is_the_rating_of_a_changed_case(tmp_path):
     least_of_all, least, *_, most = sorted(factors, key=factors.get)
     ends = f"to {factors[least]:.4g} ({least}) at least and {factors[most]:.4g} ({most}) at most"
     at_once = f"all unfavourable at once {factors[least_of_all]:.4g}"
-    first = f"one property at a time changes the factor of {found.factor:.4g} {ends}; {at_once}"
+    begin = f"one property at a time changes the factor of cart, {found.factor:.4g}, "
+    first = f"{begin}{ends}; {at_once}"
     assert words[0] == first
     # against a rating with the worst of each property
     worst = [*thin, "structure.backfill.cover=0.2", "limit.strength=2e6", "rating.width=1.62"]
@@ -90,7 +91,7 @@ def test_each_row_is_the_rating_of_a_changed_case(tmp_path):
     assert factors[least_of_all] == pytest.approx(whole.factor, rel=SEARCHED)
     assert next(iter(cells)) == least_of_all
     assert [*factors.values()] == sorted(factors.values())
-    assert words[1].startswith("measure first: ")
+    assert words[1].startswith("measure first, for cart: ")
 
 
 @pytest.mark.parametrize("key", ["breadth", "gap"])
@@ -154,7 +155,7 @@ def test_variations_that_are_stopped_are_kept(tmp_path, unplotted, capsys, monke
     monkeypatch.setattr(variations, "rate_again", rate_again)
     command = ["rate", str(path), "--vary", "--out", str(out)]
     assert af.commands.main(command) == 130
-    rows = pd.read_csv(out / "rating_variations.csv").set_index("with")["factor"]
+    rows = pd.read_csv(out / "rating_variations.csv").set_index("cart with")["factor"]
     late = rows[rows == "not computed"]
     assert len(late) == 14 - 3  # rings, and a narrower pier, which is refused before it is rated
     assert float(rows["rings a tenth thinner"]) < float(rows["rings a tenth thicker"])
@@ -164,7 +165,7 @@ def test_variations_that_are_stopped_are_kept(tmp_path, unplotted, capsys, monke
     stop[0] = 0
     assert af.commands.main(command) == 3
     assert len(seen) == 13 + 1  # all but the narrower pier, and the interrupted one twice
-    second = pd.read_csv(out / "rating_variations.csv").set_index("with")["factor"]
+    second = pd.read_csv(out / "rating_variations.csv").set_index("cart with")["factor"]
     assert "not computed" not in set(second)
     assert second["rings a tenth thinner"] == rows["rings a tenth thinner"]
     text, factors = (out / "rating.txt").read_text(), pd.to_numeric(second, errors="coerce")
@@ -200,8 +201,8 @@ def test_a_rating_of_the_command_is_varied(tmp_path, unplotted, capsys, monkeypa
     said = capsys.readouterr().out
     assert "\none property at a time changes the factor of " in said
     rows = pd.read_csv(out / "rating_variations.csv")
-    assert {"piers a tenth narrower", "0.1 m more cover"} <= {*rows["with"]}
-    assert (np.diff(rows["factor"][rows["with"].str.startswith("rings")]) > 0.0).all()
+    assert {"piers a tenth narrower", "0.1 m more cover"} <= {*rows["cart with"]}
+    assert (np.diff(rows["factor"][rows["cart with"].str.startswith("rings")]) > 0.0).all()
     gaps = [each["structure"]["piers"]["gap"] for each in changed]
     breadth = float(re.search(r"'pier' ([\d.]+) m broad", said)[1])
     assert max(x for x in gaps if isinstance(x, float)) == pytest.approx(0.6 + 0.1 * breadth, 1e-3)

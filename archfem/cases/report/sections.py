@@ -37,6 +37,7 @@ from archfem.dynamics.recorder import library_versions
 from archfem.dynamics.verdict_range import VerdictRange
 from archfem.errors import InvalidInput
 from archfem.joints.criteria import assessed_joints
+from archfem.masonry.block import Block
 from archfem.masonry.joint_closing import describe_closing
 from archfem.masonry.structure import Structure, join_names
 from archfem.statics.assessment_checks import LIMIT_STATES, LimitState
@@ -125,7 +126,7 @@ def build_input_section(data: ReportData) -> Section:
         "monolithic": "elastic finite elements, all nodes kept, weak forms of joints",
     }
     supports = (block for block in data.case.structure.blocks if block.fixed)
-    fixed = list(dict.fromkeys(f"'{block.part or block.name}'" for block in supports))
+    fixed = dict.fromkeys(_name_support(data.case.structure, block) for block in supports)
     large = data.case.analysis.discretisation.displacements == "large"
     moved = "of any size" if large else "small: equilibrium where blocks stood"
     follows = "; an assessment follows its mechanism" * ("assessment" in data.statements)
@@ -215,6 +216,12 @@ def _describe_extent(structure: Structure) -> str:
     return text
 
 
+def _name_support(structure: Structure, block: Block) -> str:
+    """Return the name of a fixed block, or of its part where all of it is fixed."""
+    whole = all(each.fixed for each in structure.blocks if each.part == block.part)
+    return f"'{block.part}'" if block.part and whole else f"'{block.name}'"
+
+
 def _describe_drawing(data: ReportData) -> list[TextBlock]:
     """Name the drawing of the blocks, its unit and tolerance, and how far corners were moved."""
     text = data.read_text(DRAWING_FILE)
@@ -284,7 +291,7 @@ def _build_rating(data: ReportData) -> list[Any]:
     texts = text.text.split("\n\n")[1:] if grids else [text.text]
     if (varied := data.read_text("rating_variations.csv")) is not None:
         head, *rows = reader(varied.splitlines())
-        title = f"Factor with one property changed at a time{of}"
+        title = "Factor with one property changed at a time"
         figures.insert(0, Grid(head, rows, title, "words"))
     return [*grids, *(TextBlock(each, "lines") for each in texts), *figures]
 
