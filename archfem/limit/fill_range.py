@@ -43,6 +43,16 @@ def vary_fill(fill: Fill | None) -> dict[FillAssumption, tuple[float, Fill | Non
     return assumed
 
 
+def vary_pressure(fill: Fill) -> dict[str, Fill]:
+    """Return a fill with none and with all of its passive pressure, and without its backing."""
+    none = change_fill(fill, mobilisation=0.0, active=0.0)
+    fills = {"without_pressure": none, "full_pressure": change_fill(fill, mobilisation=1.0)}
+    if fill.backing is not None:
+        fills["without_backing"] = change_fill(fill, backing=None)
+        fills["without_either"] = change_fill(none, backing=None)
+    return fills
+
+
 def say_part(mobilisation: float) -> str:
     """Return the mobilised part of the passive pressure, in words."""
     words = {0.0: "none", 0.333: "a third", 1.0: "all"}

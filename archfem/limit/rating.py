@@ -14,15 +14,14 @@ from archfem._validation import validate_arguments
 from archfem.errors import InvalidInput
 from archfem.limit.backfill import check_options, is_balanced, self_weight_programme
 from archfem.limit.collapse import describe_crushing, describe_fill
-from archfem.limit.fill_range import say_part
+from archfem.limit.fill_range import say_part, vary_pressure
 from archfem.limit.fill_strength import (
     Fill,
     PlasticFill,
     as_pressure,
-    change_fill,
     place_backing,
 )
-from archfem.limit.instability import DeepenedBlocks
+from archfem.limit.thickness import find_geometric_factor
 from archfem.limit.vehicles import (
     DRIVING_DIRECTIONS,
     VEHICLES,
@@ -555,7 +554,7 @@ def rate(  # noqa: PLR0913  (factors of the check, and the strength of the bridg
         given = options | {"spacings": driven.spacings, "area_load": live * area_load}
         given["positions"] = positions
         spread = [(structure.width / width * row).tolist() for row in rows]
-        return _least_of([moving_load(weighted, row, **given) for row in spread])
+        return MovingLoad.least_of([moving_load(weighted, row, **given) for row in spread])
 
     is_plastic = isinstance(fill, PlasticFill)
     axles = parse_axles(driven.axles, driven.spacings)
@@ -571,7 +570,7 @@ def rate(  # noqa: PLR0913  (factors of the check, and the strength of the bridg
         least = min(width, rule), max(area_load, driven.area_load)
         by_rule = drive(*least, [moving.position]).worst.factor
     unknown = np.nan, np.nan
-    geometric, deepest = unknown if is_plastic else _geometric_factor(weighted, moving, options)
+    geometric, deepest = unknown if is_plastic else find_geometric_factor(weighted, moving, options)
     more: dict[str, Any] = {"strength": strength, "deepest": deepest, "fill": fill}
     for key, each, by, states in _further_searches(driven, rows, live, options):
         # of the whole width, as the structure is modelled
@@ -579,10 +578,7 @@ def rate(  # noqa: PLR0913  (factors of the check, and the strength of the bridg
         # mechanisms are much the same whichever axle has the impact of CS 454
         count = 32 if key else 32 * len(rows)
         found = _find_least_factors(weighted, positions, loads, by * area_load, states, count)
-        crushed = [name for name in states if name.startswith(_CRUSHING)]
-        table = {x.removeprefix(_CRUSHING): found.pop(x, np.nan) for x in crushed}
-        every = {**found, "crushing": table}
-        more |= {key: every} if key else every
+        more |= {key: found} if key else found
     factors = live, impact, dead, width, area_load
     more["missing"] = missing
     return Rating(structure, driven, *factors, moving, geometric, by_rule, **more)
@@ -618,16 +614,6 @@ def _check_width(width: float, structure: Structure) -> None:
         )
 
 
-def _least_of(each: Sequence[MovingLoad]) -> MovingLoad:
-    """Return the worst of some loads, with the least factors of all at each place."""
-    worst = min(each, key=lambda moving: moving.worst.factor)
-    least = xr.concat([moving.factors["factor"] for moving in each], "load").min("load")
-    return replace(
-        worst,
-        factors=worst.factors.assign(factor=least.assign_attrs(each[0].factors["factor"].attrs)),
-    )
-
-
 def _scale_weights(structure: Structure, factor: float) -> Structure:
     """Return a structure whose blocks weigh a multiple."""
     if factor == 1.0:
@@ -647,39 +633,6 @@ def _places_along(structure: Structure, vehicle: Array, steps: int = 100) -> Seq
     return tuple(np.linspace(ends[0], ends[1], count).tolist())
 
 
-def _geometric_factor(
-    structure: Structure, moving: MovingLoad, options: dict[str, Any], tolerance: float = 1e-4
-) -> tuple[float, float]:
-    """Return the depth of joints over the least one that carries the worst row of axles [-].
-
-    Where none does, it is NaN, and the factor of the deepest joints follows.
-    """
-    stones, dead = self_weight_programme(structure, **options)
-    axles = stones.load([load for load in moving.worst.live if isinstance(load, PointLoad)])
-
-    def factor_of(share: float) -> float:
-        blocks = DeepenedBlocks(dead.blocks.structure, share)
-        crushing = None if dead.crushing is None else share * dead.crushing
-        changed = replace(dead, blocks=blocks, cohesion=share * dead.cohesion, crushing=crushing)
-        if not is_balanced(changed.minimise_residual(), changed):
-            return np.nan
-        optimum = changed.with_load_factor(axles).solve()
-        return np.inf if optimum is None else -optimum.value
-
-    # what narrower joints carry wider ones carry, so that halving finds the least
-    low, high = 0.0, 1.0
-    while not moving.worst.factor >= 1.0 and not (found := factor_of(high)) >= 1.0:
-        low, high = high, 2.0 * high
-        if high > 1e3:  # no depth helps
-            return np.nan, found
-    while high - low > tolerance * high:
-        middle = 0.5 * (low + high)
-        low, high = (low, middle) if factor_of(middle) >= 1.0 else (middle, high)
-        if high < tolerance:
-            return np.inf, np.nan
-    return 1.0 / high, np.nan
-
-
 def _further_searches(
     driven: Vehicle, rows: Sequence[Array], live: float, options: dict[str, Any]
 ) -> Iterator[tuple[str, Sequence[Array], float, dict[str, dict[str, Any]]]]:
@@ -694,15 +647,8 @@ def _further_searches(
 
 def _other_states(options: dict[str, Any]) -> dict[str, dict[str, Any]]:
     """Return the options with other pressures of a fill, without backing, all with crushing too."""
-    fill, fills = as_pressure(options["fill"]), dict[str, Fill]()
-    if fill is not None:
-        fills = {
-            "without_pressure": change_fill(fill, mobilisation=0.0, active=0.0),
-            "full_pressure": change_fill(fill, mobilisation=1.0),
-        }
-        if fill.backing is not None:
-            fills["without_backing"] = change_fill(fill, backing=None)
-            fills["without_either"] = change_fill(fills["without_pressure"], backing=None)
+    fill = as_pressure(options["fill"])
+    fills = vary_pressure(fill) if fill is not None else {}
     states = {name: options | {"fill": other} for name, other in fills.items()}
     if fill is not options["fill"]:
         states["by_pressure"] = options | {"fill": fill}
@@ -720,9 +666,10 @@ def _find_least_factors(
     area_load: float,
     states: dict[str, dict[str, Any]],
     count: int,
-) -> dict[str, float]:
+) -> dict[str, Any]:
     """Return the least factor in each state; none where the structure does not stand in it.
 
+    Those of states with crushing are in a table of their own, undefined (NaN) where it does not.
     A count of rows of axles, of all vehicles together, is solved first.
     """
     rows = dict.fromkeys(
@@ -734,7 +681,7 @@ def _find_least_factors(
     # the fans of loads do not depend on pressure, backing and strength
     stones, _ = self_weight_programme(structure, **next(iter(states.values())))
     axles = {row: stones.load(row) for row in rows if row}
-    strips, factors = cut_road(structure, area_load), dict[str, float]()
+    strips, factors = cut_road(structure, area_load), dict[str, Any]()
     forces = [stones.load([strip]) for strip in strips]
     for name, given in track_progress("other states", states.items()):
         stones, dead = self_weight_programme(structure, **given)
@@ -744,4 +691,6 @@ def _find_least_factors(
         worst = find_worst_rows(dead, axles, strips, forces, count)
         worst = dict(islice(worst.items(), 1 if given["friction"] != "nonassociated" else 3))
         factors[name] = min(collapse_factors(stones, dead, worst, given).values())
-    return factors
+    crushed = [name for name in states if name.startswith(_CRUSHING)]
+    table = {name.removeprefix(_CRUSHING): factors.pop(name, np.nan) for name in crushed}
+    return factors | {"crushing": table}

@@ -1,13 +1,19 @@
-"""Least thickness at which a family of structures stands, by bisection."""
+"""Least thickness of structures, and least depth of joints that carries axles, by bisection."""
 
 from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from archfem._validation import check_between, check_type, validate_arguments
 from archfem.errors import InvalidInput, InvalidStructure
+from archfem.limit.backfill import is_balanced, self_weight_programme
 from archfem.limit.collapse import stands
 from archfem.limit.fill_strength import Fill
+from archfem.limit.instability import DeepenedBlocks
+from archfem.limit.vehicles import MovingLoad
+from archfem.masonry.loads import PointLoad
 from archfem.masonry.structure import Structure
 
 
@@ -141,3 +147,36 @@ def _largest_member(build: Callable[[float], Structure]) -> tuple[float, float]:
         check_type(built, Structure, f"build({thickness:g})", "make a structure, thickness given")
         return float(thickness), built.size
     raise InvalidInput(f"build makes no structure 1e-6 to 100 m thick: {refusal}")
+
+
+def find_geometric_factor(
+    structure: Structure, moving: MovingLoad, options: dict[str, Any], tolerance: float = 1e-4
+) -> tuple[float, float]:
+    """Return the depth of joints over the least one that carries the worst row of axles [-].
+
+    Where none does, it is NaN, and the factor of the deepest joints follows.
+    """
+    stones, dead = self_weight_programme(structure, **options)
+    axles = stones.load([load for load in moving.worst.live if isinstance(load, PointLoad)])
+
+    def factor_of(share: float) -> float:
+        blocks = DeepenedBlocks(dead.blocks.structure, share)
+        crushing = None if dead.crushing is None else share * dead.crushing
+        changed = replace(dead, blocks=blocks, cohesion=share * dead.cohesion, crushing=crushing)
+        if not is_balanced(changed.minimise_residual(), changed):
+            return np.nan
+        optimum = changed.with_load_factor(axles).solve()
+        return np.inf if optimum is None else -optimum.value
+
+    # what narrower joints carry wider ones carry, so that halving finds the least
+    low, high = 0.0, 1.0
+    while not moving.worst.factor >= 1.0 and not (found := factor_of(high)) >= 1.0:
+        low, high = high, 2.0 * high
+        if high > 1e3:  # no depth helps
+            return np.nan, found
+    while high - low > tolerance * high:
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if factor_of(middle) >= 1.0 else (middle, high)
+        if high < tolerance:
+            return np.inf, np.nan
+    return 1.0 / high, np.nan

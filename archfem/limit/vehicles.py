@@ -240,6 +240,18 @@ class MovingLoad(ResultDisplay):
     direction: str
     position: float
 
+    @classmethod
+    def least_of(cls, each: Sequence["MovingLoad"]) -> "MovingLoad":
+        """Return the worst of some loads, with the least factors of all at each place.
+
+        Args:
+            each: loads at the same places.
+        """
+        worst = min(each, key=lambda moving: moving.worst.factor)
+        least = xr.concat([moving.factors["factor"] for moving in each], "load").min("load")
+        least = least.assign_attrs(worst.factors["factor"].attrs)
+        return replace(worst, factors=worst.factors.assign(factor=least))
+
     def _summary(self) -> str:
         """Describe the least factor and its place in one line."""
         return f"MovingLoad: least factor {self.worst.factor:.4g}, {self._place}"
