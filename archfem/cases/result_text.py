@@ -35,7 +35,7 @@ from archfem.joints.criteria import (
     with_failure_flags,
 )
 from archfem.limit.collapse import Collapse, Outcome, describe_crushing, describe_fill
-from archfem.limit.fill_strength import PlasticFill, as_pressure
+from archfem.limit.fill_strength import Fill, PlasticFill, as_pressure
 from archfem.limit.instability import explain_instability
 from archfem.limit.mechanism_count import Mechanism, duration_text
 from archfem.limit.rating import Rating
@@ -287,6 +287,7 @@ def describe_collapse(structure: Structure, collapse: Collapse, limit: LimitAnal
         lines.append(f"over what is assumed of the fill: {over}{least}")
     crushing = limit.describe_crushing(structure)
     lines += filter(None, [crushing, describe_fill(limit.fill, structure)])
+    lines += note_lower_crowns(structure, limit.fill)
     if structure.heads.any() and collapse.outcome is Outcome.COLLAPSES:
         lines.append(
             "blocks are rigid, and elastic joints may bear less: hold a motion a tenth below"
@@ -337,6 +338,21 @@ def describe_ratings(
     return f"{files['rating.txt']}\n\n{varied.text}", files
 
 
+def note_lower_crowns(structure: Structure, fill: Fill | PlasticFill | None) -> list[str]:
+    """Return a note on the fill above lower rings, where the crowns of rings differ."""
+    crowns = dict[str, float]()
+    for block in structure.blocks:
+        if block.role == "ring":
+            crown = float(block.drawn()[:, 1].max())
+            crowns[block.part] = max(crown, crowns.get(block.part, crown))
+    low, high = min(crowns.values(), default=0.0), max(crowns.values(), default=0.0)
+    # chords of rings of odd and of even numbers of stones differ by less
+    if not isinstance(fill, Fill) or high - low < 0.01:
+        return []
+    by = f"crowns differ by {high - low:.2f} m: fill above '{min(crowns, key=crowns.__getitem__)}'"
+    return [f"{NOTE_MARK}{by} bears none of the passive pressure of a higher ring"]
+
+
 def doubt_rating(found: Rating, limit: LimitAnalysis) -> list[str]:
     """Return doubts about a rating, equilibrium and a strength left out, and notes."""
     if np.isnan(found.factor):
@@ -356,6 +372,7 @@ def doubt_rating(found: Rating, limit: LimitAnalysis) -> list[str]:
             words = f"mobilisation {fill.mobilisation:.2g} counts as {least:.2g}, the active"
             lines.append(f"{NOTE_MARK}{words} pressure; 0 is not without pressure, which is beside")
     structure, springs = found.structure, list[int]()
+    lines += note_lower_crowns(structure, found.fill)
     springs += [n for joint in structure.joints if joint.role == "ring" for n in joint.blocks]
     if any(structure.blocks[number].fixed for number in springs):
         words = 'abutments are taken as immovable: state = "free" tests them, of [structure.'

@@ -339,6 +339,8 @@ class BlocksWithFill:
         left, right = self._drop_open(ends, _find_facing(pieces, fixed, middle), least, most).T
         partner[right] = left
         _equalise(ends, least, most, left, right)
+        alone = np.setdiff1d(self._find_beside_rings(pieces), [left, right])
+        most[alone] = least[alone]
         numbers = np.array([piece.region for piece in pieces], dtype=np.intp)
         toward = np.array([-piece.side for piece in pieces])
         return FillContacts(numbers, ends, toward, least, most, middle < level, partner)
@@ -362,6 +364,24 @@ class BlocksWithFill:
                 *places[pairs[is_open][0, 0]],
             )
         return pairs[~is_open]
+
+    def _find_beside_rings(self, pieces: Sequence[Face]) -> Numbers:
+        """Return the pieces of rings that look towards another ring.
+
+        One that faces none is above its crown. The fill would carry its passive pressure over that
+        ring to the ground, a span away, or bring it on the back of the ring: neither is counted on.
+        """
+        numbers = [self.rigid_regions.blocks[piece.region] for piece in pieces]
+        blocks = [self.whole.blocks[number] for number in numbers]
+        part = np.array([block.part if block.role == "ring" else "" for block in blocks])
+        side = np.array([piece.side for piece in pieces])
+        place = np.array([piece.ends[:, 0].mean() for piece in pieces])
+        towards = np.zeros(len(pieces), dtype=bool)
+        for name in {*part.tolist()} - {""}:
+            others = np.where((part != name) & (part != ""), place, np.nan)
+            low, high = np.nanmin(others, initial=np.inf), np.nanmax(others, initial=-np.inf)
+            towards |= (part == name) & np.where(side > 0.0, place < high, place > low)
+        return np.flatnonzero(towards)
 
     def _backing_level(self, faces: Sequence[Face]) -> float:
         """Return the level below which there is backing, -inf for none [m]."""

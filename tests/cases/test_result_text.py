@@ -4,7 +4,9 @@ import re
 from dataclasses import replace
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
+from backfilled import slender_bridge
 
 import archfem as af
 from archfem.cases.analysis_keys import parse_limit
@@ -15,6 +17,7 @@ from archfem.cases.result_text import (
     describe_run_quality,
     describe_verdicts,
     format_ratio,
+    note_lower_crowns,
     tabulate_joints,
     tabulate_runs,
 )
@@ -63,6 +66,23 @@ def test_words_and_tables_obey_the_criteria_of_the_run(run):
     met = [name for name, found in calm.verdict.mechanisms.items() if found]
     assert met == ["verified"]
     assert calm.verdict.headline.startswith("mechanism by verified; none by any joints at once, ")
+
+
+@pytest.mark.parametrize(("rise", "count"), [(2.1, 0), (1.7, 1)])
+def test_lower_crowns_are_noted(rise, count):
+    """By the radii: the middle one of nine stones has its highest corners beside the crown."""
+    rings = {"left": (8.4, 2.1), "low one": (8.4, rise)}
+    bridge, fill = slender_bridge(**rings), af.limit.Fill(friction_angle=35.0)
+    notes = note_lower_crowns(bridge, fill)
+    arches = (af.shapes.Arch(span=a, rise=b, thickness=0.6, voussoirs=9) for a, b in rings.values())
+    high, low = (
+        (each.radius + 0.3) * np.cos(each.half / 9.0) - each.radius * np.cos(each.half)
+        for each in arches
+    )
+    words = f"note: crowns differ by {high - low:.2f} m: fill above 'low one' bears none of the "
+    assert len(notes) == count
+    assert all(note.startswith(words) for note in notes)
+    assert not note_lower_crowns(bridge, None)
 
 
 DEFAULTS = (

@@ -315,8 +315,10 @@ def presses_by_level(structure, fill, moving, levels=800):
     """Least and greatest size, and stones, points and forces on them of each level of a fill.
 
     The polygon of the fill is cut into thin levels. Each presses on the stones at its two ends, on
-    both equally where both may move.
+    both equally where both may move; on a single one passively unless it lies above another ring.
     """
+    rings = {n: Polygon(structure.blocks[n].points).centroid for n in moving}
+    rings = {n: at for n, at in rings.items() if structure.blocks[n].role == "ring"}
     faces = {number: [LineString(f) for f in faces_of(structure, number)] for number in moving}
     soil = fill_of(structure)
     polygon = Polygon(soil.points)
@@ -335,6 +337,14 @@ def presses_by_level(structure, fill, moving, levels=800):
                 for number in moving
                 if any(face.distance(Point(end)) < 1e-9 for face in faces[number])
             ]
+            (start, _), (stop, _) = sorted(piece.coords)
+            own = {structure.blocks[number].part for number, *_ in pressed}
+            beside = any(
+                start < at.x < stop and structure.blocks[number].part not in own
+                for number, at in rings.items()
+            )
+            if len(pressed) == 1 and beside:
+                sizes = (sizes[0], sizes[0])
             for group in [pressed] if len(pressed) == 2 else [[each] for each in pressed]:
                 yield sizes, group
 
@@ -415,7 +425,10 @@ def test_backing_holds_faces_up_to_its_level_as_in_an_independent_programme():
     ids=len,
 )
 def test_fill_between_rings_as_in_an_independent_programme(rings, sense, backing):
-    """Also where one ring is higher, and two are above the crown of the one between."""
+    """Also where one ring is higher, and two are above the crown of the one between.
+
+    Fill above the lower ring bears no passive pressure on the higher one.
+    """
     structure = slender_bridge(**rings)
     fill = Fill(friction_angle=35.0, backing=backing)
     found = af.collapse_factor(structure, live=af.BodyForce(sense), friction=None, fill=fill)
