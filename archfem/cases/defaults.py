@@ -67,6 +67,16 @@ class Default(NamedTuple):
     reason: str  # where the value is from, or what it means
 
 
+def list_materials_and_contacts(case: Case) -> list[Material | Contact]:
+    """Return the materials and contacts of a case, without those of bodies that stand on it."""
+    structure, standing = case.structure, case.settings["structure"].get("standing", {})
+    items: list[Material | Contact] = [
+        block.material for block in structure.blocks if block.name not in standing
+    ]
+    items += [joint.contact for joint in structure.joints]
+    return [*dict.fromkeys(items)]
+
+
 def list_default_keys(case: Case, item: Material | Contact) -> list[str]:
     """Return the deciding values of a material or contact that the case does not give."""
     section = "materials" if isinstance(item, Material) else "contacts"
@@ -105,10 +115,7 @@ def list_defaults(case: Case) -> list[Default]:
 
 def _list_properties(case: Case) -> Iterator[Default]:
     """List the default values of materials and contacts."""
-    structure = case.structure
-    items: list[Material | Contact] = [block.material for block in structure.blocks]
-    items += [joint.contact for joint in structure.joints]
-    for item in dict.fromkeys(items):
+    for item in list_materials_and_contacts(case):
         section = "materials" if isinstance(item, Material) else "contacts"
         for key in list_default_keys(case, item):
             word, *_, reason = DECIDING_VALUES[section][key]

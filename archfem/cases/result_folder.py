@@ -14,7 +14,13 @@ from archfem._validation import validate_arguments, validate_methods
 from archfem.cases.answers import NO_DEMAND, state_outcome
 from archfem.cases.case import Case
 from archfem.cases.provenance import list_input_files
-from archfem.cases.result_text import PushFactors, compare_push, compare_with_site
+from archfem.cases.result_text import (
+    PushFactors,
+    compare_push,
+    compare_with_site,
+    describe_pushover,
+    note_massless,
+)
 from archfem.cases.run import (
     CASE_FILE,
     HISTORY_FILE,
@@ -195,19 +201,20 @@ def limit_files(case: Case, collapse: Collapse, text: str, doubts: Sequence[str]
     demand = NO_DEMAND if collapse.push else "the given load"
     if not collapse.push and collapse.outcome is Outcome.COLLAPSES:
         site = PushFactors(*collapse.range)
-    given = collapse.sentence, doubts, demand, site
+    lines = [*doubts, *note_massless(collapse.live, collapse.dead)]
+    given = collapse.sentence, lines, demand, site
     stated = state_outcome("limit analysis", *given).as_file("limit")
     return {"limit.txt": text, "limit.csv": joints, "collapse.png": collapse.plot(), **stated}
 
 
-def pushover_files(case: Case, push: Pushover, text: str) -> Files:
+def pushover_files(case: Case, push: Pushover, notes: Sequence[str]) -> Files:
     """Return text, curve and picture of a pushover."""
     curve = push.curve.to_dataframe().to_csv().rstrip()
     peak = push.factor * abs(find_push(case.pushover.live if case.pushover else []))
     site = compare_push(case, peak, peak) if peak else None
-    stated = state_outcome("pushover", push.sentence, (), "-", site)
+    stated = state_outcome("pushover", push.sentence, notes, "-", site)
     return {
-        "pushover.txt": text,
+        "pushover.txt": describe_pushover(push, notes),
         "pushover.csv": curve,
         "pushover.png": push.plot(),
         **stated.as_file("pushover"),

@@ -40,6 +40,7 @@ from archfem.limit.instability import explain_instability
 from archfem.limit.mechanism_count import Mechanism, duration_text
 from archfem.limit.rating import Rating
 from archfem.limit.thickness import minimum_thickness
+from archfem.masonry.loads import Action, Settlement, describe_massless
 from archfem.masonry.ring_thickness import Ring
 from archfem.masonry.structure import (
     Structure,
@@ -288,11 +289,19 @@ def describe_collapse(structure: Structure, collapse: Collapse, limit: LimitAnal
     crushing = limit.describe_crushing(structure)
     lines += filter(None, [crushing, describe_fill(limit.fill, structure)])
     lines += note_lower_crowns(structure, limit.fill)
+    lines += note_massless(collapse.live, collapse.dead)
     if structure.heads.any() and collapse.outcome is Outcome.COLLAPSES:
         lines.append(
             "blocks are rigid, and elastic joints may bear less: hold a motion a tenth below"
         )
     return "\n".join(lines)
+
+
+def note_massless(
+    live: Settlement | Sequence[Action | Settlement], dead: Sequence[Action]
+) -> list[str]:
+    """Return a note on loads that stay and are not pushed as weights are, if there are any."""
+    return [f"{NOTE_MARK}{words}"] if (words := describe_massless(live, dead)) else []
 
 
 def tabulate_ratings(ratings: Iterable[Rating]) -> ResultTable:
@@ -490,12 +499,12 @@ def compare_push(case: Case, low: float, high: float, unit: float = 1.0) -> Push
     return PushFactors(low * unit / ground, high * unit / ground, size)
 
 
-def describe_pushover(push: Pushover) -> str:
-    """Describe a pushover: factor, end, and the joints in the order in which they first hinge."""
+def describe_pushover(push: Pushover, notes: Sequence[str]) -> str:
+    """Describe a pushover: factor, end, the joints in the order in which they hinge, notes."""
     names = push.joints["name"].values
     hinges = [f"{names[joint]} at the {side}" for joint, side in push.hinges]
-    first = f"pushover: {push.sentence}"
-    return "\n".join([first, f"hinges in turn: {join_names(hinges, '; ')}"] if hinges else [first])
+    turns = [f"hinges in turn: {join_names(hinges, '; ')}"] if hinges else []
+    return "\n".join([f"pushover: {push.sentence}", *turns, *notes])
 
 
 def describe_accuracy(accuracy: Accuracy) -> str:

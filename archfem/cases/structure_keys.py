@@ -31,6 +31,7 @@ from archfem.masonry.joint_closing import CONDITIONS, FINISHED_KEYS, usual_law, 
 from archfem.masonry.materials import CONTACT_PRESETS, MATERIAL_PRESETS, Contact, Material
 from archfem.masonry.shapes import bridges, rings
 from archfem.masonry.shapes.bridge_parts import Arch, Backfill, Paving, Pier, Sidewall
+from archfem.masonry.standing import StandingBody, carrying
 from archfem.masonry.structure import Joint, Structure, join_names
 from archfem.masonry.survey.outlines import Layer, Survey, read_outlines, surveyed
 
@@ -84,6 +85,7 @@ def list_shapes() -> dict[str, Callable[..., Structure]]:
 def shape_keys(name: str) -> dict[str, Any]:
     """Return the keys of [structure] for a shape."""
     keys = {**keys_of_part(list_shapes()[name]), "shape": str, "fill": dict}
+    keys["standing"] = dict
     if name == "blocks":
         keys["material"] = str
         del keys["name"], keys["fill"]  # the name is that of the case
@@ -98,6 +100,9 @@ def shape_keys(name: str) -> dict[str, Any]:
 def build_structure(settings: Table, folder: Path = Path()) -> Structure:
     """Build the structure of a case; joints by a finish follow from their stones."""
     structure = _build_shape(settings, folder)
+    if (standing := settings["structure"].get("standing")) is not None:
+        bodies = _build_parts(StandingBody, standing, "structure.standing", settings)
+        structure = carrying(structure, bodies)
     for name, table in settings.get("contacts", {}).items():
         if "finish" in table:
             contact = _resolve_preset(settings, "contacts", name)
@@ -112,8 +117,9 @@ def _build_shape(settings: Table, folder: Path) -> Structure:
     if name == "blocks":
         return _read_blocks(settings)
     values = check_table(table, shape_keys(name), "structure")
-    del values["shape"]
     fill = values.pop("fill", {})
+    for key in ("shape", "standing"):
+        values.pop(key, None)
     values = _resolve_names(functions[name], values, settings)
     # All tables are read, also unused ones: a misspelt name of a preset is an error then.
     for section in PRESETS:
@@ -144,7 +150,8 @@ def _read_blocks(settings: Table) -> Structure:
     values = check_table(settings["structure"], shape_keys("blocks"), "structure")
     shared = {"material": values.pop("material", "stone")}
     contact = values.pop("contact", "stone to stone")
-    del values["shape"]
+    for key in ("shape", "standing"):
+        values.pop(key, None)
     blocks = [
         _read_part(Block, {**shared, **part}, f"structure.blocks[{k}]", settings)
         for k, part in enumerate(values.pop("blocks", ()))
@@ -187,7 +194,7 @@ def _bridge_parts(values: dict[str, Any], settings: Table) -> dict[str, Any]:
     parts = dict(values)
     for key, part in BRIDGE_PARTS.items():
         if key in parts:
-            parts[key] = _build_parts(part, parts[key], f"structure.{key}")
+            parts[key] = _build_parts(part, parts[key], f"structure.{key}", settings)
     for key, single in {"backfill": Backfill, "paving": Paving}.items():
         if key in parts:
             parts[key] = _read_part(single, parts[key], f"structure.{key}", settings)
@@ -249,7 +256,9 @@ def read_survey(settings: Table, folder: Path) -> Survey | None:
     return read_outlines(**{name: given[name] for name in names if name in given})
 
 
-def _build_parts(part: Callable[..., Described], table: Table, section: str) -> list[Described]:
+def _build_parts(
+    part: Callable[..., Described], table: Table, section: str, settings: Table
+) -> list[Described]:
     """Return parts of one kind: common keys of the table, and a subtable for each part."""
     subtables = {name: value for name, value in table.items() if isinstance(value, dict)}
     if not subtables:
@@ -262,7 +271,8 @@ def _build_parts(part: Callable[..., Described], table: Table, section: str) -> 
     parts = []
     for name, subtable in subtables.items():
         place = f"{section}.{name}"
-        parts.append(_call(part, place, name=name, **common | check_table(subtable, keys, place)))
+        values = common | check_table(subtable, keys, place)
+        parts.append(_call(part, place, name=name, **_resolve_names(part, values, settings)))
     return parts
 
 
@@ -432,6 +442,8 @@ def _write_argument(value: Any, names: _PresetNames) -> Any:
         return value.tolist()
     if is_dataclass(value) and not isinstance(value, type):
         return {key: _write_argument(own, names) for key, own in given_fields(value).items()}
+    if isinstance(value, Mapping):
+        return {key: _write_argument(each, names) for key, each in value.items()}
     if not isinstance(value, Sequence):
         raise TypeError(value)
     items = [_write_argument(each, names) for each in value]

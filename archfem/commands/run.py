@@ -499,9 +499,10 @@ def print_results(case: Case, found: Iterable[Result], folder: Path) -> tuple[st
                     write_progress_line(case.title, "modes and motions")
                     _print_first_modes(at_rest, folder)
             elif isinstance(result, Pushover):
-                text = result_text.describe_pushover(result)
-                print(text)
-                write(results.pushover_files(case, result, text), folder)
+                given = case.pushover
+                notes = result_text.note_massless(given.live, given.dead) if given else []
+                print(result_text.describe_pushover(result, notes))
+                write(results.pushover_files(case, result, notes), folder)
             elif isinstance(result, Suite):
                 suite = result
                 print_motions(suite)

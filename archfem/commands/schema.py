@@ -35,6 +35,7 @@ from archfem.masonry.loads import AttachedLoad, BodyForce, PointLoad, Settlement
 from archfem.masonry.materials import Contact, Material
 from archfem.masonry.parts import PART_ROLES
 from archfem.masonry.shapes.bridge_parts import Backfill, Paving
+from archfem.masonry.standing import StandingBody
 from archfem.masonry.structure import Joint
 from archfem.masonry.survey.outlines import Layer
 from archfem.models.discretisation import MODEL_FIDELITIES
@@ -116,20 +117,23 @@ def _shape(name: str) -> Schema:
 
 def _parts_of_structure(name: str) -> dict[str, Schema]:
     """Return the schemas of the tables in [structure]."""
+    parts: dict[str, Schema] = {"standing": _parts_by_name(StandingBody)}
     if name == "blocks":
         rows = {"blocks": Block, "joints": Joint}
-        return {key: _list(_part(cls)) for key, cls in rows.items()}
-    fill = _choice("elastic", "jointed")
-    parts: dict[str, Schema] = {"fill": _table(structure_keys.fill_keys(), law=fill)}
+        return parts | {key: _list(_part(cls)) for key, cls in rows.items()}
+    parts["fill"] = _table(structure_keys.fill_keys(), law=_choice("elastic", "jointed"))
     if name == "outlines":
         parts |= {"layers": _by_name(_part(Layer)), "contacts": {"type": "object"}}
     elif name == "bridge":
-        for key, part in structure_keys.BRIDGE_PARTS.items():
-            # common keys of all parts, and a table for each under its name
-            schema = _part(part)
-            parts[key] = {**schema, "additionalProperties": schema}
+        parts |= {key: _parts_by_name(part) for key, part in structure_keys.BRIDGE_PARTS.items()}
         parts |= {"backfill": _part(Backfill), "paving": _part(Paving)}
     return parts
+
+
+def _parts_by_name(declaration: Callable[..., Any]) -> Schema:
+    """Return the schema of common keys of all parts, and a table for each under its name."""
+    schema = _part(declaration)
+    return {**schema, "additionalProperties": schema}
 
 
 def _part(declaration: Callable[..., Any]) -> Schema:

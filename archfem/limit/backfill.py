@@ -126,21 +126,28 @@ class FillProfile:
     def columns(self, lever: float = 0.0) -> tuple[Numbers, Array, Array]:
         """Return stone, place and weight of every column of fill (n,), (n, 2) [m], (n,) [N].
 
+        A body on the fill has the moment of its forces about the fill's surface in any case: no
+        shear carries it away.
+
         Args:
             lever: where the place is, from 0 for the foot of a column to 1 for its centroid [-].
         """
         cut, rests = self.slices, ~self.stones[self.slices.block]
-        # the stone below each slice of fill, through any fill between them
-        below = np.where(rests, -1, np.arange(len(rests)))
+        soft = np.isin(cut.block, find_yielding_blocks(self.structure))
+        # the stone below each slice of fill, through any fill between them, and the top of that
+        below, surface = np.where(rests, -1, np.arange(len(rests))), np.arange(len(rests))
         for k in range(1, len(rests)):
             if rests[k] and cut.strip[k] == cut.strip[k - 1]:
                 below[k] = below[k - 1]
+                surface[k] = k if soft[k] else surface[k - 1]
         carried = np.flatnonzero(rests & (below >= 0))
         weight = (self._unit_weights * cut.area)[carried] * self.structure.width
         carrier, x = below[carried], cut.middle[carried]
         foot = _interpolate_edge(cut.side[carrier], cut.top[carrier], x)
         ends = (_interpolate_edge(cut.side[carried], y[carried], x) for y in (cut.bottom, cut.top))
-        height = foot + lever * (0.5 * sum(ends) - foot)
+        height, base = 0.5 * sum(ends), surface[carried]
+        level = np.where(soft[carried], height, _interpolate_edge(cut.side[base], cut.top[base], x))
+        height -= (1.0 - lever) * (level - foot)
         return cut.block[carrier], np.stack([x, height], axis=1), weight
 
     def overburden(self, point: Array, side: float) -> float:

@@ -36,7 +36,14 @@ from archfem.limit.linear_programme import Optimum, Programme, RigidBlocks
 from archfem.limit.mechanism_kinematics import RigidRegions
 from archfem.limit.mechanism_names import name_mechanism
 from archfem.limit.nonassociated import NonassociatedBounds, search_nonassociated
-from archfem.masonry.loads import Action, PointLoad, Settlement, find_push, list_loads
+from archfem.masonry.loads import (
+    Action,
+    PointLoad,
+    Settlement,
+    describe_massless,
+    find_push,
+    list_loads,
+)
 from archfem.masonry.materials import STONE
 from archfem.masonry.structure import (
     HasStructure,
@@ -218,7 +225,8 @@ class Collapse(ResultDisplay):
         crushing = ""
         if self.structure is not None:
             crushing = f"; {describe_crushing(self.strength, self.structure)}"
-        return f"{text}sliding: {sliding}{solutions}{over}{crushing}"
+        massless = f"; {words}" if (words := describe_massless(self.live, self.dead)) else ""
+        return f"{text}sliding: {sliding}{solutions}{over}{crushing}{massless}"
 
 
 def slides_anywhere(structure: Structure, push: float) -> bool:

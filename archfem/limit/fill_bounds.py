@@ -47,6 +47,7 @@ from archfem.limit.fill_strength import PlasticFill, as_pressure, place_backing
 from archfem.limit.linear_programme import RigidBlocks
 from archfem.limit.mechanism_kinematics import RigidRegions, find_rigid_regions
 from archfem.masonry.loads import Action, BodyForce, PointLoad
+from archfem.masonry.standing import find_bodies
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import Structure
 
@@ -510,6 +511,11 @@ def refine_bounds(
         raise InvalidInput(
             "fill is given, but no block is soft enough to be one (role 'other', and softer than "
             "the joints around it): leave fill out, or build the structure with its backfill"
+        )
+    if bodies := set(find_bodies(structure)) & {structure.blocks[number].name for number in soil}:
+        raise InvalidInput(
+            f"{sorted(bodies)} on a plastic fill would be a part of it: give the fill by law "
+            "'pressure', or weight without mass as a load that stays"
         )
     if friction == "nonassociated":
         raise InvalidInput(

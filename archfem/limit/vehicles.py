@@ -21,6 +21,7 @@ from archfem.limit.fill_strength import Fill, PlasticFill, as_pressure
 from archfem.limit.linear_programme import Optimum, Programme
 from archfem.limit.nonassociated import find_weakest, starting_forces
 from archfem.masonry.loads import PointLoad
+from archfem.masonry.standing import find_bodies
 from archfem.masonry.structure import (
     CONTACT_TOLERANCE,
     HasStructure,
@@ -386,6 +387,11 @@ def vehicle_positions(
     structure: Structure, vehicle: Array, positions: Sequence[float] | None, count: int = 101
 ) -> Array:
     """Return the positions of the vehicle's middle (n,) [m]."""
+    if bodies := find_bodies(structure):
+        raise InvalidInput(
+            f"axles would drive over '{bodies[0]}', which stands on the structure: take it off, in "
+            'a case by a file with base = "…" and remove = ["structure.standing"]'
+        )
     if positions is not None:
         places = np.array(check_numbers(positions, "positions [m]"))
         if not len(places):

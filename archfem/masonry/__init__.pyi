@@ -21,6 +21,8 @@ from .materials import Contact as Contact
 from .materials import Material as Material
 from .ring_thickness import Ring as Ring
 from .ring_thickness import find_ring as find_ring
+from .standing import StandingBody as StandingBody
+from .standing import carrying as carrying
 from .structure import Joint as Joint
 from .structure import Structure as Structure
 from .survey.circle_fit import FittedCircle as FittedCircle

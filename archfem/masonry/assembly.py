@@ -82,7 +82,7 @@ def assembled(
     for part, direction in directions.items():
         ordered = _order_joints(across[part], part, direction, blocks)
         (unnamed if part in walls else all_joints).extend(ordered)
-    all_joints += _name_joints([*unnamed, *others], blocks)
+    all_joints += name_joints([*unnamed, *others], blocks)
     return Structure(blocks, tuple(all_joints), width, gravity, name)
 
 
@@ -220,7 +220,7 @@ def _is_foot(joint: Joint, blocks: Sequence[Block]) -> bool:
     return any(blocks[number].fixed for number in joint.blocks)
 
 
-def _name_joints(joints: Sequence[Joint], blocks: Sequence[Block]) -> list[Joint]:
+def name_joints(joints: Sequence[Joint], blocks: Sequence[Block]) -> list[Joint]:
     """Name joints by their blocks, with numbers where two blocks have several."""
     pairs = [joint.blocks for joint in joints]
     named = []

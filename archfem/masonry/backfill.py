@@ -85,7 +85,10 @@ def jointed_fill(
         blocks += _create_blocks(block, pieces) if pieces else [block]
         fill.origin += [number] * max(1, len(pieces))
         fill.centres += [piece.centre for piece in pieces] or [np.zeros(2)]
-    return fill.assemble(blocks)
+    table = {"law": "jointed", "piece_size": piece_size}
+    table |= {"friction_angle": angle, "cohesion": cohesion}
+    origin = structure.origin and (structure.origin[0], {**structure.origin[1], "fill": table})
+    return replace(fill.assemble(blocks), origin=origin)
 
 
 def _fill_contact(angle: float, cohesion: float) -> Contact:

@@ -9,6 +9,7 @@ from archfem._typing import Array, Metres, Newtons
 from archfem._validation import check_between, check_integer, check_number, check_numbers
 from archfem.errors import InvalidInput
 from archfem.masonry.structure import Structure
+from archfem.units import kN
 
 # Distance below which points are at one place, relative to the size of a structure [-]
 SAME_PLACE = 1e-9
@@ -230,3 +231,18 @@ def find_push(live: "Action | Settlement | Sequence[Action | Settlement]") -> fl
     several = live if isinstance(live, list | tuple) else [live]
     load = several[0] if len(several) == 1 else None
     return load.horizontal if isinstance(load, BodyForce) and not load.vertical else 0.0
+
+
+def describe_massless(
+    live: "Settlement | Sequence[Action | Settlement]", dead: Sequence[Action]
+) -> str:
+    """Describe loads that stay and are not pushed as weights are; empty where there are none."""
+    several = live if isinstance(live, list | tuple) else [live]
+    pushed = any(isinstance(load, BodyForce) and load.horizontal for load in several)
+    weight = -sum(min(load.force[1], 0.0) for load in dead if isinstance(load, PointLoad))
+    if not (pushed and weight):
+        return ""
+    return (
+        f"dead loads of {weight / kN:.4g} kN have no mass: they are not pushed; what has mass "
+        "stands in [structure.standing], af.masonry.carrying"
+    )

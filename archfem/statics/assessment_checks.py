@@ -212,6 +212,13 @@ def check_assessable(
         raise InvalidInput(
             "friction 'nonassociated' is not searched with attached loads or a fill: use 'coulomb'"
         )
+    soft = [structure.blocks[number].name for number in find_yielding_blocks(structure)]
+    for name in (structure.blocks[structure.block_number(load.block)].name for load in loads):
+        if name in soft:
+            raise InvalidInput(
+                f"a load is attached to '{name}', which is fill and no stone: stand it on the "
+                "fill, [structure.standing] of a case, or name the stone below"
+            )
     if (structure.tension > 0.0).any():
         raise InvalidInput(
             "joints have tensile strength, which breaks before a mechanism forms: give contacts "

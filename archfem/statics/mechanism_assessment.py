@@ -569,8 +569,9 @@ class _Oscillator:
             )
         if any(any(load.force) for load in self.placed.loads):
             found.append(
-                "constant forces count from the start of the motion to its end; attach only those "
-                "whose presence is verified up to collapse"
+                "constant forces have no mass, so that they are not pushed, and count from the "
+                "start of the motion to its end; attach only those whose presence is verified up "
+                "to collapse"
             )
         if factor < (1.0 - 1e-3) * collapse:
             found.append(

@@ -1,5 +1,6 @@
 """Results as text and tables."""
 
+import json
 import re
 from dataclasses import replace
 from types import SimpleNamespace
@@ -21,6 +22,8 @@ from archfem.cases.result_text import (
     tabulate_joints,
     tabulate_runs,
 )
+from archfem.cases.toml_file import format_tables
+from archfem.commands.cli import main
 from archfem.limit.collapse import describe_fill
 from archfem.limit.mechanism_count import duration_text
 
@@ -209,3 +212,35 @@ def test_verdicts_of_several_runs_are_counted(run):
 )
 def test_a_ratio_of_nothing_has_no_sign(value, text):
     assert format_ratio(value) == text
+
+
+def test_dead_loads_that_a_push_leaves_at_rest_are_noted(tmp_path, capsys):
+    """W = 28.8 kN and P = 10 kN on a block of 0.6 m by 2.4 m: about the toe, b/2 over heights."""
+    block = {"shape": "column", "breadth": 0.6, "heights": [2.4]}
+    tables = {"structure": block, "limit": {"horizontal": 1.0, "friction": "none"}}
+    press = [{"x": 0.0, "force": [0.0, -10e3]}]
+    push = {"horizontal": 1.0, "dead": press, "stop": {"steps": 3}}
+    rigid = {"fidelity": "rigid"}
+    loaded = tables | {"limit": tables["limit"] | {"dead": press}, "pushover": push, "model": rigid}
+    path, out = tmp_path / "case.toml", tmp_path / "out"
+    path.write_text(format_tables(loaded))
+    assert main(["run", str(path), "--out", str(out)]) == 0
+    note = "dead loads of 10 kN have no mass: they are not pushed; what has mass stands in"
+    assert capsys.readouterr().out.count(f"note: {note}") == 2
+    for name in ("limit", "pushover"):
+        (own,) = json.loads((out / f"{name}.json").read_text())["notes"]
+        assert own.startswith(note)
+        assert note in (out / f"{name}.txt").read_text()
+    case = af.Case.of(loaded)
+    found = case.limit.solve(case.structure)
+    assert found.factor == pytest.approx(38.8 * 0.3 / (28.8 * 1.2), rel=1e-6)
+    assert note in str(found)
+    body = {"x": 0.0, "length": 0.4, "weight": 10e3, "centre_of_gravity": 0.2}
+    standing = af.Case.of(tables | {"structure": block | {"standing": {"press": body}}})
+    moved = standing.limit.solve(standing.structure)
+    assert moved.factor == pytest.approx(38.8 * 0.3 / (28.8 * 1.2 + 10.0 * 2.6), rel=1e-6)
+    # loads that grow by themselves push no weights
+    point = af.collapse_factor(
+        case.structure, live=af.PointLoad(0.0, (1e3, 0.0), y=2.4), dead=case.limit.dead
+    )
+    assert "no mass" not in str(point) + str(moved)

@@ -1,12 +1,16 @@
 """Structures, fills and construction stages of case files."""
 
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 import archfem as af
 from archfem._validation import declared_keys
+from archfem.cases.defaults import list_defaults
+from archfem.cases.report.inputs import tabulate_inputs
+from archfem.cases.report.report_data import ReportData
 from archfem.cases.structure_keys import build_structure, write_structure
 
 RING = Path(__file__).parents[2] / "meshes" / "ring.toml"
@@ -157,6 +161,58 @@ def test_a_fill_is_elastic_unless_it_is_to_be_in_pieces():
     between = [joint for joint in cut.structure.joints if joint.contact.name == "fill"]
     assert {joint.contact.cohesion for joint in between} == {20e3}
     assert between[0].contact.friction == pytest.approx(0.7002, rel=1e-4)
+
+
+STANDING = {
+    "length": "1 m",
+    "centre_of_gravity": "0.9 m",
+    "lorry": {"x": "3 m", "weight": "40 kN", "width": "0.5 m"},
+    "cart": {"x": "1.4 m", "weight": "5 kN"},
+}
+
+
+@pytest.mark.parametrize("fill", [{}, FILL], ids=["elastic", "in pieces"])
+def test_a_file_keeps_bodies_and_fill_as_they_are_given(fill, tmp_path):
+    structure = BRIDGE["structure"] | {"standing": STANDING} | ({"fill": fill} if fill else {})
+    read = af.Case.of({**BRIDGE, "structure": structure})
+    bodies = {block.name: block for block in read.structure.blocks[-2:]}
+    assert [*bodies] == ["lorry", "cart"]
+    assert bodies["lorry"].area * bodies["lorry"].material.unit_weight == pytest.approx(80e3)
+    again = af.Case.read(read.analysis.write(tmp_path / "again.toml"))
+    assert again.structure == read.structure
+    written = again.settings["structure"]
+    assert written["shape"] == "bridge"
+    assert written["standing"]["lorry"] == {
+        "x": 3.0, "length": 1.0, "weight": 40e3, "centre_of_gravity": 0.9, "width": 0.5,
+    }  # fmt: skip
+    assert written.get("fill", {}).get("piece_size") == (0.8 if fill else None)
+    rows = tabulate_inputs(ReportData(read, {})).rows
+    ((key, words, mark),) = (row for row in rows if "lorry" in " ".join(row))
+    assert (key, mark) == ("standing", "given")
+    assert "lorry x 3 m; weight 40 kN; width 0.5 m" in words
+    # its weight is no value of a material that the case leaves to a default
+    named = [each.subject for each in list_defaults(read)]
+    assert "backfill" in named
+    assert not {"lorry", "cart"} & {*named}
+
+
+def test_bodies_stand_on_walls_and_on_blocks_of_a_file(tmp_path):
+    body = {"x": 0.0, "length": 0.4, "weight": 5e3, "centre_of_gravity": 1.0}
+    wall = {"shape": "column", "breadth": 2.0, "heights": [0.5, 0.5]}
+    read = af.Case.of({"structure": wall | {"standing": {"statue": body}}})
+    assert af.Case.read(read.analysis.write(tmp_path / "wall.toml")).settings["structure"][
+        "standing"
+    ] == {"statue": body}
+    bare = af.Case.of({"structure": wall}).structure
+    blocks = write_structure(replace(bare, origin=None))
+    assert blocks["structure"]["shape"] == "blocks"
+    blocks["structure"]["standing"] = {"statue": body}
+    assert af.Case.of(blocks).structure.blocks == read.structure.blocks
+    with pytest.raises(af.InvalidInput, match=r"structure\.standing names no part"):
+        af.Case.of({"structure": wall | {"standing": body}})
+    del body["centre_of_gravity"]
+    with pytest.raises(af.InvalidInput, match=r"standing\.statue lacks centre_of_gravity"):
+        af.Case.of({"structure": wall | {"standing": {"statue": body}}})
 
 
 def test_a_case_is_built_in_stages():

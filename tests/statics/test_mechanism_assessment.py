@@ -405,6 +405,24 @@ def test_a_fill_is_weight_on_the_stones():
         af.kinematic_assessment(bridge, SPECTRUM, friction="nonassociated")
 
 
+def test_a_body_on_the_fill_is_weight_and_mass_and_no_load_is_attached_to_fill():
+    """The factor is that of limit analysis, under either assumption on the fill's inertia."""
+    bridge = arch_bridge(voussoirs=8)
+    body = {"x": 3.5, "length": 1.0, "weight": 30e3, "centre_of_gravity": 0.8}
+    loaded = af.masonry.carrying(bridge, [af.masonry.StandingBody(**body)])
+    for lever in (0.0, 1.0):
+        fill = af.limit.Fill(friction_angle=35.0, mobilisation=0.0, active=0.0, lever=lever)
+        found = af.kinematic_assessment(loaded, SPECTRUM, fill=fill)
+        expected = af.collapse_factor(loaded, live=af.BodyForce(1.0), fill=fill).factor
+        assert found.path.mechanisms[0].factor == pytest.approx(expected, rel=1e-6)
+    load = af.masonry.AttachedLoad("backfill", (3.5, 1.5), weight=30e3)
+    with pytest.raises(af.InvalidInput, match=r"'backfill', which is fill and no stone: stand it"):
+        af.kinematic_assessment(bridge, SPECTRUM, loads=[load])
+    own = af.masonry.AttachedLoad(bridge.free[0], (3.0, 1.0), force=(0.0, -1.0))
+    noted = af.kinematic_assessment(bridge, SPECTRUM, loads=[own])
+    assert any("constant forces have no mass" in note for note in noted.notes)
+
+
 @pytest.mark.parametrize(("direction", "part"), [(-1.0, 1.0), (1.0, 0.4)])
 def test_a_wall_turns_from_the_fill_behind_it_or_into_it(direction, part, verified):
     """Active or passive thrust at a third of its height about the toe, at rest and turned."""

@@ -11,6 +11,7 @@ from archfem.cases.defaults import (
     list_default_keys,
     list_fill_values,
     list_finish_ranges,
+    list_materials_and_contacts,
     value_text,
 )
 from archfem.cases.report.report_data import STATIC_RESULTS, ReportData
@@ -151,10 +152,8 @@ def describe_value(value: Any, kind: Any = None) -> str:
 
 def _property_rows(data: ReportData) -> Iterator[Row]:
     """Yield the values of materials and contacts, equal ones once."""
-    structure, groups = data.case.structure, dict[Any, list[tuple[Material | Contact, list[Row]]]]()
-    items: list[Material | Contact] = [block.material for block in structure.blocks]
-    items += [joint.contact for joint in structure.joints]
-    for item in dict.fromkeys(items):
+    groups = dict[Any, list[tuple[Material | Contact, list[Row]]]]()
+    for item in list_materials_and_contacts(data.case):
         rows, load = [*_list_properties(data, item)], getattr(item, "stands_for", None)
         # what carries more than itself may differ in weight alone from its neighbour
         same = tuple(row for row in rows if load is None or row[0] != _WEIGHT)
