@@ -170,9 +170,10 @@ def state_scale(
     result, pga, words = RESULTS["scale"], motion.pga / STANDARD_GRAVITY, found.sentence
     files = dict[str, str]()
     if isinstance(found, CollapseScale):
-        held, files["scale.csv"] = found.held, ResultTable(*found.rows()).csv
+        files["scale.csv"] = ResultTable(*found.rows()).csv
     else:
-        held, words = found[found.first].lower, f"{words}; a fall was not computed"
+        words += "; a fall was not computed"
+    held = found.held
     scales = Scales(motion.name, pga, held, found.states, found.interrupted)
     factor = f"{held:#.3g}" if held else "-"
     row = Row(result, f"'{motion.name}', PGA {pga:.2f} g", words, factor, scales._asdict())

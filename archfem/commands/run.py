@@ -47,6 +47,7 @@ from archfem.limit.collapse import Collapse, describe_fill
 from archfem.limit.rating import Rating
 from archfem.masonry.ring_thickness import find_ring
 from archfem.masonry.structure import Structure
+from archfem.models.model import Doubt
 from archfem.motion.suite import Suite
 from archfem.statics.equilibrium import structure_doubts
 from archfem.statics.mechanism_assessment import KinematicAssessment
@@ -174,10 +175,12 @@ def _name_published_files(text: str, folder: Path, command: str) -> str:
 
 @contextmanager
 def record_doubts(structure: Structure) -> Iterator[list[str]]:
-    """Yield doubts about a structure, and then the warnings of a block, as lines."""
+    """Yield doubts about a structure, and the warnings of a block but those of runs, as lines."""
     doubts = [f"{DOUBT_MARK}{doubt}" for doubt in structure_doubts(structure)]
     handler = logging.Handler(logging.WARNING)
     handler.emit = lambda record: doubts.append(f"{DOUBT_MARK}{record.getMessage()}")  # type: ignore[method-assign]
+    # doubts of runs are kept by the runs
+    handler.addFilter(lambda record: not any(isinstance(x, Doubt) for x in record.args or ()))
     logger.addHandler(handler)
     try:
         yield doubts

@@ -35,6 +35,15 @@ from archfem.units import kPa
 # 2 c cos φ / (1 + sin φ) [Pa]
 SOIL_TENSION = 2.0 * SOIL_COHESION * cos(radians(SOIL_ANGLE)) / (1.0 + sin(radians(SOIL_ANGLE)))
 
+# Words of the doubt about a fill that holds itself, and the stones, by more tension than that
+FILL_TENSION = (
+    "elastic fill bears {:.3g} kPa of tension, at t = {:.4g} s: soil has next to none, "
+    f"{SOIL_TENSION / kPa:.2g} kPa with a cohesion of {SOIL_COHESION / kPa:g} kPa"
+)
+
+# What leaves the results of such a fill in doubt
+PULLED = f"in doubt, as the elastic fill bears tension of over {SOIL_TENSION / kPa:.2g} kPa"
+
 
 @dataclass(frozen=True, eq=False)
 class EnergyMeter:
@@ -255,13 +264,11 @@ class RunMonitor:
             )
 
     def _check_tension(self) -> None:
-        """Warn of fill that holds itself, and the stones, by tension."""
+        """Warn of a fill that bears more tension than soil."""
         tension, time = self.fill_tension
         if tension > SOIL_TENSION:
             self._add_doubt(
-                "elastic fill bears {:.3g} kPa of tension, at t = {:.4g} s: soil has next to "
-                f"none, {SOIL_TENSION / kPa:.2g} kPa with a cohesion of "
-                f"{SOIL_COHESION / kPa:g} kPa",
+                FILL_TENSION,
                 'compare with fill in pieces (law = "jointed", friction_angle, cohesion and '
                 "piece_size in [structure.fill] of a case)",
                 tension / kPa,

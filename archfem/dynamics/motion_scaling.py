@@ -6,7 +6,7 @@ than one at which it falls. Hence runs also fill the gaps between scales below t
 where one falls, the search continues below it.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import pairwise
@@ -23,6 +23,7 @@ from archfem.dynamics.analysis import Analysis, takes_analysis, takes_falling_an
 from archfem.dynamics.collapse_state import FALLEN_STATES, CollapseState, doubt_soft_blocks
 from archfem.dynamics.events import EveryMechanism, applicable_definitions
 from archfem.dynamics.history import Ending, History, first_mechanisms, partial_history
+from archfem.dynamics.monitor import FILL_TENSION, PULLED
 from archfem.dynamics.recorder import Record
 from archfem.dynamics.rocking_body import find_rocking_body
 from archfem.dynamics.schemes import EffectiveDamping, Viscous
@@ -34,7 +35,7 @@ from archfem.errors import DidNotConverge, InvalidInput
 from archfem.joints.criteria import Criteria
 from archfem.limit.mechanism_count import Mechanism
 from archfem.masonry.structure import Structure, join_names
-from archfem.models.model import Doubt, Model
+from archfem.models.model import Doubt, Model, log_doubts_once, merge_doubts
 from archfem.motion.motion import Motion
 from archfem.motion.signal_processing import MAX_PEAK_ACCELERATION
 from archfem.statics.equilibrium import Equilibrium, dead_load
@@ -121,10 +122,18 @@ class MechanismScales:
         return min(self.definitions, key=lambda definition: self[definition].upper)
 
     @property
+    def held(self) -> float:
+        """Largest scale below the first mechanism, and below a fill in tension [-]; 0 for none."""
+        most, below = self[self.first].lower, _find_tension(self.runs)
+        stood = (run.scale for run in self.runs if run.survives(self.first) and run.scale < below)
+        return max((scale for scale in stood if scale <= most), default=0.0)
+
+    @property
     def states(self) -> dict[str, float]:
-        """Smallest scale at which it forms a mechanism, if any [-]."""
-        bracket = self[self.first]
-        return {"mechanism": bracket.upper} if bracket.run else {}
+        """Smallest scales at which it forms a mechanism, and before at which its fill is pulled."""
+        bracket, pulled = self[self.first], _find_tension(self.runs)
+        scales = {"tension": pulled} if pulled <= bracket.lower else {}
+        return scales | ({"mechanism": bracket.upper} if bracket.run else {})
 
     @property
     def sentence(self) -> str:
@@ -133,8 +142,7 @@ class MechanismScales:
         met = "nor at any scale that was tried"
         if bracket.run:
             met = f"first mechanism at {_say_scale(bracket.upper, self.pga)}, by {first}"
-        met = f"{UNFINISHED}, {met}" if self.interrupted else met
-        return _say_bracket("no mechanism", bracket.lower, self.pga, met)
+        return _say_bracket("no mechanism", self, met)
 
     def __repr__(self) -> str:
         """Return this in one line."""
@@ -276,11 +284,20 @@ def _say_scale(scale: float, pga: float | None) -> str:
     return f"{scale * pga / STANDARD_GRAVITY:#.3g} g ({scale:#.3g} × the motion)"
 
 
-def _say_bracket(state: str, lower: float, pga: float | None, met: str) -> str:
+def _say_bracket(state: str, found: Any, met: str) -> str:
     """Return a bracket in words, from the state at its lower bound to the event above it."""
-    if not lower:  # the smaller ones, if any were run, have no answer
+    if scale := found.states.get("tension"):
+        met = f"from {scale:#.3g} × on {PULLED}: {met}"
+    met = f"{UNFINISHED}, {met}" if found.interrupted else met
+    if not found.held:  # the smaller ones, if any were run, have no answer
         return f"{met}; no smaller scale is known to survive"
-    return f"{state} at {_say_scale(lower, pga)}, {met}"
+    return f"{state} at {_say_scale(found.held, found.pga)}, {met}"
+
+
+def _find_tension(runs: Iterable[ScaledRun]) -> float:
+    """Return the smallest scale at which an elastic fill bears more tension than soil [-]."""
+    doubted = (run.scale for run in runs if any(x.words == FILL_TENSION for x in run.doubts))
+    return min(doubted, default=inf)
 
 
 def _doubts_of_searches(
@@ -290,7 +307,7 @@ def _doubts_of_searches(
 
     Searches are by their settings in words. Doubts that differ in numbers alone are stated once.
     """
-    doubts, of_runs = list[Doubt](), dict[tuple[str, ...], tuple[Doubt, list[str]]]()
+    doubts, of_runs = list[Doubt](), dict[tuple[str, ...], list[tuple[Doubt, str]]]()
     for settings, scales in searches.items():
         bracket = scales[definition]
         if above := bracket.above:
@@ -306,11 +323,11 @@ def _doubts_of_searches(
             doubts.append(Doubt(words, "the same command continues it", (), settings))
         for run in scales.runs:
             for doubt in run.doubts if run.scale in (bracket.lower, bracket.upper) else ():
-                _, places = of_runs.setdefault(doubt.kind, (doubt, []))
-                places.append(f"{run.scale:#.3g} × {settings}".strip())
-    for doubt, (first, *others) in of_runs.values():
+                place = f"{run.scale:#.3g} × {settings}".strip()
+                of_runs.setdefault(doubt.kind, []).append((doubt, place))
+    for same, (first, *others) in (zip(*pairs, strict=True) for pairs in of_runs.values()):
         likewise = f" (likewise at {join_names(others)})" if others else ""
-        doubts.append(replace(doubt, place=f"at {first}{likewise}"))
+        doubts.append(merge_doubts(same, f"at {first}{likewise}"))
     return tuple(doubts)
 
 
@@ -332,6 +349,7 @@ def admissible_range(between: Sequence[float], motion: Motion) -> tuple[float, f
     return smallest, max(smallest, min(largest, MAX_PEAK_ACCELERATION / peak))
 
 
+@log_doubts_once()
 def search_scales(
     run_scaled: Callable[[float], ScaledRun],
     definitions: tuple[str, ...],
@@ -395,7 +413,8 @@ def _next_scale(
     if len(runs) >= max_runs:
         return None
     brackets = [scales[definition] for definition in scales.definitions]
-    if runs[0].scale > smallest and any(bracket.lower == 0.0 for bracket in brackets):
+    fails = any(bracket.lower == 0.0 for bracket in brackets)
+    if runs[0].scale > smallest and (fails or _find_tension(runs[:1]) < inf):
         return max(runs[0].scale / ratio, smallest)
     if runs[-1].scale < largest and any(bracket.run is None for bracket in brackets):
         return min(runs[-1].scale * ratio, largest)
@@ -452,11 +471,10 @@ class CollapseScale:
             met = f"{met}, {'the other' if len(self.searches) == 2 else 'the last'} time step {at}"
         if self.dislocated < inf:
             met = f"dislocated from {self.dislocated:#.3g} ×, {met}"
-        if self.moves <= self.held:
+        if self.moves <= max(self._stood):
             less = " or less" * ("moves in all" in self.states)
             met = f"a mechanism from {self.moves:#.3g} ×{less}, {met}"
-        met = f"{UNFINISHED}, {met}" if self.interrupted else met
-        text = _say_bracket("stands", self.held, self.pga, met)
+        text = _say_bracket("stands", self, met)
         if self.as_one is None:
             return text
         falls = f"falls from {self.as_one:#.3g} × on"
@@ -558,14 +576,16 @@ class CollapseScale:
     def states(self) -> dict[str, float]:
         """Smallest scales at which it moves, is dislocated and falls [-].
 
-        Those of a fall are of any step, of all steps, and of one rigid body.
+        Those of a fall are of any step, of all steps, and of one rigid body. That of "tension" is
+        one at which it stands, and its fill bears more of it than soil does.
         """
-        scales = {"moves": self.moves if self.moves <= self.held else inf}
+        scales = {"tension": _find_tension(self._runs), "moves": self.moves}
+        scales = {state: at for state, at in scales.items() if at <= max(self._stood)}
         scales |= {"dislocated": self.dislocated, "falls": self._least_fall}
         scales["falls by all steps"] = self.upper
         scales["falls as one"] = inf if self.as_one is None else self.as_one
         if self.moves == min((run.scale for run in self._runs), default=inf):
-            scales["moves in all"] = scales["moves"]  # and maybe at smaller ones
+            scales["moves in all"] = self.moves  # and maybe at smaller ones
         return {state: scale for state, scale in scales.items() if scale < inf}
 
     @property
@@ -575,9 +595,17 @@ class CollapseScale:
 
     @property
     def held(self) -> float:
-        """Largest scale at which it stood below any at which it did not [-]; 0 for none."""
-        stood = (at for at, kind in self._list_held() if kind == "stands")
-        return max((at for at in stood if at < self.dislocated), default=0.0)
+        """Largest scale at which it stood below any at which it did not [-]; 0 for none.
+
+        It is also below any at which an elastic fill bears more tension than soil.
+        """
+        return max(at for at in self._stood if at < _find_tension(self._runs))
+
+    @property
+    def _stood(self) -> list[float]:
+        """Scales at which it stood below any at which it did not, whatever its fill, or 0 [-]."""
+        held, end = self._list_held(), self.dislocated
+        return [0.0, *(at for at, kind in held if kind == "stands" and at < end)]
 
     def _list_held(self) -> list[tuple[float, str]]:
         """List the scales up to `lower`, each with the state of collapse."""

@@ -5,7 +5,9 @@ it through this interface alone, whatever its fidelity and whether displacements
 """
 
 import json
-from collections.abc import Iterable, Sequence
+import logging
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from copy import copy
 from dataclasses import astuple, dataclass, replace
 from functools import cached_property
@@ -15,7 +17,7 @@ import numpy as np
 from scipy import sparse
 
 from archfem._typing import Array, Numbers
-from archfem.errors import InvalidInput
+from archfem.errors import InvalidInput, logger
 from archfem.joints.operator import JointOperator
 from archfem.masonry.loads import Action, BodyForce, Settlement
 from archfem.masonry.structure import Structure
@@ -204,6 +206,24 @@ def merge_doubts(doubts: Sequence[Doubt], place: str = "") -> Doubt:
         text, numbers = isinstance(column[0], str), [end for x in column for end in list_ends(x)]
         values.append(column[0] if text else (min(numbers), max(numbers)))
     return replace(doubts[0], values=tuple(values), place=place)
+
+
+@contextmanager
+def log_doubts_once() -> Iterator[None]:
+    """Log the doubts of several runs once where they differ in numbers alone."""
+    logged = set[tuple[str, ...]]()
+
+    def is_new(record: logging.LogRecord) -> bool:
+        kinds = {x.kind for x in record.args or () if isinstance(x, Doubt)}
+        known = bool(kinds) and kinds <= logged
+        logged.update(kinds)
+        return not known
+
+    logger.addFilter(is_new)
+    try:
+        yield
+    finally:
+        logger.removeFilter(is_new)
 
 
 def write_doubts(doubts: Iterable[Doubt]) -> str:

@@ -12,12 +12,16 @@ from glued import glued
 
 import archfem as af
 from archfem.dynamics import CollapseScale, mechanism_scales, motion_scaling
+from archfem.dynamics.collapse_state import CollapseState
+from archfem.dynamics.monitor import FILL_TENSION
 from archfem.dynamics.motion_scaling import (
+    COLLAPSE_DEFINITION,
     MechanismScales,
     ScaledRun,
     admissible_range,
     search_scales,
 )
+from archfem.errors import logger as log
 from archfem.models.model import Doubt
 
 ROUND_OFF = 1.0 + 1e-9
@@ -530,7 +534,7 @@ def test_a_doubt_of_several_runs_is_said_once():
         }
     )
     assert [*map(str, found.doubts)] == [
-        "at 2.00 × by 10 ms (likewise at 2.10 × by 5 ms): it slips by 3.5 mm",
+        "at 2.00 × by 10 ms (likewise at 2.10 × by 5 ms): it slips by 3.5 to 12 mm",
         "at 1.20 × by 5 ms: energy drifts",
     ]
 
@@ -603,3 +607,64 @@ def test_motions_are_scaled_to_five_g_at_most_by_their_strongest_component():
         assert admissible_range(between, af.Motion(weak, 0.01, **others)) == allowed
     with pytest.raises(af.InvalidInput, match="motion 'still' is at rest: no factor on it moves"):
         admissible_range(between, af.Motion(0.0 * weak, 0.01, name="still"))
+
+
+def test_no_margin_is_claimed_where_the_fill_bears_more_tension_than_soil():
+    """It stands up to 4, and its fill is in doubt from 2 on: it is known to stand at 1 alone."""
+
+    def pulled(search, least):
+        def doubts(scale):
+            return (Doubt(FILL_TENSION, "cut it", (5.0 * scale, 0.3)),) if scale >= least else ()
+
+        return replace(search, runs=tuple(replace(r, doubts=doubts(r.scale)) for r in search.runs))
+
+    runs = {0.01: fallen(1.0, 2.0, 4.0, -8.0), 0.005: fallen(1.0, 2.0, 5.0, -9.0)}
+    found = CollapseScale({dt: pulled(search, 2.0) for dt, search in runs.items()})
+    assert (found.lower, found.held, found.states["tension"]) == (4.0, 1.0, 2.0)
+    words = "in doubt, as the elastic fill bears tension of over 5.8 kPa"
+    assert str(found).startswith(
+        f"stands at 1.00 × the motion, from 2.00 × on {words}: falls at 8.00 × the motion"
+    )
+    # one doubt of the runs that bound the fall, with the range of its numbers
+    (doubt,) = found.doubts
+    assert doubt.cause.startswith("elastic fill bears 20 to 45 kPa of tension, at t = 0.3 s: soil")
+    assert doubt.place == (
+        "at 4.00 × by 10 ms (likewise at 8.00 × by 10 ms, 5.00 × by 5 ms, 9.00 × by 5 ms)"
+    )
+    # all of them in tension: nothing is known; tension beyond the fall says nothing
+    every = CollapseScale({dt: pulled(search, 0.5) for dt, search in runs.items()})
+    assert every.held == 0.0
+    assert str(every).startswith(f"from 1.00 × on {words}: falls at 8.00 × the motion")
+    assert "; no smaller scale is known to survive" in str(every)
+    beyond_it = CollapseScale({dt: pulled(search, 8.0) for dt, search in runs.items()})
+    assert (beyond_it.held, "tension" in beyond_it.states) == (4.0, False)
+    small = searched(dict.fromkeys(DEFINITIONS, beyond(2.5)))
+    held = pulled(small, 1.5)
+    assert 1.0 <= held.held < 1.5 <= small.held
+    assert f"from {held.states['tension']:#.3g} × on {words}: first mechanism at" in str(held)
+
+
+def test_scales_are_smaller_until_the_fill_bears_no_tension():
+    """A search begins at 1, where the fill is in tension, and nothing falls below 4."""
+
+    def shaken(scale):
+        doubts = (Doubt(FILL_TENSION, "", (9.0 * scale, 0.3)),) if scale > 0.6 else ()
+        state = CollapseState("fallen" if scale > 4.0 else "stands", None, (), 0.1, 0.1, True)
+        return ScaledRun(scale, {}, Ending.FINISHED, "", state, doubts)
+
+    found = search_scales(shaken, (COLLAPSE_DEFINITION,), 0.05, (0.1, 10.0))
+    assert CollapseScale({0.005: found}).held == pytest.approx(0.5)
+
+
+def test_doubts_of_many_runs_are_logged_once_by_kind(caplog):
+    def shaken(scale):
+        log.warning("%s", Doubt("it slips by {:mm}", "", (1e-3 * scale,)))
+        log.warning("another at %.3g", scale)
+        state = CollapseState("fallen" if scale > 4.0 else "stands", None, (), 0.1, 0.1, True)
+        return ScaledRun(scale, {}, Ending.FINISHED, "", state)
+
+    found = search_scales(shaken, (COLLAPSE_DEFINITION,), 0.05, (0.1, 10.0))
+    said = [record.getMessage() for record in caplog.records]
+    assert said[0] == "it slips by 1 mm"
+    assert sum("slips" in text for text in said) == 1
+    assert len(said) == 1 + len(found.runs)

@@ -9,12 +9,14 @@ from archfem.cases.report.doubts import peak_of_ground
 from archfem.cases.report.report_data import ReportData
 from archfem.dynamics.collapse_state import COLLAPSE_STATES
 from archfem.dynamics.history import History
+from archfem.dynamics.monitor import PULLED
 from archfem.dynamics.motion_scaling import UNFINISHED
 from archfem.masonry.structure import join_words
 from archfem.models.model import Ends
 
 # States that a search of scales finds, in the words of margin and answer
 _STATES = {
+    "tension": (f"is {PULLED},", ""),
     "moves": ("moves as a mechanism", ""),
     "dislocated": ("is dislocated", "is first dislocated"),
     "falls": ("falls", "first falls"),
