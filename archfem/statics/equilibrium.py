@@ -35,6 +35,7 @@ from archfem.masonry.backfill import jointed_fill
 from archfem.masonry.block import Block, as_point, say_place
 from archfem.masonry.construction import Stage, resolve_stages
 from archfem.masonry.loads import BodyForce
+from archfem.masonry.parts import find_undivided
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import (
     CONTACT_TOLERANCE,
@@ -482,7 +483,7 @@ def structure_doubts(structure: Structure) -> list[Doubt]:
     fixed = [*_doubt_inner_supports(structure), *_doubt_ends(structure)]
     remedy = "if so, give it that part, in a drawing by its layer"
     parts = [Doubt(cause, remedy) for cause in structure.misplaced.values()]
-    sizes = [*_doubt_slope(structure), *_doubt_depth(structure)]
+    sizes = [*_doubt_slope(structure), *_doubt_depth(structure), *_doubt_undivided(structure)]
     return [*fixed, *parts, *sizes, *fill_doubts(structure)]
 
 
@@ -498,6 +499,22 @@ def _doubt_depth(structure: Structure) -> list[Doubt]:
             "check the unit of the lengths; `unit` in [structure] replaces that of a drawing",
         )
     ]
+
+
+def _doubt_undivided(structure: Structure) -> Iterator[Doubt]:
+    """Doubt rings whose stones could hinge inside, as where several are drawn as one."""
+    blocks = structure.blocks
+    found = find_undivided(blocks, structure.joints, structure.pairs, structure.ends)
+    for part in dict.fromkeys(blocks[k].part for k in found):
+        own = [k for k in found if blocks[k].part == part]
+        spans, hollows = zip(*(found[k] for k in own), strict=True)
+        names = join_names([f"'{blocks[k].name}'" for k in own]) + (f" of '{part}'" if part else "")
+        yield Doubt(
+            f"in one piece over {{:.3g}} times the depth of a joint, {names} could hinge inside: "
+            "the inner face rises by {:.2g} of the depth, and a ring of voussoirs is weaker",
+            "draw the outline of each voussoir, unless it is one stone",
+            ((min(spans), max(spans)), (min(hollows), max(hollows))),
+        )
 
 
 def _doubt_ends(structure: Structure) -> Iterator[Doubt]:

@@ -236,6 +236,30 @@ def test_a_ring_in_a_wrong_unit_is_a_doubt(factor, doubts):
     assert all(f"typically {0.3 * factor:.3g} m deep" in doubt.cause for doubt in found)
 
 
+@pytest.mark.parametrize("voussoirs", [2, 3, 4, 15])
+def test_a_ring_drawn_as_a_few_stones_is_a_doubt(voussoirs):
+    """It bears more than one of voussoirs; chord and rise are those of an arc."""
+    sizes = {"radius": 1.0, "thickness": 0.2, "embrace": 180.0}
+    ring, fine = (af.circular_arch(**sizes, voussoirs=n) for n in (voussoirs, 60))
+    factors = [af.collapse_factor(x, live=af.BodyForce(1.0, 0.0)).factor for x in (ring, fine)]
+    found, half = structure_doubts(ring), np.pi / voussoirs / 2.0
+    assert len(found) == (factors[0] > 1.1 * factors[1]) == (voussoirs < 15)
+    for doubt in found:
+        assert f"in one piece over {10.0 * np.sin(half):.3g} times" in doubt.cause
+        assert f"rises by {4.5 * (1.0 - np.cos(half)):.2g} of the depth" in doubt.cause
+        assert doubt.remedy == "draw the outline of each voussoir, unless it is one stone"
+
+
+def test_lintels_springers_and_blocks_of_piers_may_be_monoliths():
+    sizes = {"radius": 1.5, "thickness": 0.35, "voussoirs": 9, "pier_breadth": 0.7}
+    monoliths = [
+        af.arch_on_piers(**sizes, courses=[3.0]),
+        af.Case.read(ROOT / "archfem/cases/new/portal.toml").structure,
+        af.shapes.flat_arch(span=2.0, thickness=0.4, voussoirs=3, skewback="10 degree"),
+    ]
+    assert [structure_doubts(each) for each in monoliths] == [[], [], []]
+
+
 def test_a_fixed_stone_of_a_pier_or_a_flat_arch_is_a_doubt():
     pier = af.column(breadth=0.6, heights=[0.5] * 4)
     flat = af.shapes.flat_arch(span=2.0, thickness=0.4, voussoirs=5, skewback="10 degree")
