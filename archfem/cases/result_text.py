@@ -395,7 +395,7 @@ def describe_limit(case: Case, found: Collapse, opposite: Collapse | None) -> tu
     others = []
     if opposite is not None:
         close = np.allclose(opposite.range, found.range, rtol=1e-4)
-        if opposite.range[0] < found.range[0] and not close:
+        if _order_senses(opposite) < _order_senses(found) and not close:
             found, opposite = opposite, found
         rank = _compare_senses(found, opposite)
         others.append(f"in the other sense: {opposite.sentence} ({rank})")
@@ -405,9 +405,18 @@ def describe_limit(case: Case, found: Collapse, opposite: Collapse | None) -> tu
     return found, "\n".join([describe_collapse(case.structure, found, case.limit), *others])
 
 
+def _order_senses(found: Collapse) -> tuple[int, float]:
+    """Return the order of a sense: the least found, then the least bound, then one without end."""
+    if found.outcome is Outcome.BRACKETED:
+        return 1, found.upper
+    return 2 * int(np.isinf(found.range[0])), found.range[0]
+
+
 def _compare_senses(found: Collapse, opposite: Collapse) -> str:
     """Say whether a load bears more in the other sense, by results whose least is the first's."""
     rank = "higher" if opposite.range[0] > found.range[1] else "their ranges overlap"
+    if rank != "higher" and opposite.outcome is Outcome.BRACKETED:
+        return "which sense bears less is not known"
     if found.over_fill and opposite.over_fill:
         least, other = found.over_fill.values, opposite.over_fill.values
         rank = "higher" if all(other[key] > least[key] for key in least) else rank

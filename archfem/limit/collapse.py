@@ -162,12 +162,13 @@ class Collapse(ResultDisplay):
         low, high = (f"{unit * bound:.4g}" for bound in ends)
         place, words = f"at {low}" if low == high else f"at {low} to {high}", self._name_load()
         if self.outcome is Outcome.BRACKETED:
-            place = f"which is not below {low}, nor above {high}"
+            place = f"between {low} and {high}"
             if np.isinf(self.upper):
-                place = f"which is at least {low}"
+                place = f"at least {low}"
             elif low == high or (self.solutions and not self.solutions.has_lower_bound):
-                place = f"which is at most {high}"
-        elif self.solutions and self.solutions.may_be_less:
+                place = f"at most {high}"
+            return f"{self._headline}; it is {place}{words}"
+        if self.solutions and self.solutions.may_be_less:
             place, words = place.replace("at ", "at ≤ ", 1), f"{words} (least found)"
         return f"{self._headline}, {place}{words}"
 
@@ -370,7 +371,10 @@ def _solve_loads(
     warn_bonds(structure, result)
     actions = (loads,) if isinstance(loads, Settlement) else tuple(loads)
     crushes = check_options(structure, friction, strength)
-    return replace(result, strength=crushes, live=actions, dead=stays, structure=structure)
+    result = replace(result, strength=crushes, live=actions, dead=stays, structure=structure)
+    if result.outcome is Outcome.BRACKETED:
+        logger.warning("%s: the factor is only a bound; %s", result.sentence, result.solutions)
+    return result
 
 
 def stands(
@@ -541,9 +545,6 @@ def _read_without_optimum(
     bound = upper if unbounded is Outcome.LOCKS else lower
     if not np.isfinite(bound):
         return _read_result(stones, dead, unbounded, np.inf, at_rest)
-    logger.warning(
-        "no state without dilatancy was found, and the factor is only a bound: %s", solutions
-    )
     result = _read_result(stones, dead, Outcome.BRACKETED, bound, _without_forces(at_rest))
     return replace(result, upper=upper)
 

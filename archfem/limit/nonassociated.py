@@ -229,9 +229,6 @@ class NonassociatedBounds:
         if not np.isfinite(lower):
             return "without dilatancy it does not either: no factor is too large"
         weakest, strongest = self.between
-        text = "were not found"
-        if np.isfinite(weakest):
-            text = f"found from {weakest:.4g}, the least, to {strongest:.4g}"
         limits = f"proved: none is below {lower:.4g}, nor above {upper:.4g}"
         if np.isinf(upper):  # a load that no associated factor limits has a lower bound alone
             limits = f"proved: none is below {lower:.4g}"
@@ -239,10 +236,12 @@ class NonassociatedBounds:
             limits = f"proved: none is above {upper:.4g}; no lower bound is known"
         if np.isclose(weakest, upper, rtol=1e-6):
             limits += "; the least found is the factor of 'coulomb' too"
+        if np.isnan(weakest):
+            return f"{tried} starting states led to no solution without dilatancy; {limits}"
         least = str(self.agreeing or "a descent below them")
         return (
-            f"solutions without dilatancy {text} (by {successful} of {tried} starting states, the "
-            f"least by {least}); {limits}"
+            f"solutions without dilatancy found from {weakest:.4g}, the least, to {strongest:.4g} "
+            f"(by {successful} of {tried} starting states, the least by {least}); {limits}"
         )
 
     @property

@@ -85,7 +85,9 @@ def _draw_mechanism(axes: Axes, structure: Structure, found: Collapse, factors: 
     soft = set(find_yielding_blocks(structure))
     stones = np.array([not soft & set(joint.blocks) for joint in structure.joints])
     draw_thrust(axes, Marker(structure, stones).at(found.joints))
-    factor = f"{found.factor:.3g} ×{factors}" if np.isfinite(found.factor) else ""
+    # without a solution there may be no bound from below, at which the load would vanish
+    multiple = found.upper if found.outcome is Outcome.BRACKETED else found.factor
+    factor = f"{multiple:.3g} ×{factors}" if np.isfinite(multiple) else ""
     if found.outcome is not Outcome.INFEASIBLE:  # else nothing was loaded: the weight is too much
         draw_loads(axes, structure, found.live, factor=factor)
     set_title(axes, f"{structure.name}: {found.sentence}")

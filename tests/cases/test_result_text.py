@@ -24,7 +24,7 @@ from archfem.cases.result_text import (
 )
 from archfem.cases.toml_file import format_tables
 from archfem.commands.cli import main
-from archfem.limit.collapse import describe_fill
+from archfem.limit.collapse import Outcome, describe_fill
 from archfem.limit.mechanism_count import duration_text
 
 
@@ -147,6 +147,23 @@ def test_limit_analysis_in_words(ring):
     between = 1.1 * pushed.factor
     words = describe_limit(case, ranged, replace(mirrored, factor=between, upper=between))[1]
     assert words.endswith(f" (their ranges overlap)\n{DEFAULTS}")
+    # a sense in which nothing was found has bounds alone, and never leads over one with a mechanism
+    ends = {"factor": 0.0, "motion": 0.0 * pushed.motion}
+    lost = replace(mirrored, outcome=Outcome.BRACKETED, upper=2.0 * pushed.factor, **ends)
+    for given_first in ((lost, pushed), (pushed, lost)):
+        least, words = describe_limit(case, *given_first)
+        assert least is pushed
+        bound = (
+            f"no state without dilatancy was found; it is between 0 and {2.0 * lost.upper:.4g} g"
+        )
+        told = (
+            f"in the other sense: {bound}, pushed to the left (which sense bears less is not known)"
+        )
+        assert told in words
+    lower = replace(lost, upper=pushed.factor)
+    assert describe_limit(case, lost, lower)[0] is lower
+    endless = replace(pushed, outcome=Outcome.UNBOUNDED, factor=np.inf, upper=np.inf)
+    assert describe_limit(case, endless, lost)[0] is lost
     # 1.15 a_g at the surface
     for case.target, named in (
         (site, "0.1 g × S 1.15"),

@@ -479,14 +479,14 @@ def test_without_a_solution_the_bound_is_the_answer(monkeypatch):
     assert found.solutions.bracket == pytest.approx((found.factor, found.upper))
     assert 0.0 < found.factor < found.upper == pytest.approx(upper)
     assert found.sentence == (
-        f"no state without dilatancy was found, which is not below {found.factor:.4g}, nor above "
-        f"{upper:.4g} times 1 kN at x = 0 m"
+        f"no state without dilatancy was found; it is between {found.factor:.4g} and {upper:.4g} "
+        "times 1 kN at x = 0 m"
     )
     solutions = replace(found.solutions, bracket=(1e-8 * upper, upper))  # round-off of the bound
     unknown = replace(found, factor=1e-8 * upper, solutions=solutions)
     assert "no lower bound is known" in str(unknown)
-    assert f"was found, which is at most {upper:.4g} times 1 kN" in unknown.sentence
-    assert "which is at least" in replace(found, upper=np.inf).sentence
+    assert f"was found; it is at most {upper:.4g} times 1 kN" in unknown.sentence
+    assert "; it is at least" in replace(found, upper=np.inf).sentence
     assert np.isnan(found.joints["N"]).all()
 
 
