@@ -10,6 +10,7 @@ from collections.abc import Collection, Iterator, Mapping
 from enum import StrEnum
 from html import escape
 from importlib import import_module
+from multiprocessing import parent_process
 from time import monotonic
 from typing import Any, ClassVar, Self, TypeVar
 
@@ -17,8 +18,8 @@ from tqdm import tqdm
 
 Item = TypeVar("Item")
 
-# Time between lines of progress where the output is no terminal [s]
-PROGRESS_INTERVAL = 5.0
+# Time between lines of progress where the output is no terminal [s]: of searches, and of motions
+PROGRESS_INTERVAL, MOTION_INTERVAL = 5.0, 20.0
 
 # Before lines on what may change an answer, and on what it assumes or leaves out on the safe side
 DOUBT_MARK, NOTE_MARK = "in doubt: ", "note: "
@@ -114,16 +115,18 @@ class ProgressReport:
     """Progress of a search of five seconds and more: a bar on a terminal, elsewhere lines.
 
     The total is None if it is unknown. A line of a search within another one begins with the texts
-    of the outer ones, and is written however short the inner one is.
+    of the outer ones, and is written however short the inner one is. Motions within a search are
+    shown rarely, and those of worker processes not at all.
     """
 
     _open: ClassVar[list["ProgressReport"]] = []  # from the outermost to the innermost
 
-    def __init__(self, name: str, total: int | None) -> None:
+    def __init__(self, name: str, total: float | None, *, rarely: bool = False) -> None:
         layout = "{desc}: |{bar}| {n_fmt} of {total_fmt}{postfix}"
         look: dict[str, Any] = {"bar_format": layout, "desc": name, "leave": False}
         self._bar = tqdm(total=total, disable=None, delay=PROGRESS_INTERVAL, **look)
-        self._name, self._text, self._shown = name, "", monotonic()
+        self._name, self._text, self._rarely = name, "", rarely
+        self._shown = self._drawn = monotonic()
 
     def __enter__(self) -> Self:
         self._open.append(self)
@@ -133,15 +136,21 @@ class ProgressReport:
         self._open.remove(self)
         self._bar.close()
 
-    def show(self, text: str, done: int = 0) -> None:
+    def show(self, text: str, done: float = 0) -> None:
         """Show a text, and count the steps done since the last one."""
+        now = monotonic()
         self._bar.update(done)
-        self._bar.set_postfix_str(text)
+        # a motion shows thousands of texts a second
+        self._bar.set_postfix_str(text, refresh=not self._rarely or now - self._drawn > 0.1)
+        self._drawn = now if now - self._drawn > 0.1 else self._drawn
         self._text, first = text, (*self._open, self)[0]
-        if self._bar.disable and monotonic() - first._shown >= PROGRESS_INTERVAL:
+        if self._rarely and parent_process() is not None:
+            return
+        interval = MOTION_INTERVAL if self._rarely else PROGRESS_INTERVAL
+        if self._bar.disable and now - first._shown >= interval:
             inner = [f"{each._name}: {each._text}" for each in self._open[1:] if each._text]
             write_progress_line(first._name, "; ".join(filter(None, [first._text, *inner])))
-            first._shown = monotonic()
+            first._shown = now
 
 
 def track_progress(name: str, items: Collection[Item]) -> Iterator[Item]:

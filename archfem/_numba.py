@@ -32,6 +32,7 @@ from numba.core.compiler_machinery import LoweringPass, register_pass
 from numba.core.typed_passes import NativeLowering
 
 from archfem._files import lock_file
+from archfem._threads import hold_signals
 from archfem.errors import logger
 
 # mypy: disable-error-code="no-untyped-call"
@@ -190,7 +191,7 @@ def store_compiled(compile_function: Callable[..., Any]) -> Callable[..., Any]:
         compile_signature = dispatcher.compile
 
         def compile_once(signature: Any) -> Any:
-            with cache.lock:  # released also if it does not compile
+            with hold_signals(), cache.lock:  # released also if it does not compile
                 return compile_signature(signature)
 
         dispatcher.compile = compile_once

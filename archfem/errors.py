@@ -67,6 +67,18 @@ class NotInstalled(ArchfemError, ImportError):
     """A package that is required and missing: install it, or choose options without it."""
 
 
+class Interrupted(KeyboardInterrupt):
+    """Ctrl-C or SIGTERM within a computation; results up to that point are attached.
+
+    Attributes:
+        last: frames of a fall, of the longest steps that were followed to its end, or so far.
+    """
+
+    def __init__(self, last: Any) -> None:
+        super().__init__()
+        self.last = last
+
+
 class DidNotConverge(ArchfemError):
     """No equilibrium was found; results up to that point are attached.
 

@@ -3,6 +3,7 @@
 import errno
 import os
 import re
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -11,7 +12,7 @@ import numba
 import pytest
 from repeats import each_once
 
-from archfem import _numba
+from archfem import _numba, _threads
 
 
 def test_compilation_is_reported_once_for_each_part(capsys, monkeypatch):
@@ -25,6 +26,34 @@ def test_compilation_is_reported_once_for_each_part(capsys, monkeypatch):
     assert "compiling the time steps of large displacements, which takes about 38 s" in first
     assert "compiling the fall of loose blocks, which takes about 37 s" in second
     assert "compiling the time steps, which takes about 23 s" in third
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_waits_until_a_kernel_is_compiled(number):
+    """An exception within a callback of LLVM would be lost, and the kernel with it."""
+
+    def interrupt(*_):
+        raise KeyboardInterrupt
+
+    def compile_slowly():
+        with _threads.hold_signals():
+            signal.raise_signal(number)
+            reached.append("the end")
+
+    before = signal.signal(number, interrupt)
+    reached = []
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            compile_slowly()
+        assert signal.getsignal(number) is interrupt
+    finally:
+        signal.signal(number, before)
+    assert reached == ["the end"]
+    held = []
+    compiled = _numba.entry(lambda x: x + 1)
+    compiled._cache.load_overload = lambda *_: held.append(signal.getsignal(signal.SIGINT))
+    assert compiled(1) == 2
+    assert held != [signal.getsignal(signal.SIGINT)]
 
 
 @pytest.mark.slow
@@ -43,7 +72,7 @@ def test_the_stated_time_is_that_of_the_compilation(tmp_path):
 # from processor time as well.
 MEASUREMENT = """
 import time
-from archfem import _numba
+from archfem import _numba, _threads
 from archfem.dynamics.warm_up import compile_variant
 _numba.perf_counter = time.process_time
 start = time.process_time()
@@ -122,7 +151,7 @@ def test_one_of_two_processes_compiles(tmp_path):
 
 FUNCTION = """
 import sys
-from archfem import _numba
+from archfem import _numba, _threads
 
 @_numba.entry
 def add_half(value):

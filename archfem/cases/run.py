@@ -29,6 +29,7 @@ from archfem.cases.structure_keys import read_survey
 from archfem.cases.toml_file import read_tables
 from archfem.dynamics.analysis import Analysis
 from archfem.dynamics.damping import resolve_effective_damping
+from archfem.dynamics.fall import mark_interrupted
 from archfem.dynamics.history import Ending, History, partial_history
 from archfem.dynamics.schemes import Viscous
 from archfem.dynamics.slip_error import least_compression
@@ -441,8 +442,13 @@ def _run_motion(
     except DidNotConverge as error:
         history, failure = partial_history(error), error
     seconds = perf_counter() - start
-    doubts = (*at_rest.doubts, *history.doubts, *doubt_fidelity(at_rest, motion, history))
-    history = history.with_doubts(doubts)
+    compared = list[Doubt]()
+    if history.ending is not Ending.INTERRUPTED:
+        try:
+            compared = doubt_fidelity(at_rest, motion, history)
+        except KeyboardInterrupt:
+            history = mark_interrupted(history, "its comparison with a finer fidelity, at the end")
+    history = history.with_doubts((*at_rest.doubts, *history.doubts, *compared))
     if path is not None:
         history.save(path)
         del history  # of a long run it takes hundreds of megabytes
@@ -485,6 +491,8 @@ def _compare_start(
     try:
         cut = motion.cut(0.0, 0.5)
         run = time_history(analysis, cut, start=dead, damping=at_rest.damping[0])
+        if run.ending is Ending.INTERRUPTED:
+            raise KeyboardInterrupt
     except ArchfemError:  # it has no equilibrium at some step: no comparison
         return None
     # either run may have ended before, by an event or a failed step

@@ -13,6 +13,7 @@ from functools import partial
 from importlib import import_module
 from importlib.util import find_spec
 from io import TextIOWrapper
+from time import monotonic
 from typing import Any
 
 from archfem._files import describe_os_error
@@ -74,13 +75,17 @@ def _run_command(options: argparse.Namespace) -> int | None:
 
 
 @contextmanager
-def _interrupt_on_sigterm() -> Iterator[list[int]]:
+def _interrupt_on_sigterm() -> Iterator[list[float]]:
     """Raise KeyboardInterrupt on SIGTERM, as Ctrl-C does; yield the received signals."""
-    received: list[int] = []
+    received: list[float] = []
 
-    def interrupt(number: int, _: object) -> None:
-        received.append(number)  # so that the exit code differs from that of Ctrl-C
-        raise KeyboardInterrupt
+    def interrupt(*_: object) -> None:
+        # `timeout` sends it twice, to the process and to its group: the second one must not
+        # break off what the first one lets be kept
+        repeated = bool(received) and monotonic() - received[-1] < 1.0
+        received.append(monotonic())  # so that the exit code differs from that of Ctrl-C
+        if not repeated:
+            raise KeyboardInterrupt
 
     previous = signal.signal(signal.SIGTERM, interrupt)
     try:

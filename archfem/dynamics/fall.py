@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import xarray as xr
 
+from archfem._display import ProgressReport
 from archfem._typing import Array
 from archfem._validation import validate_arguments
 from archfem.dynamics.collapse_state import (
@@ -36,7 +37,7 @@ from archfem.dynamics.rocking_body import doubt_courses
 from archfem.dynamics.schemes import StiffnessDamping, Viscous
 from archfem.dynamics.separation import is_overturning, is_resting, swings_little
 from archfem.dynamics.state import State
-from archfem.errors import DidNotConverge
+from archfem.errors import DidNotConverge, logger
 from archfem.masonry.stiffness_ratio import find_yielding_blocks, mark_stone_joints
 from archfem.masonry.structure import Structure, join_names
 from archfem.models.model import Doubt, Model
@@ -93,7 +94,23 @@ def follow_fall(
     The states are those at the start, from which displacements count, and at the end of the run.
     Not whole, the fall ends with the first lost block, and is not compared with rigid blocks. Where
     the fall could not be followed to its end and no block was lost, there is no state of collapse.
+    Ctrl-C and SIGTERM end it with what was computed.
     """
+    try:
+        return _follow_fall(history, model, states, motion, damping, whole)
+    except KeyboardInterrupt:  # before the first step
+        return mark_interrupted(history, f"{states[1].time:.4g} s")
+
+
+def _follow_fall(
+    history: History,
+    model: Model,
+    states: tuple[State, State],
+    motion: Motion,
+    damping: Viscous | None,
+    whole: bool,
+) -> History:
+    """Add a fall and the state of collapse to a history, unless interrupted at once."""
     (start, state), structure, ending = states, model.structure, history.ending
     rocking_ratio = damping.restitution if isinstance(damping, StiffnessDamping) else None
     origin, _ = model.rigid_motions(start.q, start.velocity)
@@ -107,12 +124,15 @@ def follow_fall(
         attrs = history.dataset.attrs | dataset.attrs
         history = replace(history, dataset=history.dataset.merge(dataset).assign_attrs(attrs))
         doubts += _doubt_fall(structure, dataset)
-        if failure := dataset.attrs["fall_failure"]:
+        failure = dataset.attrs["fall_failure"]
+        if failure == "interrupted":
+            history = mark_interrupted(history, f"{frames[-1].time:.4g} s, in a fall")
+        elif failure:
             words = "loose blocks were followed until {:.2f} s alone, and what comes after is not"
             remedy = "compare with another dt, or with archfem.dynamics.RigidBlockSimulation"
             doubts.append(Doubt(f"{words} known: {{}}", remedy, (frames[-1].time, failure)))
-            if fall.time is None:
-                return history.with_doubts((*history.doubts, *doubts))
+        if failure and fall.time is None:
+            return history.with_doubts((*history.doubts, *doubts))
     else:
         frame = LooseBlocks(state.time, *model.rigid_motions(state.q, state.velocity))
         resting = is_resting(model, state, shaken=ending is not Ending.FINISHED)
@@ -125,11 +145,24 @@ def follow_fall(
     push = motion.horizontal * np.sign(motion.horizontal[-1])
     held = bool(push[-len(push) // 5 :].min() > 0.5 * np.abs(push).max())
     doubts += doubt_collapse(structure, fall, held)
-    if fall.kind in FALLEN_STATES and whole:
-        doubts += _doubt_joints(structure, motion, start.time)
     if whole and start.time == 0.0 and ending is not Ending.EVENT:
         doubts += doubt_courses(structure, fall, motion)
-    return with_fall(history, fall).with_doubts((*history.doubts, *doubts))
+    history = with_fall(history, fall).with_doubts((*history.doubts, *doubts))
+    if fall.kind not in FALLEN_STATES or not whole or history.ending is Ending.INTERRUPTED:
+        return history
+    try:
+        compared = list(_doubt_joints(structure, motion, start.time))
+    except KeyboardInterrupt:
+        return mark_interrupted(history, "its comparison with rigid blocks, after the fall")
+    return history.with_doubts((*history.doubts, *compared))
+
+
+def mark_interrupted(history: History, when: str) -> History:
+    """Return a history as one that Ctrl-C or SIGTERM ended, and log that it is kept."""
+    outcome = f"interrupted at {when}"
+    logger.warning("%s: what was computed is kept", outcome)
+    attrs = {"ended": str(Ending.INTERRUPTED), "outcome": outcome}
+    return replace(history, dataset=history.dataset.assign_attrs(attrs))
 
 
 def simulate_fall(
@@ -161,11 +194,13 @@ def simulate_fall(
             poses.append(each.poses)
             if not whole and find_lost(frame.poses).any():
                 break
-    except DidNotConverge as error:
-        failure = str(error)
+    except (DidNotConverge, KeyboardInterrupt) as error:
         if not frames:
-            frames = [loose.restore(each) for each in error.last]
-            poses = [each.poses for each in error.last]
+            frames = [loose.restore(each) for each in getattr(error, "last", ())]
+            poses = [each.poses for each in getattr(error, "last", ())]
+        if not frames:  # interrupted before the first step
+            raise
+        failure = "interrupted" if isinstance(error, KeyboardInterrupt) else str(error)
     dataset = _fall_dataset(frames, motion, released).merge(loose.describe_grains(poses))
     return dataset.assign_attrs(fall_failure=failure), frames
 
@@ -224,7 +259,9 @@ def _doubt_joints(structure: Structure, motion: Motion, start: float) -> Iterato
     simulation = RigidBlockSimulation(with_sliding_joints(structure), dt=TRIED_STEPS[0])
     at_rest, end = LooseBlocks.as_built(structure, start), motion.duration + 2.0
     find_lost = mark_lost(structure)
-    with suppress(DidNotConverge):  # then there is nothing to compare with
+    name = f"{motion.name}: compared with rigid blocks"
+    # without convergence there is nothing to compare with
+    with suppress(DidNotConverge), ProgressReport(name, None, rarely=True):
         frames = simulation.frames(at_rest, end, motion, spacing=0.02)
         if not any(find_lost(frame.poses).any() for frame in frames):
             yield Doubt(

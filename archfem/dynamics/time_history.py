@@ -11,8 +11,8 @@ from time import monotonic
 from typing import Any
 
 import numpy as np
-from tqdm import tqdm
 
+from archfem._display import ProgressReport
 from archfem._threads import single_threaded
 from archfem._validation import check_between, check_type, validate_arguments
 from archfem.dynamics import events
@@ -134,7 +134,7 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
         recorder.add(first)
         monitors = event, LooseningMonitor.of(model, start) if model.large_displacements else None
         batches = _take_steps(adaptive, start, dt, motion.duration)
-        ending, outcome = _run_steps(batches, recorder, monitors, motion.duration)
+        ending, outcome = _run_steps(batches, recorder, monitors, motion)
     except KeyboardInterrupt:
         ending, outcome = Ending.INTERRUPTED, f"interrupted at {recorder.state.time:.4g} s"
         logger.warning("%s: what was computed is kept", outcome)
@@ -292,19 +292,20 @@ def _take_steps(
 
 
 def _run_steps(
-    batches: Iterable[Batch], recorder: Recorder, monitors: Monitors, end: float
+    batches: Iterable[Batch], recorder: Recorder, monitors: Monitors, motion: Motion
 ) -> tuple[Ending, str]:
     """Record steps up to an event or the end of the motion; return how and why the run ended."""
     start = recorder.state
-    duration, is_announced = round(end - start.time, 4), False
+    duration, is_announced = round(motion.duration - start.time, 4), False
     # the pace is that after the first batch, which may wait for compilation
     begun = since = 0.0
-    with tqdm(total=duration, unit="s", disable=None, leave=False) as bar:
+    with ProgressReport(motion.name, duration, rarely=True) as progress:
         for batch in batches:
-            ending, reason, size = _find_end(monitors, batch, recorder.state.time)
+            ending, reason, size = _find_end(monitors, batch, before := recorder.state.time)
             if size:
                 recorder.add(batch.cut(size), last=reason is not None)
-            bar.update(round(recorder.state.time - start.time - bar.n, 4))
+            time = recorder.state.time
+            progress.show(f"{time:.3g} of {motion.duration:.3g} s", round(time - before, 6))
             if reason is not None:
                 when = f"at {recorder.state.time:.4g} s"
                 if ending in (Ending.PARTED, Ending.MET):

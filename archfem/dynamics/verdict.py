@@ -7,6 +7,7 @@ import numpy as np
 import xarray as xr
 
 from archfem._display import DOUBT_MARK
+from archfem._threads import single_threaded
 from archfem._typing import Array
 from archfem.dynamics.collapse_state import CollapseState
 from archfem.joints.criteria import (
@@ -143,6 +144,7 @@ class Verdict:
         return f"Verdict({self.headline!r})"
 
 
+@single_threaded
 def detect_mechanisms(
     joints: xr.Dataset, structure: Structure | None
 ) -> dict[str, Mechanism | None]:

@@ -27,10 +27,10 @@ from archfem.units import format_mm
 # Rings and piers are assessed; other parts follow their support.
 PART_ROLES = ("ring", "pier", "other")
 
-# Hollow of the inner face of a stone over its depth, above which several were drawn as one [-].
-# Voussoirs as long as deep have 0.02. Rings of five stones, with 0.25 and more, bore 1.1 to 1.5
-# times the push of rings of many.
-MAX_HOLLOW = 0.25
+# Span of a stone, and hollow of its inner face, over depths, above which several were drawn as one
+# [-]. Voussoirs as long as deep have a hollow of 0.02, and short keystones of pointed arches have
+# 0.4. Rings of five stones, with 2.8 and 0.26, bore 1.1 to 1.5 times the push of rings of many.
+MAX_SPAN, MAX_HOLLOW = 2.5, 0.25
 
 
 class Member(Protocol):
@@ -257,7 +257,7 @@ def find_undivided(
     for k, own in faces.items():
         measured = (_measure_hollow(blocks[k], *pair) for pair in combinations(own, 2))
         span, hollow = max(measured, default=(0.0, 0.0))
-        if hollow > MAX_HOLLOW:
+        if span > MAX_SPAN and hollow > MAX_HOLLOW:
             found[k] = span, hollow
     return found
 

@@ -156,10 +156,10 @@ def test_limit_analysis_in_words(ring):
         bound = (
             f"no state without dilatancy was found; it is between 0 and {2.0 * lost.upper:.4g} g"
         )
-        told = (
+        noted = (
             f"in the other sense: {bound}, pushed to the left (which sense bears less is not known)"
         )
-        assert told in words
+        assert noted in words
     lower = replace(lost, upper=pushed.factor)
     assert describe_limit(case, lost, lower)[0] is lower
     endless = replace(pushed, outcome=Outcome.UNBOUNDED, factor=np.inf, upper=np.inf)

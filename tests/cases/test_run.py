@@ -193,7 +193,7 @@ def test_a_run_is_compared_with_a_finer_one_over_its_first_half_second(stack, mo
         resultants[..., 0], resultants[..., 2] = normal, rows
         time = 0.1 * np.arange(len(rows))
         joints = af.joints.joint_dataset(stack, resultants, time)
-        return SimpleNamespace(time=time, joints=joints)
+        return SimpleNamespace(time=time, joints=joints, ending=af.dynamics.Ending.FINISHED)
 
     def doubts(coarse, finer, softened=None):
         def run(analysis, motion, **_):

@@ -7,6 +7,7 @@ import os
 import re
 import resource
 import signal
+import subprocess
 import sys
 from pathlib import Path
 
@@ -16,6 +17,8 @@ import pytest
 import archfem as af
 from archfem import _files
 from archfem.commands.cli import exit_code
+from archfem.dynamics import fall
+from archfem.dynamics.rigid_body import simulation
 
 COLUMN = (
     '[structure]\nshape = "column"\nbreadth = 1.0\nheights = [1.0]\n[model]\nfidelity = "rigid"\n'
@@ -280,6 +283,59 @@ def test_a_signal_ends_a_motion_and_keeps_its_steps(
     summary = (tmp_path / "out" / "summary.txt").read_text()
     assert "outcome: interrupted at" in summary
     assert "interrupted" in capsys.readouterr().err
+
+
+def test_sigterm_in_a_fall_keeps_dead_load_and_history(tmp_path, unplotted, monkeypatch):
+    """`timeout` sends it to the process and to its group, so twice; kept are the frames so far."""
+    check = simulation._Run._check
+
+    def stop(run, time):
+        check(run, time)
+        if time > 0.9:
+            os.kill(os.getpid(), signal.SIGTERM)
+
+    def write_twice(*given):
+        os.kill(os.getpid(), signal.SIGTERM)
+        return keep(*given)
+
+    keep = fall.mark_interrupted
+    monkeypatch.setattr(simulation._Run, "_check", stop)
+    monkeypatch.setattr(fall, "mark_interrupted", write_twice)
+    path, out = tmp_path / "column.toml", tmp_path / "out"
+    path.write_text(
+        COLUMN.replace("breadth = 1.0", "breadth = 0.6")
+        .replace("[1.0]", "[2.4]")
+        .replace("synthetic = { seed = 1, duration = 3.0, pga = 1.0 }", 'file = "push.csv"')
+        .replace('"rigid"', '"rigid"\ndisplacements = "large"')
+        + "[analysis]\ndt = 2e-3\n"
+    )
+    rows = "\n".join(f"{0.01 * k:.2f},3.924" for k in range(100))
+    (tmp_path / "push.csv").write_text(f"Time (s),Acceleration (m/s2)\n{rows}\n")
+    assert af.commands.main(["run", str(path), "--out", str(out)]) == 143
+    assert (out / "dead.png").is_file()
+    run = af.History.read(out / "history.nc", af.Case.read(path).structure)
+    assert run.ending is af.dynamics.Ending.INTERRUPTED
+    assert 0.88 < run.dataset["fall_time"].values[-1] <= 0.9
+    assert "outcome: interrupted at 0.896 s, in a fall" in (out / "summary.txt").read_text()
+
+
+def test_sigterm_interrupts_where_gmsh_is_loaded():
+    """gmsh sets the system's handler, upon which the signal would end the process at once."""
+    pytest.importorskip("gmsh")
+    script = "\n".join(
+        [
+            "import os, signal",
+            "import archfem as af",
+            "from archfem.commands.cli import exit_code, _interrupt_on_sigterm",
+            "def stop():",
+            "    af.build(af.column(breadth=1.0, heights=[1.0]), fidelity='faces')",
+            "    os.kill(os.getpid(), signal.SIGTERM)",
+            "with _interrupt_on_sigterm():",
+            "    print(exit_code(stop))",
+        ]
+    )
+    ran = subprocess.run([sys.executable, "-c", script], text=True, capture_output=True)
+    assert (ran.stdout, ran.stderr) == ("130\n", "archfem: interrupted\n")
 
 
 def test_sigterm_in_limit_analysis_keeps_dead_load_and_motion(

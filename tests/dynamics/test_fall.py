@@ -142,6 +142,77 @@ def test_a_fall_that_cannot_be_followed_keeps_what_is_known(followed, outcome, w
     assert doubted == (whole or outcome == "unknown")
 
 
+@pytest.mark.parametrize(
+    ("followed", "compared", "outcome"),
+    [
+        (0.2, False, "unknown"),
+        (0.6, False, "fallen"),
+        (99.0, True, "fallen"),
+        (-1.0, False, "unknown"),
+    ],
+)
+def test_a_fall_that_is_interrupted_keeps_what_was_computed(
+    followed, compared, outcome, monkeypatch
+):
+    """The column of the test above; behind the fall, it is compared with rigid blocks."""
+    check, doubt = simulation._Run._check, fall._doubt_joints
+
+    def stop(run, time):
+        check(run, time)
+        if time > 0.67 + followed:
+            raise KeyboardInterrupt
+
+    def stop_comparison(*given):
+        if compared:
+            raise KeyboardInterrupt
+        return doubt(*given)
+
+    monkeypatch.setattr(simulation._Run, "_check", stop)
+    monkeypatch.setattr(fall, "_doubt_joints", stop_comparison)
+    column = af.column(breadth=0.6, heights=[2.4], contact=af.Contact(1e9, 4e8, 0.6))
+    analysis = af.Analysis(column, fidelity="rigid", displacements="large", dt=2e-3)
+    run = analysis.run(af.Motion(np.full(100, 0.4 * G), 0.01))
+    assert run.ending is af.dynamics.Ending.INTERRUPTED
+    assert run.verdict.outcome == outcome
+    assert run.time[-1] == pytest.approx(0.67, abs=0.02)
+    place = (
+        "its comparison with rigid blocks"
+        if compared
+        else r"[\d.]+ s" + ", in a fall" * (followed > 0)
+    )
+    assert re.match(rf"interrupted at {place}", run.outcome)
+    assert [x.remedy for x in run.doubts if "interrupted" in x.cause] == [
+        "run the motion again, to its end"
+    ]
+    assert ("fall_pose" in run.dataset) == (followed > 0.0)
+    if not compared and followed > 0.0:
+        last = run.dataset["fall_time"].values[-1]
+        assert 0.67 + followed - 0.021 < last <= 0.67 + followed
+
+
+def test_motions_and_falls_show_their_progress(monkeypatch, tmp_path):
+    """Every line has the name of the motion, which distinguishes those of a suite."""
+    monkeypatch.setattr("archfem._display.MOTION_INTERVAL", 0.0)
+    column = af.column(breadth=0.6, heights=[2.4], contact=af.Contact(1e9, 4e8, 0.6))
+    analysis = af.Analysis(column, fidelity="rigid", displacements="large", dt=2e-3)
+    with open(tmp_path / "errors", "w") as errors:
+        monkeypatch.setattr("sys.stderr", errors)
+        analysis.run(af.Motion(np.full(100, 0.4 * G), 0.01, name="push"))
+    lines = (tmp_path / "errors").read_text().splitlines()
+    said = [
+        r"push: 0\.\d+ of 0\.99 s",
+        r"push: loose blocks at [\d.]+ of 21 s at most, by steps of 0\.5 ms",
+        r"push: compared with rigid blocks: push: loose blocks at .* by steps of 0\.5 ms",
+    ]
+    for pattern in said:
+        assert any(re.fullmatch(pattern, line) for line in lines), pattern
+    monkeypatch.setattr("archfem._display.parent_process", object)  # of a worker
+    with open(tmp_path / "none", "w") as errors:
+        monkeypatch.setattr("sys.stderr", errors)
+        analysis.run(af.Motion(np.full(100, 0.4 * G), 0.01, name="push"))
+    assert (tmp_path / "none").read_text() == ""
+
+
 def test_loose_stones_rub_as_their_joints_did_or_by_six_tenths():
     for friction, rubs, bond in ((0.45, 0.45, 1e4), (None, 0.6, 0.0)):
         contact = af.Contact(1e9, 4e8, friction, cohesion=1e4)

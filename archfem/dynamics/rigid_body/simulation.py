@@ -9,6 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from archfem._display import ProgressReport
 from archfem._typing import Array
 from archfem._validation import check_number, check_type, validate_methods
 from archfem.dynamics.rigid_body.bodies import (
@@ -35,7 +36,7 @@ from archfem.dynamics.rigid_body.time_stepping import (
     advance_steps,
     kinetic_energy,
 )
-from archfem.errors import DidNotConverge, InvalidInput, logger
+from archfem.errors import DidNotConverge, Interrupted, InvalidInput, logger
 from archfem.masonry.structure import Structure
 from archfem.motion.motion import Motion
 
@@ -127,7 +128,8 @@ class RigidBlockSimulation:
         Raises:
             InvalidInput: the start has other blocks, or the times do not fit.
             DidNotConverge: blocks pass through each other, the energy increases without work, or
-                there are too many contacts. Where no step is given, `last` has the frames before.
+                there are too many contacts. Where no step is given, `last` has the frames before,
+                as after Ctrl-C.
         """
         self._check(start, end, spacing)
         if self.dt is not None:
@@ -152,6 +154,8 @@ class RigidBlockSimulation:
                 logger.info("the fall is repeated with shorter steps: %s", error)
                 failure, followed = error, finer
                 continue
+            except KeyboardInterrupt as error:
+                raise Interrupted(frames or finer) from error
             change = self._step_change(frames, finer) if frames else float("nan")
             frames = finer
             balanced = frames[-1].energy.gained_share <= MAX_ENERGY_GAIN
@@ -189,18 +193,22 @@ class RigidBlockSimulation:
         stride = max(1, round(spacing / dt))
         steps = int(np.ceil((end - start.time) / dt - 1e-6))
         anchor, since = start.poses, start.time
-        for first, last in pairwise([*range(0, steps, stride), steps]):
-            middles = start.time + dt * (np.arange(first, last) + 0.5)
-            run.advance(np.zeros((last - first, 2)) if motion is None else motion.at(middles))
-            time = start.time + dt * last
-            shaken = motion is not None and time <= motion.duration
-            # at rest: no point moves by more than 0.5 mm in half a second on a ground at rest
-            if shaken or run.largest_displacement(anchor) > 5e-4:
-                anchor, since = run.poses, time
-            resting = time - since >= 0.5
-            yield run.frame(time, resting)
-            if resting:
-                return
+        name = "ground at rest" if motion is None else motion.name
+        with ProgressReport(name, end - start.time, rarely=True) as progress:
+            for first, last in pairwise([*range(0, steps, stride), steps]):
+                middles = start.time + dt * (np.arange(first, last) + 0.5)
+                run.advance(np.zeros((last - first, 2)) if motion is None else motion.at(middles))
+                time = start.time + dt * last
+                shaken = motion is not None and time <= motion.duration
+                # at rest: no point moves by more than 0.5 mm in half a second on a ground at rest
+                if shaken or run.largest_displacement(anchor) > 5e-4:
+                    anchor, since = run.poses, time
+                resting = time - since >= 0.5
+                words = f"loose blocks at {time:.3g} of {end:.3g} s at most, by steps of"
+                progress.show(f"{words} {1e3 * dt:g} ms", dt * (last - first))
+                yield run.frame(time, resting)
+                if resting:
+                    return
 
     def final_frame(
         self, start: LooseBlocks, end: float, motion: Motion | None = None

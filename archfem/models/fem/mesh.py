@@ -34,6 +34,7 @@ from scipy.spatial import cKDTree
 from archfem._files import atomic_write, temporary_folder
 from archfem._optional import require_package
 from archfem._recent import RecentResults
+from archfem._threads import hold_signals
 from archfem._typing import Array, Numbers
 from archfem._validation import validate_arguments
 from archfem.errors import InvalidInput, MeshError
@@ -425,7 +426,8 @@ def read_mesh(structure: Structure, path: str | Path) -> Mesh:
 @contextmanager
 def _gmsh_model(name: str) -> Iterator[None]:
     """Open a new gmsh model without output, and close it at the end."""
-    gmsh.initialize(readConfigFiles=False, interruptible=False)
+    with hold_signals():
+        gmsh.initialize(readConfigFiles=False, interruptible=False)
     try:
         gmsh.option.setNumber("General.Terminal", 0)
         gmsh.model.add(name)
