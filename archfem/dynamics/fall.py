@@ -42,9 +42,16 @@ from archfem.masonry.stiffness_ratio import find_yielding_blocks, mark_stone_joi
 from archfem.masonry.structure import Structure, join_names
 from archfem.models.model import Doubt, Model
 from archfem.motion.motion import Motion
+from archfem.units import STANDARD_GRAVITY
 
 # Coefficient of friction of loose stones where their joints never slide: that of rough stone
 ASSUMED_FRICTION = 0.6
+
+# Words of the doubt of a fall that rigid blocks do not have, with the peak of the motion [g]
+RIGID_STAND = (
+    "blocks fall with these joints, and as rigid blocks none falls under this motion of {:.3g} g: "
+    "the fall depends on how the joints close, and with stiffer ones it may not occur"
+)
 
 # Share of the steps of a fall whose impulses need not settle [-]
 MAX_UNSETTLED = 0.02
@@ -265,9 +272,9 @@ def _doubt_joints(structure: Structure, motion: Motion, start: float) -> Iterato
         frames = simulation.frames(at_rest, end, motion, spacing=0.02)
         if not any(find_lost(frame.poses).any() for frame in frames):
             yield Doubt(
-                "blocks fall with these joints, and as rigid blocks none falls under this motion: "
-                "the fall depends on how the joints close, and with stiffer ones it may not occur",
+                RIGID_STAND,
                 f"{RANGE_REMEDY}, and check the stiffness of the joints",
+                (motion.pga / STANDARD_GRAVITY,),
             )
 
 

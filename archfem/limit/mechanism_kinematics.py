@@ -24,6 +24,7 @@ from scipy import sparse
 from scipy.optimize import nnls
 from scipy.sparse.csgraph import dijkstra
 
+from archfem._display import ProgressReport
 from archfem._typing import Array, Flags, Numbers
 from archfem._validation import check_type, validate_arguments
 from archfem.joints.criteria import Criteria, find_lasting, with_failure_flags
@@ -207,12 +208,14 @@ def first_verified_mechanism(
     def find_motion(instant: int) -> int | None:
         pattern = freedoms[instant].tobytes()
         if pattern not in moves:
+            progress.show(f"{times[instant]:.3g} of {times[-1]:.3g} s, {len(moves)} patterns")
             permitted = verifier.loop_check.permits_motion(freedoms[instant])
             moves[pattern] = permitted and verify(instant).kind != "none"
         return instant if moves[pattern] else None
 
-    duration = Criteria.of(joints).duration
-    first = find_lasting(freedoms, joints["time"].values, duration, find_motion)
+    times, duration = joints["time"].values, Criteria.of(joints).duration
+    with ProgressReport("verified mechanism", None, rarely=True) as progress:
+        first = find_lasting(freedoms, times, duration, find_motion)
     if first is None:
         return None
     found = verify(first)

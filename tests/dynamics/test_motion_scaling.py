@@ -13,6 +13,7 @@ from glued import glued
 import archfem as af
 from archfem.dynamics import CollapseScale, mechanism_scales, motion_scaling
 from archfem.dynamics.collapse_state import CollapseState
+from archfem.dynamics.fall import RIGID_STAND
 from archfem.dynamics.monitor import FILL_TENSION
 from archfem.dynamics.motion_scaling import (
     COLLAPSE_DEFINITION,
@@ -371,6 +372,24 @@ def fallen(*scales):
     )
     runs = (ScaledRun(abs(s), {}, Ending.PARTED, "", f) for s, f in zip(scales, made, strict=True))
     return MechanismScales(("collapse",), tuple(runs))
+
+
+@pytest.mark.parametrize(
+    ("scales", "stated"),
+    [
+        ((1.0, -2.0, -3.0, -4.0), "; from 3.00 × the motion on they fall as rigid blocks too"),
+        ((1.0, -2.0), "; nor do they at a larger scale that was run"),
+    ],
+)
+def test_the_scale_from_which_rigid_blocks_fall_is_stated(scales, stated):
+    """The falls at 2 alone are doubted by a comparison with rigid blocks."""
+    made = fallen(*scales)
+    stand = af.models.model.Doubt(RIGID_STAND, "remedy", (0.2,))
+    runs = (replace(run, doubts=(stand,)) if run.scale == 2.0 else run for run in made.runs)
+    found = CollapseScale({0.01: replace(made, runs=tuple(runs))})
+    (cause,) = (doubt.cause for doubt in found.doubts)
+    assert "under this motion of 0.2 g: " in cause
+    assert cause.endswith(stated)
 
 
 def test_collapse_is_between_a_stable_and_a_falling_run_at_every_step():
