@@ -322,8 +322,12 @@ class VerdictRange(ResultDisplay):
         """
         return cls(read_dataset(path, "file of a verdict's range"))
 
-    def table(self) -> str:
-        """Return falls, or else dislocations, by value, and the share that a property explains."""
+    def tabulate(self) -> tuple[list[str], list[list[str]]]:
+        """Return falls, or else dislocations, by value, and the share that a property explains.
+
+        Returns:
+            The titles of the columns, and a row for each property.
+        """
         decisive, rows = self.decisive[self.answered], []
         data = self.answers
         for name, share in self.importance().items():
@@ -336,7 +340,11 @@ class VerdictRange(ResultDisplay):
             rows.append([property_text(name), *explained, ", ".join(cells)])
         head = ["explains, of the variance of the outcome"] if self.is_mixed else []
         counted = "dislocated" if self.is_dislocation_worst else "falls"
-        return align_columns(["property", *head, counted], rows)
+        return ["property", *head, counted], rows
+
+    def table(self) -> str:
+        """Return the table of `tabulate` as text."""
+        return align_columns(*self.tabulate())
 
     def __str__(self) -> str:
         """Sentence, doubts, displacements, and a line for each property."""

@@ -92,13 +92,14 @@ def draw_findings(
     Points that differ in one number alone are joined by a line. Colours are the values of a key in
     words, such as the case. Findings without negative values begin at zero over words, whose
     distances mean nothing. Named cases are bars with a dashed line at the first one, under several
-    motions dots of their colours; of ratings these are the factors, with a line at 1.
+    motions dots of their colours; of ratings these are the factors, with a line at 1. A case that
+    falls, without a number, is a hatched bar to the end.
 
     Args:
         table: table of a study, as by `Study.run`.
         max_panels: number of panels: the first findings that differ are drawn.
         max_keys: number of keys that they are drawn over.
-        limits: values of findings at which a dashed line is drawn, by their names.
+        limits: values of findings at which a dotted line is drawn, by their names.
 
     Returns:
         The figure, with a row for each finding and a column for each key; a panel for each finding
@@ -138,13 +139,13 @@ def draw_findings(
         coloured = coloured or next(iter(few), None)
         _draw_over_key(axes, frame.rename(columns={name: "value"}), key, others, coloured)
         if limits and name in limits:
-            axes.axhline(limits[str(name)], color=Colour.GREY, lw=0.9, ls="--")
+            axes.axhline(limits[str(name)], color=Colour.GREY, lw=0.9, ls=":")
         if number < columns and coloured is not None:
             labels = axes.get_legend_handles_labels()[1]
-            fitting = legend_columns(labels, figure.get_figwidth() / columns)
-            place = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0), "ncols": fitting}
-            style = {"fontsize": Size.LABEL, "title_fontsize": Size.LABEL, "frameon": False}
-            axes.legend(title=_label_key(flat, coloured), **place, **style)
+            style: Any = {"fontsize": Size.LABEL, "title_fontsize": Size.LABEL, "frameon": False}
+            style |= {"ncols": legend_columns(labels, figure.get_figwidth() / columns)}
+            style |= {"title": _label_key(flat, coloured), "bbox_to_anchor": (0.5, 1.0)}
+            axes.legend(loc="lower center", **style)
     for axes in panels[len(names) * len(keys) :]:
         axes.remove()
     return figure
@@ -170,6 +171,7 @@ def _draw_named_cases(
         style_axes(axes, _label_key(table, str(name)))
         if frame["place"].is_unique:
             axes.barh(frame["place"], frame[name], height=0.7, color=Colour.LINES[0])
+            _hatch_falls(axes, frame[frame[name].isna()])
         else:  # motions or samples of a case
             sets = frame.groupby(pairs, sort=False) if pairs else [(("",), frame)]
             for number, ((pair, *_), dots) in enumerate(sets):
@@ -182,7 +184,7 @@ def _draw_named_cases(
         if not pairs:
             axes.axvline(frame[name].iloc[0], ls="--", label=f"{labels[0]}, the first", **style)
         if name in limits:
-            axes.axvline(limits[name], ls="--", **style)
+            axes.axvline(limits[name], ls=":", **style)
         # those of a push are accelerations, which pass at that of the site
         if name in REQUIRED_FACTORS and "without_pressure" in table:
             axes.axvline(1.0, label="a factor of 1", **style)
@@ -192,6 +194,14 @@ def _draw_named_cases(
         axes.remove()
     add_legend_below(figure, handles=panels[0].get_legend_handles_labels()[0])
     return figure
+
+
+def _hatch_falls(axes: Axes, unknown: Any) -> None:
+    """Draw cases that fall, and so have no number, as hatched bars to the end of a panel."""
+    falls = unknown[unknown["fall"].isin(FALLEN_STATES)] if "fall" in unknown else None
+    style = {"fc": "none", "ec": Colour.HINGE, "hatch": "////", "lw": 0.0, "label": "falls"}
+    if falls is not None and len(falls):
+        axes.barh(falls["place"], 1.0, height=0.7, transform=axes.get_yaxis_transform(), **style)
 
 
 def _label_key(table: xr.Dataset, key: str, gap: str = " ") -> str:
@@ -246,8 +256,8 @@ def draw_study(
         The figure.
     """
     names = list(factors)
-    definitions = list(next(iter(factors.values())))
-    scales = {d: np.array([case[d] for case in factors.values()]) for d in definitions}
+    first, *_ = cases = [*factors.values()]
+    scales = {definition: np.array([case[definition] for case in cases]) for definition in first}
     scales = {d: values for d, values in scales.items() if np.isfinite(values).any()}
     label = "scale of the motions at the first mechanism [-]"
     figure, axes = new_axes(Size.PAGE, 1.9 + 0.42 * len(names), label)
@@ -290,8 +300,7 @@ def _draw_ranges(axes: Axes, scales: Mapping[str, Array], end: float) -> None:
         # rows of one case lie around its tick, whose distance to the next is 1
         rows = np.arange(len(least)) + 0.16 * (number - 0.5 * (len(scales) - 1))
         low, middle, high = np.quantile(least, [0.0, 0.5, 1.0], axis=1, method="nearest")
-        colour = Colour.LINES[number]
-        axes.hlines(rows, np.minimum(low, end), np.minimum(high, end), color=colour, lw=1.4)
+        axes.hlines(rows, np.minimum(low, end), np.minimum(high, end), style["color"], lw=1.4)
         known = np.isfinite(middle)
         axes.plot([], [], "o", label=explanations.get(definition, definition), **style)
         axes.plot(middle[known], rows[known], "o", **style)
@@ -330,8 +339,7 @@ def draw_ida(
         known = np.isfinite(demands)
         x, y = np.append(0.0, demands[known]), np.append(0.0, intensity[known])
         end = max(end, x.max())
-        label = None if number else "motions"
-        left.plot(x, y, marker=".", ms=3, label=label, **style)
+        left.plot(x, y, marker=".", ms=3, label=None if number else "motions", **style)
         if not known.all() and known.any():
             tip = 1.06 * x[-1] + 1e-12, y[-1]
             left.annotate("", tip, (x[-1], y[-1]), arrowprops={"arrowstyle": "->"} | style)
@@ -534,8 +542,7 @@ def draw_verdict_range(verdicts: VerdictRange) -> Figure:
     rows, max_panels = verdicts.answers, 6
     falls, parted = (x[verdicts.answered] for x in (verdicts.falls, verdicts.dislocated))
     residual = 1e3 * rows["residual"].values
-    standing = residual[~falls]
-    top = 3.0 * float(standing.max(initial=1.0))
+    top = 3.0 * float(residual[~falls].max(initial=1.0))
     heights = np.where(falls, 2.0 * top, np.maximum(residual, 1e-3 * top))
     shares = verdicts.importance()
     labels = {
@@ -555,9 +562,8 @@ def draw_verdict_range(verdicts: VerdictRange) -> Figure:
     for axes in panels[len(shares) :]:
         axes.set_visible(False)
     for axes, (name, share) in zip(panels, shares.items(), strict=False):
-        first = axes in panels[::columns]
-        label = labels.get(name, name.replace("_", " "))
-        style_axes(axes, label, "residual\ndisplacement [mm]" if first else "")
+        beside = "residual\ndisplacement [mm]" if axes in panels[::columns] else ""
+        style_axes(axes, labels.get(name, name.replace("_", " ")), beside)
         if verdicts.is_mixed:
             set_title(axes, f"explains {share:.0%}")
         _draw_property(axes, rows[name].values, heights, falls, parted)
@@ -565,10 +571,8 @@ def draw_verdict_range(verdicts: VerdictRange) -> Figure:
             axes.axhline(top, color=Colour.GREY, lw=0.9, ls="--")
         axes.set(yscale="log", ylim=(0.7e-3 * top, 4.0 * top))
     add_legend_below(figure, 3, handles=panels[0].get_legend_handles_labels()[0])
-    text = verdicts.headline
-    if verdicts.is_mixed:
-        text += "; shares are of the variance of the outcome"
-    set_figure_title(figure, text)
+    shares_of = "; shares are of the variance of the outcome" * verdicts.is_mixed
+    set_figure_title(figure, verdicts.headline + shares_of)
     return figure
 
 

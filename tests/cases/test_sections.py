@@ -14,6 +14,8 @@ from archfem.cases.case import case_of
 from archfem.cases.report import conclusion, report_data, response, sections
 from archfem.cases.report.response import _check_row, supported_weight_ratio
 from archfem.cases.result_text import tabulate_joints, tabulate_motions, tabulate_runs
+from archfem.dynamics import VerdictRange
+from archfem.models.model import Doubt
 
 
 @pytest.fixture(scope="module")
@@ -52,6 +54,69 @@ def test_parts_are_listed_with_the_weight_that_moves(piers):
     pier = next(row for part, row in rows.items() if "pier" in part)
     assert pier["weight [kN]"] == f"{2.0 * 20.0 * 1.2 * 1.2:.4g}"
     assert pier["of them fixed"] == "1"
+
+
+def test_lost_blocks_are_listed_by_their_parts(piers):
+    names = [piers.blocks[number].name for number in piers.free]
+    ring = [block.name for block in piers.blocks if block.part == "arch"]
+    left = next(b.name for b in piers.blocks if b.part == "left pier" and not b.fixed)
+    assert conclusion.list_lost(piers, names[:2]) == ", ".join(names[:2])
+    assert len(ring) == 3
+    assert conclusion.list_lost(piers, [left, *ring, names[-1]]) == (
+        "all of arch; 1 of 2 of left pier; 1 of 2 of right pier"
+    )
+    assert conclusion.list_lost(piers, names) == "all of left pier, arch and right pier"
+
+
+def test_the_doubts_of_several_runs_stand_in_one_table(piers, runs, monkeypatch):
+    """Those of one kind once, with the ends of their numbers; none with each run."""
+    monkeypatch.setattr(response, "_build_envelopes", lambda *_: [])
+    stated = {
+        "first": [Doubt("steps of {:g} ms are long", "", (5.0,))],
+        "second": [Doubt("steps of {:g} ms are long", "", (2.0,)), Doubt("it slips")],
+    }
+    made = {name: run.with_doubts(stated[name]) for name, run in runs.items()}
+    case = SimpleNamespace(structure=piers, suite={}, title="piers")
+    data = report_data.ReportData(case, made)
+    grid = response._build_suite_response(data)[-1]
+    assert grid.caption == "Doubts of the runs"
+    rows = dict(grid.rows)
+    assert rows["steps of 2 to 5 ms are long"] == "first and second"
+    assert rows["it slips"] == "second"
+    monkeypatch.setattr(response, "summarise_outcomes", lambda *_: "stands")
+    (line, *_) = response._build_mechanism(data, made["second"])
+    assert "it slips" not in line.text.lower()
+    alone = report_data.ReportData(case, {"second": made["second"]})
+    (line, *_) = response._build_mechanism(alone, made["second"])
+    assert "It slips" in line.text or "it slips" in line.text
+
+
+def test_falls_by_property_are_a_table_whose_cells_wrap(piers, tmp_path):
+    """As text their lines were wider than a page, and broke before the last word."""
+    rows = {
+        "outcome": ["fallen", "stands"] * 8,
+        "displacement": np.zeros(16),
+        "residual": np.zeros(16),
+        "error": [""] * 16,
+        "sampled": [True] * 16,
+        "k_n": np.linspace(0.3, 3.0, 16),
+    }
+    columns = {name: ("run", np.asarray(values)) for name, values in rows.items()}
+    attrs = {"properties": ["k_n"], "k_n": 2e9, "k_s": 1e9, "motion": "a"}
+    found = VerdictRange(xr.Dataset(columns, attrs=attrs))
+    path = tmp_path / "verdict_range.txt"
+    path.write_text(str(found), encoding="utf-8")
+    case = SimpleNamespace(structure=piers, suite=None)
+    data = report_data.ReportData(case, {})
+    vars(data).update(files={path.name: path, "verdict_range.nc": path}, verdict_ranges=(found,))
+    text, table = sections._build_range(data)[:2]
+    assert found.sentence in text.text
+    assert "explains" not in text.text
+    assert table.head == ["property", "explains, of the variance of the outcome", "falls"]
+    ((name, _, cell),) = table.rows
+    assert name == "k_n"
+    assert cell.count(" of ") == 3
+    assert table.manner == "words"
 
 
 def test_a_part_without_a_name_has_a_dash():

@@ -55,6 +55,20 @@ def test_findings_are_drawn_in_words_and_mm_and_a_fall_has_none():
     assert axes.lines[-1].get_ydata()[0] == 40.0
 
 
+def test_a_case_that_falls_is_a_hatched_bar_and_the_lines_differ():
+    """The displacement of a fall is that to the ground: without a bar it would seem to be none."""
+    found = study(falls=[1, 2], cases=4)
+    one = found.numbers.isel(point=slice(1, None, 2))
+    (axes,) = draw_findings(one, limits={"residual displacement": 40.0}).axes
+    hatched = [bar for bar in axes.patches if bar.get_hatch()]
+    assert [bar.get_y() + 0.5 * bar.get_height() for bar in hatched] == pytest.approx([1.0, 2.0])
+    ends = [bar.get_window_extent().x1 for bar in hatched]
+    assert ends == pytest.approx([axes.bbox.x1] * 2, abs=2.0)
+    assert [line.get_linestyle() for line in axes.lines] == ["--", ":"]
+    legend = [text.get_text() for text in axes.figure.legends[0].get_texts()]
+    assert sorted(legend) == ["case 0, the first", "falls"]
+
+
 def test_cases_with_doubts_stand_before_others():
     found = study(cases=3)
     found.worst["doubts"] = [0.0, 0.0, 1.0]

@@ -39,7 +39,7 @@ from archfem.dynamics.verdict_range import (
     UNVARIED,
     VerdictRange,
 )
-from archfem.masonry.structure import join_names, join_words
+from archfem.masonry.structure import Structure, join_names, join_words
 from archfem.models.model import Doubt, Ends
 from archfem.units import STANDARD_GRAVITY, format_mm
 from archfem.view.pages.document import Grid, Section, TextBlock
@@ -211,12 +211,12 @@ def summarise_outcomes(data: ReportData, runs: Sequence[History]) -> str:
 def build_conclusion(data: ReportData) -> Section:
     """Build the section on the answer in sentences, its doubts, and demands and capacities."""
     doubts: dict[str, list[Doubt]] = {}
-    every, stated = list_doubts(data), set[str]()
+    every, stated = list_doubts(data), set[tuple[str, ...]]()
     # a doubt of several results is stated once, without the motions of which it is true, too
     for result, doubt in sorted(every, key=lambda each: bool(each[1].place)):
-        if doubt.cause not in stated:
+        if doubt.kind not in stated:
             doubts.setdefault(result, []).append(doubt)
-        stated.add(doubt.cause)
+        stated.add(doubt.kind)
     doubtful, decisive = [*dict.fromkeys(x for x, _ in every)], list_decisive_doubts(data, every)
     rows = []
     for result, row in _capacity_rows(data):
@@ -507,7 +507,8 @@ def _describe_ends(data: ReportData) -> Iterator[str]:
         if run.verdict.incomplete:
             yield f"the run under '{name}' {run.verdict.incomplete}"
     if lost := {f"'{name}'": fall for name, fall in falls.items() if fall and fall.blocks}:
-        yield f"under {join_words([*lost])} it loses {describe_lost([*lost.values()])}"
+        which = describe_lost(data.case.structure, [*lost.values()])
+        yield f"under {join_words([*lost])} it loses {which}"
     if moving := [f"'{name}'" for name, fall in falls.items() if fall and not fall.resting]:
         yield f"blocks still move at the end of {join_words(moving)}"
 
@@ -521,13 +522,27 @@ def describe_mechanism(verdict: Any) -> str:
     return "none by any definition"
 
 
-def describe_lost(falls: Sequence[CollapseState], max_names: int = 3) -> str:
-    """Return the number of lost blocks, the time of the first, and of one fall some names."""
+def describe_lost(structure: Structure, falls: Sequence[CollapseState]) -> str:
+    """Return the number of lost blocks, the time of the first, and of one fall which they are."""
     counts, times = [len(fall.blocks) for fall in falls], [fall.time or 0.0 for fall in falls]
     ends = (Ends((min(each), max(each))) for each in (counts, times))
-    text, blocks = "{} blocks, the first at {:.2f} s".format(*ends), falls[0].blocks
-    names = ", ".join([*blocks[:max_names], *["…"] * (len(blocks) > max_names)])
-    return text if len(falls) > 1 else f"{text}: {names}"
+    text = "{} blocks, the first at {:.2f} s".format(*ends)
+    return text if len(falls) > 1 else f"{text}: {list_lost(structure, falls[0].blocks)}"
+
+
+def list_lost(structure: Structure, names: Sequence[str], max_names: int = 4) -> str:
+    """List lost blocks by name, or many by their parts."""
+    blocks = [structure.blocks[number] for number in structure.free]
+    if len(names) <= max_names:
+        return ", ".join(names)
+    counts, lost = (
+        Counter(block.part or "no part" for block in each)
+        for each in (blocks, [block for block in blocks if block.name in names])
+    )
+    whole = [part for part, count in lost.items() if count == counts[part]]
+    some = [f"{count} of {counts[part]} of {part}" for part, count in lost.items()]
+    some = [text for text, part in zip(some, lost, strict=True) if part not in whole]
+    return "; ".join([f"all of {join_words(whole)}"] * bool(whole) + some)
 
 
 def sentence(text: str) -> str:

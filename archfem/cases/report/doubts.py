@@ -54,19 +54,19 @@ def list_doubts(data: ReportData) -> list[tuple[str, Doubt]]:
 def _merge_runs(data: ReportData) -> Iterator[Doubt]:
     """Yield each kind of doubt of the runs once, with how many of several runs have it."""
     verdicts = [run.verdict for run in data.runs.values()]
-    for same in _group_kinds(x for each in verdicts for x in each.doubts):
+    for same in group_kinds(x for each in verdicts for x in each.doubts):
         count = sum(any(doubt in same for doubt in each.doubts) for each in verdicts)
         yield merge_doubts(same, f"{count} of {len(verdicts)} runs" * (len(verdicts) > 1))
 
 
 def _merge_motions(doubts: Iterable[Doubt]) -> Iterator[Doubt]:
     """Yield each kind of doubt once, under all of its motions, which are the places of some."""
-    for same in _group_kinds(doubts):
+    for same in group_kinds(doubts):
         motions = dict.fromkeys(f"'{doubt.place}'" for doubt in same if doubt.place)
         yield merge_doubts(same, f"under {join_words([*motions])}" * bool(motions))
 
 
-def _group_kinds(doubts: Iterable[Doubt]) -> Iterable[list[Doubt]]:
+def group_kinds(doubts: Iterable[Doubt]) -> Iterable[list[Doubt]]:
     """Return doubts in groups that differ in numbers alone."""
     found: dict[tuple[str, ...], list[Doubt]] = {}
     for doubt in doubts:

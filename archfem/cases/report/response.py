@@ -12,15 +12,18 @@ from archfem.cases.case import Case
 from archfem.cases.report.conclusion import (
     describe_lost,
     describe_mechanism,
+    list_lost,
     sentence,
     summarise_outcomes,
 )
+from archfem.cases.report.doubts import group_kinds
 from archfem.cases.report.motion_rules import tabulate_checks
 from archfem.cases.report.report_data import ReportData, build_player
 from archfem.dynamics.collapse_state import FALLEN_STATES
 from archfem.dynamics.history import History
 from archfem.masonry.joint_closing import describe_closing
-from archfem.masonry.structure import Structure, join_names
+from archfem.masonry.structure import Structure, join_names, join_words
+from archfem.models.model import merge_doubts
 from archfem.motion.matching import DEFAULT_BAND
 from archfem.motion.motion import Motion
 from archfem.motion.suite import Suite
@@ -204,12 +207,11 @@ def _tabulate_joints(data: ReportData, run: History, label: str = "") -> Grid:
 def _build_mechanism(data: ReportData, run: History) -> list[Any]:
     """Build verdict and mechanism in a line each, and the fall of a run."""
     verdict, fall = run.verdict, run.verdict.fall
-    lines = [
-        f"Outcome: {summarise_outcomes(data, [run])}",
-        *(f"In doubt: {doubt.cause}" for doubt in verdict.doubts),
-    ]
-    if fall is not None and fall.blocks and len(data.runs) == 1:  # of several there is a table
-        lines.append(f"lost: {describe_lost([fall], len(fall.blocks))}")
+    lines = [f"Outcome: {summarise_outcomes(data, [run])}"]
+    if len(data.runs) == 1:  # of several there are tables
+        lines += [f"In doubt: {doubt.cause}" for doubt in verdict.doubts]
+        if fall is not None and fall.blocks:
+            lines.append(f"lost: {describe_lost(data.case.structure, [fall])}")
     found = verdict.mechanisms.get("verified")
     lines.append(f"Mechanism: {f'verified, {found}' if found else describe_mechanism(verdict)}")
     # the assumptions name the law of closing, and whether it was varied
@@ -228,14 +230,21 @@ def _build_suite_response(data: ReportData) -> list[Any]:
     # mechanisms are stated with each run
     caption = "Outcome, PGA, and the critical joint of each run"
     tables = [Grid(head[:columns], [row[:columns] for row in rows[:-1]], caption)]
-    falls = {name: run.verdict.fall for name, run in data.runs.items()}
+    falls, structure = {k: run.verdict.fall for k, run in data.runs.items()}, data.case.structure
     lost = [
-        (name, f"{len(fall.blocks)}", f"{fall.time:.2f} s", join_names(fall.blocks))
+        (name, f"{len(fall.blocks)}", f"{fall.time:.2f} s", list_lost(structure, fall.blocks))
         for name, fall in falls.items()
         if fall is not None and fall.blocks
     ]
     if lost:
         tables.append(Grid(("run", "lost", "the first at", "blocks"), lost, "Lost blocks", "words"))
+    own = {name: run.verdict.doubts for name, run in data.runs.items()}
+    doubts = [
+        (merge_doubts(same).cause, join_words([name for name in own if {*own[name]} & {*same}]))
+        for same in group_kinds(doubt for each in own.values() for doubt in each)
+    ]
+    if doubts:
+        tables.append(Grid(("in doubt", "runs"), doubts, "Doubts of the runs", "words"))
     return [*tables, *_build_envelopes(data)]
 
 

@@ -398,8 +398,8 @@ def _build_study(data: ReportData) -> list[Any]:
     limit, key = DISLOCATION * shallowest_part(data.case.structure)[0], "residual displacement"
     with suppress(InvalidInput), limit_width(MAX_WIDTH):  # no number differs
         figure = draw_findings(found.numbers, max_panels=4, limits={key: 1e3 * limit})
-        dashed = f", dashed the limit of dislocation of the case, {format_mm(limit)}"
-        caption += f"; all points{dashed * (key in found.numbers)}"
+        dotted = f", dotted the limit of dislocation of the case, {format_mm(limit)}"
+        caption += f"; all points{dotted * (key in found.numbers)}"
         blocks.append(FigureBlock.of(figure, sentence(caption)))
     return blocks
 
@@ -424,7 +424,10 @@ def _build_range(data: ReportData) -> list[Any]:
         counted = "Dislocations" if found and found.is_dislocation_worst else "Falls"
         titled = table.format(counted)
         blocks = data.read_result(place.removesuffix(".txt"), named, table=titled)
-        if found is not None and not found.decisive.any():
+        if found is not None and found.decisive.any():
+            text = blocks[0].text.removesuffix(found.table()).rstrip()
+            blocks[:1] = [TextBlock(text, "lines"), Grid(*found.tabulate(), titled, "words")]
+        elif found is not None:
             told = filter(None, [found.sentence, found.displacements])
             words = f"{'; '.join(told)}; varied: {', '.join(found.properties)}"
             blocks[: 2 if changes else 1] = [TextBlock(sentence(words.replace("_", " ")))]

@@ -57,9 +57,9 @@ class StudyFindings:
 
     @cached_property
     def numbers(self) -> xr.Dataset:
-        """Findings that are numbers, in words; lengths in mm, and none of a fall."""
+        """Findings that are numbers, in words, beside falls; lengths in mm, and none of a fall."""
         numbers = [name for name in self.names if self.table[name].dtype.kind == "f"]
-        table = self.table[numbers].copy()
+        table = self.table[[*numbers, *(["fall"] if "fall" in self.table else [])]].copy()
         for name in [name for name in _SIZES if name in table]:
             held = self.table[name].where(~self.table["fall"].isin(FALLEN_STATES))
             table[name] = (1e3 * held).assign_attrs(units="mm")

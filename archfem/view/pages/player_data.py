@@ -250,9 +250,9 @@ class Scene:
 
     @cached_property
     def initial_joint(self) -> int:
-        """Number of the joint shown at first: that of the largest |e|, or one that opens."""
-        joints = assessed_joints(self.run.joints)
-        largest = abs(joints["eccentricity"]).max("time").where(~joints["open"].any("time"), 0.5)
+        """Number of the joint shown at first: then of the largest |e|, or open."""
+        joints = assessed_joints(self.run.joints).sel(time=self.initial_time, method="nearest")
+        largest = abs(joints["eccentricity"]).where(~joints["open"], 0.5)
         return int(joints["joint"].values[int(largest.fillna(0.5).argmax("joint"))])
 
     @cached_property

@@ -71,6 +71,22 @@ def test_frames_are_those_that_differ_for_the_eye(stack):
     assert times[[0, -1]] == pytest.approx(run.time[[0, -1]])
 
 
+def test_the_joint_shown_at_first_is_the_most_eccentric_of_that_instant(stack):
+    """Another one has the largest |e| of the run, before or after what is shown."""
+    model = af.build(stack, fidelity="rigid")
+    motion = af.Motion.synthetic(seed=1, duration=0.32, pga=1.0)
+    run = af.time_history(model, motion, dt=0.005, record=af.Record(fields_every=1))
+    dataset = run.dataset.copy(deep=True)
+    at = int(np.abs(run.time - Scene(model.structure, run, model).initial_time).argmin())
+    assert at > 3
+    dataset["eccentricity"][at] = [0.1, -0.4]
+    dataset["eccentricity"][2] = [0.49, 0.0]
+    dataset["open"][:] = False
+    assert Scene(model.structure, af.History(dataset, stack), model).initial_joint == 1
+    dataset["open"][at, 0] = True
+    assert Scene(model.structure, af.History(dataset, stack), model).initial_joint == 0
+
+
 def seen(points, moved):
     """Lower left and upper right corner of points, as built and moved."""
     every = np.concatenate([points, moved.reshape(-1, 2)])
