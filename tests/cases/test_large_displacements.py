@@ -139,14 +139,14 @@ def test_a_range_in_the_folder_stands_in_place_of_what_a_run_cannot_know(held):
     varied = "motion, lengths, stiffness, friction, damping, size of the motions, time step"
     assert (
         f" M{varied[1:]} and fidelity were not varied, and displacements have no range."
-        in without[-2]
+        in without[-1]
     )
     data = ReportData(data.case, data.runs)
     vars(data)["verdict_ranges"] = (af.dynamics.VerdictRange(xr.Dataset(rows, attrs=attrs)),)
     assert summarise_outcomes(data, [held]) == "stands; falls in 1 of 4 variations"
     head = dict(list_facts(data))["verdict"]
     assert head == "stands, moves by 0.102 mm; falls in 1 of 4 variations"
-    lead, changes, _ = sentences_of(data)  # the last is on the transverse direction
+    lead, changes = sentences_of(data)
     # the share alone would be surer than four runs are: beta.ppf(0.975, 2, 3)
     assert " It falls in 1 of 4 variations: 1 of the 4 that vary all (1% to 81% at 95%). " in lead
     moved = "1 mm to 3 mm, in 95 % of 3 runs 3 mm or less"
