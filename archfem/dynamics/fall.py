@@ -5,7 +5,7 @@ outside their joints. All blocks then continue as free rigid blocks until they r
 (`dynamics.rigid_body`), from the positions and the momentum of the model.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
@@ -157,11 +157,33 @@ def _follow_fall(
     history = with_fall(history, fall).with_doubts((*history.doubts, *doubts))
     if fall.kind not in FALLEN_STATES or not whole or history.ending is Ending.INTERRUPTED:
         return history
+    return _compare_rigid_blocks(history, structure, motion, start.time)
+
+
+def _compare_rigid_blocks(
+    history: History, structure: Structure, motion: Motion, start: float
+) -> History:
+    """Return a history of a fall with a doubt where rigid blocks have none."""
     try:
-        compared = list(_doubt_joints(structure, motion, start.time))
+        compared = list(_doubt_joints(structure, motion, start))
     except KeyboardInterrupt:
         return mark_interrupted(history, "its comparison with rigid blocks, after the fall")
     return history.with_doubts((*history.doubts, *compared))
+
+
+def state_rigid_falls(doubt: Doubt, falls: Iterable[tuple[float, Sequence[Doubt]]]) -> Doubt:
+    """Return the doubt that rigid blocks stand with the scale from which they fall too.
+
+    Falls are by their scale, with the doubts of each; other doubts are returned as they are.
+    """
+    if doubt.words != RIGID_STAND:
+        return doubt
+    stand = {scale: any(x.words == RIGID_STAND for x in doubts) for scale, doubts in falls}
+    most = max((scale for scale, alone in stand.items() if alone), default=0.0)
+    if not (both := [scale for scale in stand if scale > most]):
+        return replace(doubt, words=f"{doubt.words}; nor do they at a larger scale that was run")
+    words = f"{doubt.words}; from {{:#.3g}} × the motion on they fall as rigid blocks too"
+    return replace(doubt, words=words, values=(*doubt.values, min(both)))
 
 
 def mark_interrupted(history: History, when: str) -> History:

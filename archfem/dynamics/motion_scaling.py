@@ -22,7 +22,7 @@ from archfem._validation import validate_arguments, validate_methods
 from archfem.dynamics.analysis import Analysis, takes_analysis, takes_falling_analysis
 from archfem.dynamics.collapse_state import FALLEN_STATES, CollapseState, doubt_soft_blocks
 from archfem.dynamics.events import EveryMechanism, applicable_definitions
-from archfem.dynamics.fall import RIGID_STAND
+from archfem.dynamics.fall import state_rigid_falls
 from archfem.dynamics.history import Ending, History, first_mechanisms, partial_history
 from archfem.dynamics.monitor import FILL_TENSION, PULLED
 from archfem.dynamics.recorder import Record
@@ -519,19 +519,8 @@ class CollapseScale:
             doubts.append(Doubt(words, "", (ends,)))
         searches = {f"by {1e3 * dt:g} ms": search for dt, search in self.searches.items()}
         doubts += _doubts_of_searches(searches, COLLAPSE_DEFINITION)
-        return tuple(self._add_rigid_falls(x) if x.words == RIGID_STAND else x for x in doubts)
-
-    def _add_rigid_falls(self, doubt: Doubt) -> Doubt:
-        """Return a doubt that rigid blocks stand with the scale from which they fall too."""
-        fell = [run for run in self._runs if run.fails(COLLAPSE_DEFINITION)]
-        alone = {x.scale for x in fell if any(each.words == RIGID_STAND for each in x.doubts)}
-        both = min((run.scale for run in fell if run.scale > max(alone, default=0.0)), default=inf)
-        if both == inf:
-            return replace(
-                doubt, words=f"{doubt.words}; nor do they at a larger scale that was run"
-            )
-        words = f"{doubt.words}; from {{:#.3g}} × the motion on they fall as rigid blocks too"
-        return replace(doubt, words=words, values=(*doubt.values, both))
+        falls = [(run.scale, run.doubts) for run in self._runs if run.fails(COLLAPSE_DEFINITION)]
+        return tuple(state_rigid_falls(doubt, falls) for doubt in doubts)
 
     @property
     def _every(self) -> dict[float, MechanismScales]:
