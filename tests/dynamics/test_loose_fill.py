@@ -181,7 +181,7 @@ def test_a_search_of_a_fall_has_one_facet_of_fill_on_each_stone(footbridge, monk
     found = analysis.scale(motion, dt=[0.01], between=(1.0, 1.0))
     one = with_one_facet(analysis)
     assert set(seen) == {one.model.size} != {analysis.model.size}
-    assert found.doubts[-1].endswith(
+    assert str(found.doubts[-1]).endswith(
         "at 1.00 × the motion by 10 ms: the first ended by loose blocks, and loose blocks were lost"
     )
     coarse = ida_cells(analysis, monkeypatch, motion)

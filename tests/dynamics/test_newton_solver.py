@@ -103,7 +103,7 @@ def test_supports_that_have_moved_are_refused_by_schemes_at_an_instant(ring):
     moved = model.settled(af.Settlement(0, (0.0, -1e-3, 0.0)))
     equation = af.dynamics.Equation(moved, MOTION, scheme=af.dynamics.Newmark())
     for method in ("newton", "compliance"):
-        with pytest.raises(af.InvalidInput, match="supports have not moved"):
+        with pytest.raises(af.InvalidInput, match="supports that have not moved"):
             stepper_for(method, equation)
         assert stepper_for(method, af.dynamics.Equation(moved, MOTION)).name == method
 
