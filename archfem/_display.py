@@ -19,7 +19,8 @@ from tqdm import tqdm
 Item = TypeVar("Item")
 
 # Time between lines of progress where the output is no terminal [s]: of searches, and of motions
-PROGRESS_INTERVAL, MOTION_INTERVAL = 5.0, 20.0
+PROGRESS_INTERVAL = 5.0
+MOTION_INTERVAL = 20.0
 
 # Before lines on what may change an answer, and on what it assumes or leaves out on the safe side
 DOUBT_MARK, NOTE_MARK = "in doubt: ", "note: "

@@ -182,7 +182,7 @@ def test_a_search_of_a_fall_has_one_facet_of_fill_on_each_stone(footbridge, monk
     one = with_one_facet(analysis)
     assert set(seen) == {one.model.size} != {analysis.model.size}
     assert str(found.doubts[-1]).endswith(
-        "at 1.00 × the motion by 10 ms: the first ended by loose blocks, and loose blocks were lost"
+        "at 1.00 × the motion: the first ended by loose blocks, and loose blocks were lost"
     )
     coarse = ida_cells(analysis, monkeypatch, motion)
     assert coarse == {"cells": [1, 1], "cell": "triangle"}
