@@ -47,6 +47,7 @@ from archfem.masonry.structure import (
     describe_spans,
     join_joint_names,
     join_names,
+    join_words,
     list_or_count,
 )
 from archfem.motion.matching import Match
@@ -386,8 +387,10 @@ def doubt_rating(found: Rating, limit: LimitAnalysis) -> list[str]:
     if any(structure.blocks[number].fixed for number in springs):
         words = 'abutments are taken as immovable: state = "free" tests them, of [structure.'
         lines.append(f"{NOTE_MARK}{words}sidewalls]")
-    words = "a second lorry that meets the vehicle, and all that spandrel walls carry"
-    return [*lines, f"{NOTE_MARK}left out: {words}"]
+    left_out = ["a second lorry that meets the vehicle", "all that spandrel walls carry"]
+    if not found.parapets:
+        left_out.append('parapets (their weight is parapets = "… kN/m" of [rating])')
+    return [*lines, f"{NOTE_MARK}left out: {join_words(left_out)}"]
 
 
 def describe_limit(case: Case, found: Collapse, opposite: Collapse | None) -> tuple[Collapse, str]:

@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from archfem._display import ResultDisplay, track_progress
-from archfem._typing import Array, Metres, Pascals
+from archfem._typing import Array, Metres, NewtonsPerMetre, Pascals
 from archfem._validation import validate_arguments
 from archfem.errors import InvalidInput
 from archfem.limit.backfill import check_options, is_balanced, self_weight_programme
@@ -35,6 +35,7 @@ from archfem.limit.vehicles import (
     cut_road,
     find_vehicle,
     find_worst_rows,
+    lay_parapets,
     moving_load,
     name_missing,
     parse_axles,
@@ -51,7 +52,7 @@ from archfem.masonry.structure import (
     join_words,
     structure_of,
 )
-from archfem.units import MPa
+from archfem.units import MPa, kN
 
 # Strength of masonry where none is given [Pa]: squared stones in lime mortar have 3 to 10 MPa (from
 # memory)
@@ -110,6 +111,7 @@ class Rating(ResultDisplay):
             else none, and with a plastic fill.
         fill: strength of the fill, or None.
         missing: "live" and "impact" where neither the vehicle nor its user gave them.
+        parapets: weight of the parapets along the bridge, without factor [N/m].
     """
 
     structure: Structure
@@ -133,6 +135,7 @@ class Rating(ResultDisplay):
     by_cs454: Mapping[str, Any] = field(default_factory=dict)
     fill: Fill | PlasticFill | None = None
     missing: Sequence[str] = ()
+    parapets: float = 0.0
 
     @property
     def factor(self) -> float:
@@ -335,6 +338,7 @@ class Rating(ResultDisplay):
             f"live load by {self.live:g} ({self._source('live')})",
             f"impact by {self.impact:g}{self._impact_axle()} ({self._source('impact')})",
             f"dead load by {self.dead:g} ({favourable if self.dead == 1.0 else 'given'})",
+            *([f"parapets of {self.parapets / kN:g} kN/m"] if self.parapets else []),
             *resistance,
         ]
         return "\n".join(lines)
@@ -382,9 +386,8 @@ class Rating(ResultDisplay):
         words = f"the least factor is {first:.4g}"
         words = "the bridge does not stand" if np.isnan(first) else words
         law = " with the fill as weight and pressure" * isinstance(self.fill, PlasticFill)
-        ends = f"{_say_ends([first, *others])} over what is assumed of the fill"
-        beside = f" ({ends})" * bool(others)
-        return f"at {ASSUMED_STRENGTH / MPa:g} MPa {words}{law}{beside}"
+        ends = f" ({_say_ends([first, *others])} over what is assumed of the fill)" * bool(others)
+        return f"at {ASSUMED_STRENGTH / MPa:g} MPa {words}{law}{ends}"
 
     @property
     def by_codes(self) -> dict[str, "Rating"]:
@@ -499,6 +502,7 @@ def rate(  # noqa: PLR0913  (factors of the check, and the strength of the bridg
     friction: str | None = "coulomb",
     strength: Pascals | None = None,
     fill: Fill | PlasticFill | None = None,
+    parapets: NewtonsPerMetre = 0.0,
 ) -> Rating:
     """Rate a bridge for a vehicle: the multiple of it, with partial factors, at collapse.
 
@@ -526,6 +530,8 @@ def rate(  # noqa: PLR0913  (factors of the check, and the strength of the bridg
             "nonassociated".
         strength: as for `collapse_factor`, divided by its partial factor [Pa].
         fill: as for `collapse_factor`.
+        parapets: weight of both parapets along the bridge, where they stand on it [N/m]. It spreads
+            evenly over the width, and through the fill, but raises no pressure of the fill.
 
     Returns:
         Factor, worst place, its mechanism, and the factors at all places.
@@ -547,7 +553,8 @@ def rate(  # noqa: PLR0913  (factors of the check, and the strength of the bridg
     _check_width(width, structure)
     weighted, rows = _scale_weights(structure, dead), driven.factored(live, impact)
     strength, fill = check_options(structure, friction, strength), place_backing(fill, structure)
-    options: dict[str, Any] = {"friction": friction, "strength": strength, "fill": fill}
+    laid = lay_parapets(structure, dead * parapets)
+    options = dict[str, Any](friction=friction, strength=strength, fill=fill, dead=laid)
 
     def drive(width: float, area_load: float, positions: Sequence[float]) -> MovingLoad:
         # the structure is modelled over its whole width, of which a vehicle loads a part
@@ -580,7 +587,7 @@ def rate(  # noqa: PLR0913  (factors of the check, and the strength of the bridg
         found = _find_least_factors(weighted, positions, loads, by * area_load, states, count)
         more |= {key: found} if key else found
     factors = live, impact, dead, width, area_load
-    more["missing"] = missing
+    more |= {"missing": missing, "parapets": parapets}
     return Rating(structure, driven, *factors, moving, geometric, by_rule, **more)
 
 
@@ -592,6 +599,7 @@ def rate_again(found: Rating, structure: Structure, width: float | None, **optio
     vehicle, options = found.vehicle, dict(options)
     options["strength"] = check_options(structure, options["friction"], options["strength"])
     options["fill"] = place_backing(options["fill"], structure)
+    options["dead"] = lay_parapets(structure, found.dead * found.parapets)
     by_rule = np.isclose(found.width, vehicle.spread_over(found.structure))
     usual = vehicle.spread_over(structure) if by_rule else found.width
     share = structure.width / (usual if width is None else width)

@@ -20,7 +20,7 @@ from archfem.limit.fill_bounds import FillBounds, bound_least_factor, refine_bou
 from archfem.limit.fill_strength import Fill, PlasticFill, as_pressure
 from archfem.limit.linear_programme import Optimum, Programme
 from archfem.limit.nonassociated import find_weakest, starting_forces
-from archfem.masonry.loads import PointLoad
+from archfem.masonry.loads import Action, PointLoad
 from archfem.masonry.standing import find_bodies
 from archfem.masonry.structure import (
     CONTACT_TOLERANCE,
@@ -34,6 +34,9 @@ DRIVING_DIRECTIONS = ("right", "left")
 
 # Least load on a road [Pa], below which it is in kPa
 MIN_AREA_LOAD = 100.0
+
+# Least weight of parapets along a bridge [N/m]: less is a mistake of units
+MIN_PARAPETS = 100.0
 
 # Largest spacing of axles and width of wheels [m], above which they are in mm
 MAX_LENGTH = 100.0
@@ -267,7 +270,7 @@ class MovingLoad(ResultDisplay):
         return f"at x = {self.position:.3g} m (the vehicle's middle), driving {self.direction}"
 
 
-def moving_load(
+def moving_load(  # noqa: PLR0913  (loads, their places, and the strength of the bridge)
     structure: Structure | HasStructure,
     axles: float | Sequence[float],
     *,
@@ -277,6 +280,7 @@ def moving_load(
     friction: str | None = "coulomb",
     strength: float | None = None,
     fill: Fill | PlasticFill | None = None,
+    dead: Sequence[Action] = (),
 ) -> MovingLoad:
     """Find the collapse factor of a vehicle at every place on a bridge, and the worst place.
 
@@ -305,6 +309,7 @@ def moving_load(
         fill: as for `collapse_factor`. With a plastic fill factors are lower bounds, the least
             one on meshes as fine as its `gap` requires, others on coarser ones; Ctrl-C ends that
             refinement.
+        dead: loads beside self-weight that do not grow, as for `collapse_factor`.
 
     Returns:
         Factors over both directions and all positions: infinite where the vehicle never makes a
@@ -332,7 +337,7 @@ def moving_load(
             f"the vehicle is nowhere on the structure: positions are from {places.min():.4g} to "
             f"{places.max():.4g} m; move them onto it"
         )
-    options: dict[str, Any] = {"friction": friction, "strength": strength, "fill": fill}
+    options = dict[str, Any](friction=friction, strength=strength, fill=fill, dead=dead)
     distinct = tuple(dict.fromkeys((*rows[0], *rows[1])))
     strips = cut_road(structure, check_area_load(area_load))
     laid, factor_of, bounds = _solve_rows(structure, distinct, strips, options)
@@ -457,6 +462,15 @@ def cut_road(structure: Structure, area_load: float, count: int = 40) -> AxleRow
         for x in (0.5 * (edges[:-1] + edges[1:])).tolist()
     ]
     return tuple(load for strip in strips for load in strip) if area_load else ()
+
+
+def lay_parapets(structure: Structure, weight: float) -> AxleRow:
+    """Return the weight of parapets along a bridge as loads on 100 strips of the road [N/m]."""
+    if 0.0 < check_number(weight, "parapets [N/m]", minimum=0.0) < MIN_PARAPETS:
+        raise InvalidInput(
+            f"parapets {weight:g} N/m look like kN/m: give them in N/m, or as '{weight:g} kN/m'"
+        )
+    return cut_road(structure, weight / structure.width, 100)
 
 
 def _solve_rows(

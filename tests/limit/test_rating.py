@@ -233,6 +233,45 @@ def test_a_distributed_load_on_an_overhang_by_hand():
     assert ", and 4 kN/m² of road where it is adverse; given" in str(found)
 
 
+def test_parapets_are_a_dead_load_along_the_bridge(monkeypatch):
+    """Against columns of thin paving, as heavy: without pressure of the fill weights decide.
+
+    In a narrow fan it does not matter that an axle on the paving is 3 cm higher.
+    """
+    monkeypatch.setattr(rating, "_places_along", lambda *_: (3.0, 3.5, 4.0, 4.5))
+    weight, width = 18e3, 3.0
+    walls = [
+        af.shapes.Sidewall(length=2.0, height=1.0, above=0.5, state="fixed", name=side)
+        for side in ("left", "right")
+    ]
+    arch = af.shapes.Arch(span=5.0, rise=1.25, thickness=0.4, voussoirs=20)
+    parts = {"arches": [arch], "sidewalls": walls, "backfill": af.shapes.Backfill(cover=0.4)}
+    plain = af.bridge(**parts, width=width)
+    paved = af.bridge(**parts, width=width, paving=af.shapes.Paving(thickness=0.03, length=0.2))
+    heavy = af.Material(10e9, 0.2, weight / (0.03 * width), stands_for="parapets")
+    blocks = [replace(x, material=heavy) if x.part == "paving" else x for x in paved.blocks]
+    paved = replace(paved, blocks=tuple(blocks))
+    fill = af.limit.Fill(friction_angle=35.0, mobilisation=0.0, active=0.0, spread="3 degree")
+    axle, given = Vehicle("axle", (1e5,), impact=1.0, live=1.0), {"fill": fill, "strength": 5e6}
+    given["width"] = 2.0
+    found, light, as_paving = (
+        af.rate(structure, axle, **given, parapets=parapets)
+        for structure, parapets in ((plain, weight), (plain, 0.0), (paved, 0.0))
+    )
+    assert found.factor > 1.05 * light.factor
+    assert found.factor == pytest.approx(as_paving.factor, rel=5e-3)
+    assert found.full_pressure > light.full_pressure
+    assert "\nparapets of 18 kN/m\n" in str(found)
+    again = rating.rate_again(found, plain, 2.0, fill=fill, strength=5e6, friction="coulomb")
+    assert again == pytest.approx(found.factor, rel=1e-3)
+    assert found.geometric > light.geometric
+    limit = LimitAnalysis([], "coulomb", 5e6)
+    assert "parapets" not in doubt_rating(found, limit)[-1]
+    assert "and parapets (their weight is parapets = " in doubt_rating(light, limit)[-1]
+    with pytest.raises(af.InvalidInput, match=r"parapets 17.6 N/m look like kN/m"):
+        af.rate(plain, axle, **given, parapets=17.6)
+
+
 @pytest.mark.parametrize(
     ("axles", "turns", "direction", "number"),
     [
