@@ -98,7 +98,7 @@ def test_each_row_is_the_rating_of_a_changed_case(tmp_path):
 def test_the_keys_of_a_case_are_changed_one_property_at_a_time(tmp_path, key):
     """By a gap all piers are a tenth of the least breadth broader."""
     path = tmp_path / "case.toml"
-    text = CASE.replace("PIER", f'{key} = "0.8 m"').replace("0.3 m", "0.05 m")
+    text = CASE.replace("PIER", f'{key} = "0.8 m"').replace("0.3 m", "0.1 m")
     walls = '[structure.sidewalls]\nlength = "1.5 m"\nheight = "1 m"\nstate = "fixed"\n'
     text = text.replace("[structure.backfill]", f"{walls}a = {{}}\nb = {{}}\n[structure.backfill]")
     path.write_text(text)
@@ -119,7 +119,7 @@ def test_the_keys_of_a_case_are_changed_one_property_at_a_time(tmp_path, key):
         "piers a tenth narrower": {f"structure.piers.{key}": 0.8 - by},
         "piers a tenth broader": {f"structure.piers.{key}": 0.8 + by},
         "0.1 m less cover": {"structure.backfill.cover": 0.02},
-        "0.1 m more cover": {"structure.backfill.cover": 0.15},
+        "0.1 m more cover": {"structure.backfill.cover": 0.2},
         "half the strength of the stones": {"limit.strength": 2e6},
         "a vehicle on 2.52 m": {"rating.width": 2.52},
         "a vehicle on 3 m": {"rating.width": 3.0},

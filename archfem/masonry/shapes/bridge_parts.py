@@ -170,7 +170,10 @@ class Backfill:
     """The fill on rings, skewbacks and sidewalls, up to the deck; its far ends are free.
 
     Attributes:
-        cover: height of fill above the highest crown, up to the level of the deck [m].
+        cover: height of fill above the highest corner of the rings' stones, up to the level of the
+            deck [m]. Of an even number of stones it is that above the crown of the arc. Of an odd
+            number n the crown is higher by R (1 - cos(φ / 2n)), with the radius R of the extrados
+            and the embrace φ: by 6 mm with 19 stones of a span of 5.4 m, by 44 mm with 7.
         erosion: settlement of the fill below that level [m], except within
         hump: this distance to either side of the highest crown [m].
         spandrels: total thickness of the two spandrel walls, whose weight replaces that of the

@@ -89,7 +89,7 @@ def bridge(  # noqa: PLR0913  (the parts a bridge may have, and what they are ma
         right_ledge = fill_ledge(right, -1.0, sidewalls[1:])[::-1]
         bottom = [*left, *chain(*extrados), *right_ledge]
         top = backfill.surface(bottom[0][0], bottom[-1][0], _highest_crown(faces, extrados))
-        _check_cover(bottom, top)
+        _check_cover([*bottom, *_find_crowns(arches, faces)], top)
         builder.add([*bottom, *reversed(top)], "backfill", backfill.loaded(width, material))
         if paving is not None:
             builder.pave(top, paving)
@@ -133,6 +133,13 @@ def _highest_crown(
     return 0.5 * (left[0][0] + right[0][0]), level
 
 
+def _find_crowns(arches: Sequence[Arch], faces: Sequence[tuple[Face, Face]]) -> list[Point]:
+    """Return the crown of the extrados of each ring, on its arc: chords may be below it."""
+    middles = (0.5 * (left[0][0] + right[0][0]) for left, right in faces)
+    levels = (each.radius * (1.0 - cos(each.half)) + 0.5 * each.thickness for each in arches)
+    return list(zip(middles, levels, strict=True))
+
+
 def _check_cover(bottom: Sequence[Point], surface: Sequence[Point]) -> None:
     """Check that the fill covers rings and sidewalls."""
     min_cover = 0.02  # [m]; thinner layers make slivers in the mesh
@@ -141,9 +148,9 @@ def _check_cover(bottom: Sequence[Point], surface: Sequence[Point]) -> None:
     if cover.min() < min_cover:
         place = int(np.argmin(cover))
         raise InvalidStructure(
-            f"the fill is {cover[place]:.3f} m above the stones at x = {x[place]:.2f} m, and it "
-            f"must be at least {min_cover} m: give more cover, less erosion, or less of `above`, "
-            "the height of sidewalls over the springing"
+            f"the fill is {cover[place]:.3f} m above the stones at x = {x[place]:.2f} m, by the "
+            f"arcs of rings, and it must be at least {min_cover} m: give more cover, less erosion, "
+            "or less of `above`, the height of sidewalls over the springing"
         )
 
 
