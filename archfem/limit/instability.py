@@ -16,7 +16,7 @@ from archfem.errors import DidNotConverge, InvalidInput
 from archfem.limit.backfill import is_balanced, refuse_bonds, self_weight_programme
 from archfem.limit.linear_programme import Programme, RigidBlocks
 from archfem.masonry.block import as_point, say_place
-from archfem.masonry.structure import Structure, join_joint_names
+from archfem.masonry.structure import CONTACT_TOLERANCE, Structure, join_joint_names
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,23 +48,23 @@ def explain_instability(structure: Structure) -> str | None:
     names = np.array([structure.joints[number].name for number in stones.rigid_regions.joints])
     sliding = join_joint_names(names[np.abs(slip) > moving])
     turning = join_joint_names(names[np.abs(extrados - intrados) > moving])
+    rigid, speeds = dead.blocks.structure, np.abs(fall.multipliers.reshape(-1, 3)).max(axis=1)
+    falling = np.array(rigid.free)[speeds > 1e-6 * speeds.max()]
     # depth, as a multiple of that given, and friction from which more does not help [-]
     unlimited = 1e3
     if _stands(dead, friction=unlimited):
         least = _least_value(dead, "friction", float(dead.blocks.structure.friction.min()), 10.0)
         text = f"joints slide ({sliding}): it stands from a coefficient of friction of {least:.2g}"
-        if not _stands(dead, depth=unlimited):
-            text += ", and no thickness helps"
-        return text
+        if end := _name_free_end(rigid, falling):
+            return f"{text}; {end}"
+        return text + ", and no thickness helps" * (not _stands(dead, depth=unlimited))
     if _stands(dead, depth=unlimited):
         least = _least_value(dead, "depth", 1.0, unlimited)
         return (
             f"joints hinge ({turning}): it stands if they are {least:.3g} times as deep, at the "
             "same weight; no friction helps"
         )
-    speeds = np.abs(fall.multipliers.reshape(-1, 3)).max(axis=1)
-    rigid = dead.blocks.structure
-    missing = _name_interruption(rigid, np.array(rigid.free)[speeds > 1e-6 * speeds.max()])
+    missing = _name_interruption(rigid, falling)
     if _stands(dead, friction=unlimited, depth=unlimited):
         moves = [sliding and f"slide ({sliding})", turning and f"hinge ({turning})"]
         return f"joints {' and '.join(filter(None, moves))}: " + (
@@ -107,6 +107,29 @@ def describe_friction(structure: Structure) -> str:
         return ""
     less = " or less" if least == _LITTLE_FRICTION else ""
     return f"it stands from a coefficient of friction of {least:.2g}{less}"
+
+
+def _name_free_end(structure: Structure, falling: Sequence[int]) -> str:
+    """Return where pieces of a fill fall out of an end of it that nothing holds; "" for nowhere."""
+    points = {k: block.points for k, block in enumerate(structure.blocks) if block.grain}
+    if not points:
+        return ""
+    along = np.concatenate([*points.values()])[:, 0]
+    near = CONTACT_TOLERANCE * structure.size
+    for end in (along.min(), along.max()):
+        beside = {k for k, corners in points.items() if np.sum(abs(corners[:, 0] - end) < near) > 1}
+        held = {
+            number
+            for joint in structure.joints
+            if np.ptp(joint.ends[:, 0]) < near and abs(joint.middle[0] - end) < near
+            for number in joint.blocks
+        }
+        if (beside - held) & {*falling}:
+            return (
+                f"pieces of the fill fall out of its free end at x = {end:.2f} m, which a wall as "
+                "high as the fill would hold (`above` of the sidewalls of a bridge), or cohesion"
+            )
+    return ""
 
 
 def _name_interruption(structure: Structure, moving: Sequence[int]) -> str:

@@ -164,3 +164,24 @@ def test_a_ring_on_one_support_is_named_with_its_end():
     assert "'voussoir 3' at " in text
     assert "'voussoir 7' at " in text
     assert "rest on nothing: add a support, or the stones that are missing" in text
+
+
+@pytest.mark.parametrize(
+    ("above", "named"), [((0.1, 0.1), True), ((0.9, 0.1), True), ((0.9, 0.9), False)]
+)
+def test_fill_that_falls_out_of_a_free_end_is_held_by_higher_walls(above, named):
+    """The end that is named is one with a low wall, and the remedy is one."""
+    walls = [
+        af.shapes.Sidewall(length=1.5, height=1.0, above=high, state="fixed", name=name)
+        for high, name in zip(above, ("left wall", "right wall"), strict=True)
+    ]
+    arch = af.shapes.Arch(span=2.0, rise=0.5, thickness=0.3, voussoirs=5)
+    fill = af.shapes.Backfill(cover=0.4)
+    bridge = af.bridge(arches=[arch], sidewalls=walls, backfill=fill)
+    text = explain_instability(af.masonry.jointed_fill(bridge, 0.45, friction_angle=20.0))
+    if not named:
+        assert text is None
+        return
+    end = 0.0 if above[0] < 0.5 else max(block.points[:, 0].max() for block in bridge.blocks)
+    assert f"; pieces of the fill fall out of its free end at x = {end:.2f} m, which" in text
+    assert "thickness" not in text
