@@ -716,6 +716,13 @@ first = { synthetic = { seed = 1 } }
 """
 
 
+PIER = """
+"east" = { span = "4 m", rise = "1.5 m", thickness = "0.5 m", voussoirs = 9 }
+[structure.piers]
+pier = { breadth = "1.2 m", height = "2 m", course = "1 m" }
+"""
+
+
 @pytest.mark.parametrize(
     ("command", "given", "found"),
     [
@@ -910,6 +917,24 @@ def test_factors_of_a_vehicle_are_not_those_of_the_code(kept, undrawn):
     assert "live 1.35; impact 1.4" in rows["rating: vehicle"][0]
     stated = "1, none or by rule, see below"
     assert rows["rating: area load, dead, width"] == (stated, "default")
+
+
+@pytest.mark.parametrize("spandrels", ["0 m", "0.6 m"])
+def test_the_weight_of_a_fill_is_stated_as_given_and_with_spandrels(spandrels):
+    """A fifth of 3 m in stone of 23 kN/m³, the rest in fill of 18."""
+    text = BRIDGE.replace('cover = "0.4 m"', f'cover = "0.4 m"\nspandrels = "{spandrels}"')
+    text += '[materials]\nbackfill = { unit_weight = "18 kN/m³" }\nstone.unit_weight = 23e3\n'
+    data = report_data.ReportData(af.Case.of(tomllib.loads(text)), {})
+    rows = {row[0]: row[1:] for row in tabulate_inputs(data).rows}
+    mixed = ", 19 kN/m³ with the spandrels" * (spandrels != "0 m")
+    assert rows["backfill: weight"] == (f"18 kN/m³{mixed}", "given")
+
+
+def test_of_a_pier_the_foundation_is_fixed():
+    text = BRIDGE.replace("[structure.sidewalls]", PIER + "[structure.sidewalls]")
+    data = report_data.ReportData(af.Case.of(tomllib.loads(text)), {})
+    rows = {row[0]: row[1] for row in build_input_section(data).pieces[1].rows}
+    assert rows["ground"].endswith("fixed to it: 'left', 'pier, foundation', 'right'")
 
 
 def test_long_tables_of_joints_stand_in_two_halves(kept, monkeypatch):

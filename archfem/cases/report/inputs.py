@@ -32,6 +32,7 @@ from archfem.motion.matching import DEFAULT_BAND
 from archfem.motion.motion import Motion
 from archfem.statics.mechanism_assessment import kinematic_assessment
 from archfem.statics.pushover import pushover
+from archfem.units import in_unit
 from archfem.view.pages.document import Grid
 
 Row = tuple[str, str, str]  # quantity, value, mark
@@ -181,6 +182,9 @@ def _list_properties(data: ReportData, item: Material | Contact) -> Iterator[Row
     for key, (word, *_, reason) in DECIDING_VALUES[section].items():
         value = getattr(item, key)
         text, mark = value_text(section, key, value), _mark(key in given)
+        if word == _WEIGHT and key in given:
+            own = value_text(section, key, in_unit(given[key], "N/m**3", key))
+            text = text if own == text else f"{own}, {text} with the spandrels"
         if key in defaults:
             text += f" ({reason.partition(';')[0]})"
         elif mark == "default" and value is not None:
