@@ -22,6 +22,7 @@ import numpy as np
 from archfem.dynamics.collapse_state import (
     DISLOCATION,
     FALLEN_STATES,
+    RANGE_REMEDY,
     CollapseState,
     shallowest_part,
 )
@@ -149,8 +150,8 @@ def doubt_courses(structure: Structure, fall: CollapseState, motion: Motion) -> 
     if (body := find_rocking_body(structure)) is None:
         return
     remedy = (
-        "bonded, tall or stiff courses act as one body: state both, and compare with fewer courses "
-        "and stiffer joints"
+        f"{RANGE_REMEDY}, and compare with fewer courses and stiffer joints: bonded or tall "
+        "courses act as one body"
     )
     one, falls = body.rock(motion), fall.kind in FALLEN_STATES
     if one is None:

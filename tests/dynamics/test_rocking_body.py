@@ -50,7 +50,8 @@ def test_pulses_overturn_as_by_housner(ratio, halves, edge, verified):
     for factor in (0.998, 1.002):
         one = body.rock(sine(ratio, factor * edge, halves, 1e-3))
         assert isfinite(one.time) is overturns(ratio, factor * edge, halves)
-    case = f"stack as one body under {halves} half sines, ω/p = {ratio:g}: least peak [g]"
+    shaken = "half a sine" if halves == 1 else "one sine"
+    case = f"stack as one rigid body, {shaken}, ω/p = {ratio:g}: edge of peaks that overturn [g]"
     verified(case, edge, "rigid block integrated event by event", "the same", difference=2e-3)
 
 
