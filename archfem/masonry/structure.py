@@ -592,8 +592,27 @@ def find_clear_spans(structure: Structure) -> dict[str, tuple[float, float]]:
             ends.setdefault(joint.part, []).append((low, high))
     # between the inner ends of the outermost joints: those of a lintel are as long as its bearings
     return {
-        part: (min(own)[1], max(own, key=lambda joint: joint[1])[0]) for part, own in ends.items()
+        part: _widen_to_piers(structure, part, min(own)[1], max(own, key=lambda joint: joint[1])[0])
+        for part, own in ends.items()
     }
+
+
+def _widen_to_piers(
+    structure: Structure, part: str, low: float, high: float
+) -> tuple[float, float]:
+    """Return the span of a ring up to the faces of piers whose upper stones are its springers."""
+    middle = 0.5 * (low + high)
+    stones = {number for joint in structure.joints if joint.part == part for number in joint.blocks}
+    for number in stones:
+        beds = [x for x in structure.joints if x.role == "pier" and number in x.blocks]
+        if not beds:
+            continue
+        left, right = (
+            choose(choose(bed.intrados[0], bed.extrados[0]) for bed in beds)
+            for choose in (min, max)
+        )
+        low, high = (min(low, right), high) if right < middle else (low, max(high, left))
+    return low, high
 
 
 def describe_spans(structure: Structure) -> str:
@@ -614,6 +633,6 @@ def describe_spans(structure: Structure) -> str:
             for joint in structure.joints
             if joint.role == "ring" and part in {parts[number].part for number in joint.blocks}
         ]
-        high = f" and {min(clear):.3g} m high below the clear spans" if clear else ""
+        high = f" and {min(clear):.3g} m high to the ring" if clear else ""
         piers.append(f"'{part}' {min(joint.depth for joint in own):.4g} m broad{high}")
     return "; ".join([f"clear span {' and '.join(ends)}" if spans else "no ring", *piers])

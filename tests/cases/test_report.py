@@ -1073,7 +1073,10 @@ def test_a_study_stands_in_a_report(kept, unplotted, tmp_path, capsys):
     assert "In the study the push is least, 0.25 g, at structure.breadth = 0.5." in conclusion
     assert "Lengths" not in conclusion.partition("were not varied")[0]
     assert af.commands.main(["report", str(kept), "--study", str(tmp_path)]) == 1
-    assert "has no study.txt" in capsys.readouterr().err
+    assert "has no study.txt: run `archfem study`" in capsys.readouterr().err
+    (tmp_path / "progress.json").write_text("{}", encoding="utf-8")
+    assert af.commands.main(["report", str(kept), "--study", str(tmp_path)]) == 1
+    assert "has no study.txt: its study is not finished" in capsys.readouterr().err
 
 
 def test_parts_of_a_bridge_state_the_lengths_that_are_left_out():

@@ -342,7 +342,7 @@ def test_gravity_width_and_material_are_passed_on():
         ),
         (
             {"piers": (af.shapes.Pier(breadth=0.4, height=2.0),)},
-            "rings do not stand side by side on a breadth of 0.4",
+            "rings do not stand side by side on a breadth of 0.4 m: give a wider one, or thinner",
         ),
         ({"sidewalls": walls(setback=1.9)}, "nothing is left of its length 2 m behind the ring"),
         ({"sidewalls": walls(length=0.2)}, "nothing is left of its length 0.2 m"),
@@ -390,7 +390,7 @@ def test_a_pier_by_its_breadth_keeps_it_between_the_clear_spans(measured, thickn
     assert ends[1][:, 0].min() - ends[0][:, 0].max() == pytest.approx(0.9, rel=EXACT)
     low = 2.4 + ends[0][:, 1].min()  # the springing level is above the clear springing
     words = describe_spans(made)
-    assert words.endswith(f"; 'pier' 0.9 m broad and {low:.3g} m high below the clear spans")
+    assert words.endswith(f"; 'pier' 0.9 m broad and {low:.3g} m high to the ring")
     if measured == "intrados":
         assert np.ptp(ends[0][:, 0]) == pytest.approx(4.0, rel=EXACT)
         assert f"{ends[0][:, 0].max() + 0.9:.2f} to " in words

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import archfem as af
+from archfem.masonry.structure import find_clear_spans
 
 SQUARE = ((0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (0.0, 1.0))
 
@@ -234,3 +235,28 @@ def test_a_strip_of_a_gable_overturns_before_the_gable_does():
             blocks.append(af.Block(outline, af.STONE, f"{level} {a}", part="wall", role="pier"))
     gable = af.masonry.assembled(blocks, af.Contact(1e9, 4e8), width=0.6)
     assert gable.transverse_push == (pytest.approx(0.6 / 3.0), "a strip from bottom to top")
+
+
+def test_a_clear_span_ends_at_the_piers_below_springers():
+    """An arch of three stones between springers of its piers, whose faces are 3 m apart."""
+    corners = {
+        "ground": (((-1, -1), (5, -1), (5, 0), (-1, 0)), "other"),
+        "left": (((0, 0), (0.5, 0), (0.5, 2), (0, 2)), "pier"),
+        "left springer": (((0, 2), (0.5, 2), (1, 3), (0.5, 3.5), (0, 3.5)), "pier"),
+        "crown": (((1, 3), (3, 3), (3.5, 3.5), (0.5, 3.5)), "ring"),
+        "right": (((3.5, 0), (4, 0), (4, 2), (3.5, 2)), "pier"),
+        "right springer": (((3.5, 2), (4, 2), (4, 3.5), (3.5, 3.5), (3, 3)), "pier"),
+    }
+    blocks = [
+        af.Block(
+            outline,
+            af.STONE,
+            name,
+            fixed=name == "ground",
+            part="arch" if role == "ring" else name.split()[0],
+            role=role,
+        )
+        for name, (outline, role) in corners.items()
+    ]
+    arch = af.masonry.assembled(blocks, af.Contact(1e9, 4e8))
+    assert find_clear_spans(arch) == {"arch": (0.5, 3.5)}

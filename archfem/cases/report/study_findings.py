@@ -91,7 +91,10 @@ def read_study(data: ReportData) -> StudyFindings | None:
     place = data.study or data.folder
     if place is None or not (place / "study.txt").is_file():
         if data.study is not None:
-            raise InvalidInput(f"{place} has no study.txt, which `archfem study` writes: run it")
+            begun = (data.study / "progress.json").is_file()
+            words = "its study is not finished: run it again, which continues it"
+            words = words if begun else "run `archfem study`, which writes it"
+            raise InvalidInput(f"{place} has no study.txt: {words}")
         return None
     title, _, text = read_listed(place, "study.txt").decode("utf-8").strip().partition("\n\n")
     return collect_findings(title, text, read_dataset(place / "results.nc", "table"))

@@ -424,10 +424,15 @@ class StoneworkBuilder:
         """Build a pier under two springings; return the number of its skewback."""
         (x0, y0), (x1, y1) = left[0], right[0]
         step = pier.height / count_pieces(pier.height, pier.course, f"courses of '{pier.name}'")
-        if not left[1][0] < right[1][0] or min(y0, y1) <= -step:
+        if not left[1][0] < right[1][0]:
             raise InvalidStructure(
-                f"'{pier.name}': rings do not stand side by side on {_width_text(pier)} "
-                f"and a course of {step:.3g} m: give a wider one or higher courses"
+                f"'{pier.name}': rings do not stand side by side on {_width_text(pier)}: give a "
+                "wider one, or thinner rings; blocks or outlines may have one springer for both"
+            )
+        if min(y0, y1) <= -step:
+            raise InvalidStructure(
+                f"'{pier.name}': rings begin below the uppermost course, of {step:.3g} m: give "
+                "higher courses"
             )
         # flush with the intrados below, along both springing joints above
         top = [right[0], right[1], left[1], left[0]]
