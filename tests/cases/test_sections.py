@@ -1,6 +1,7 @@
 """Numbers of a report and of its tables: those of structure, dead load and runs."""
 
 from dataclasses import replace
+from itertools import pairwise
 from types import SimpleNamespace
 
 import numpy as np
@@ -54,6 +55,23 @@ def test_parts_are_listed_with_the_weight_that_moves(piers):
     pier = next(row for part, row in rows.items() if "pier" in part)
     assert pier["weight [kN]"] == f"{2.0 * 20.0 * 1.2 * 1.2:.4g}"
     assert pier["of them fixed"] == "1"
+
+
+def test_the_names_of_a_wall_do_not_fill_pages():
+    """Stones are numbered in the picture; of 30 joints the caption would list each."""
+    blocks = [af.Block(((0, -1), (6, -1), (6, 0), (0, 0)), af.STONE, "ground", fixed=True)]
+    for level in range(4):
+        cuts = [0, *(k + 0.5 * (level % 2) for k in range(1, 6)), 6]
+        for k, (a, b) in enumerate(pairwise(cuts)):
+            outline = ((a, level), (b, level), (b, level + 1), (a, level + 1))
+            name = f"course {level}, stone {k}"
+            blocks.append(af.Block(outline, af.STONE, name, part="wall", role="pier"))
+    wall = af.masonry.assembled(blocks, af.Contact(1e9, 4e8))
+    assert wall.heads.any()
+    case = case_of(af.Analysis(wall, fidelity="rigid"))
+    pieces = sections.build_structure_section(report_data.ReportData(case, {})).pieces
+    (caption,) = (piece.caption for piece in pieces if piece.kind == "plate")
+    assert caption == "The structure, with numbers of stones in the order of the case, from 0 on."
 
 
 def test_lost_blocks_are_listed_by_their_parts(piers):

@@ -179,8 +179,11 @@ def build_structure_section(data: ReportData) -> Section:
     ]
     beside = data.dead is not None and drawn[0] < MAX_SLENDERNESS * drawn[1]
     with limit_width(HALF_WIDTH) if beside else nullcontext():
-        named = "; ".join(["The structure, with its assessed joints", *list_numbers(structure)])
-        figures = [(draw_names(structure), f"{named}.")]
+        # of a wall in bond the picture has numbers of stones
+        named = ["The structure, with its assessed joints", *list_numbers(structure)]
+        if structure.heads.any():
+            named = ["The structure, with numbers of stones in the order of the case, from 0 on"]
+        figures = [(draw_names(structure), f"{'; '.join(named)}.")]
         if data.dead is not None:
             criteria = case.analysis.failure_criteria
             figures.append((draw_structure(structure, data.dead, criteria=criteria), _THRUST))
