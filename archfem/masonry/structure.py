@@ -121,6 +121,8 @@ def describe_assessment(
     )
 
 
+LARGE_STONE = 3.0  # median diagonal above which the unit is probably wrong [m]
+
 # Distance of two coincident points, relative to the size of the structure
 CONTACT_TOLERANCE = 1e-6
 
@@ -364,6 +366,13 @@ class Structure(ResultDisplay):
         """Check that every block is connected, through others, to a fixed one."""
         held = find_supported_blocks(self, range(len(self.blocks)))
         if loose := [block for k, block in enumerate(self.blocks) if k not in held]:
+            points = [block.drawn() for block in self.blocks]
+            breadth, height = np.ptp(np.concatenate(points), axis=0)
+            typical = np.median([np.hypot(*np.ptp(outline, axis=0)) for outline in points])
+            question = f"of {breadth:.3g} × {height:.3g} m in all, is the unit wrong?"
+            # what is said first is what a reader tries first
+            before = f"{question} Or else " if typical > LARGE_STONE else ""
+            after = f"; or {question}" if not before and len(loose) == len(self.free) else ""
             gaps = {self.blocks[k].name: loose[0].distance_to(self.blocks[k]) for k in held}
             nearest = min(gaps, key=gaps.__getitem__, default=None)
             away = ""
@@ -372,9 +381,9 @@ class Structure(ResultDisplay):
                 away += "which a larger snap of a drawing joins"
             names = join_names([f"'{block.name}'" for block in loose])
             raise InvalidStructure(
-                f"blocks {names} rest on nothing: join each, through others, to a fixed block, "
-                "which has fixed = true, in a drawing by its layer"
-                f"; '{loose[0].name}' is at {say_place(as_point(loose[0].centroid))}{away}"
+                f"{before}blocks {names} rest on nothing: join each, through others, to a fixed "
+                "block, which has fixed = true, in a drawing by its layer; "
+                f"'{loose[0].name}' is at {say_place(as_point(loose[0].centroid))}{away}{after}"
             )
 
     def _check_outlines(self) -> None:
@@ -590,11 +599,15 @@ def find_clear_spans(structure: Structure) -> dict[str, tuple[float, float]]:
         if joint.role == "ring":
             low, high = sorted((joint.intrados[0], joint.extrados[0]))
             ends.setdefault(joint.part, []).append((low, high))
-    # between the inner ends of the outermost joints: those of a lintel are as long as its bearings
-    return {
-        part: _widen_to_piers(structure, part, min(own)[1], max(own, key=lambda joint: joint[1])[0])
-        for part, own in ends.items()
-    }
+    # Between the inner ends of the outermost joints: those of a lintel are as long as its bearings.
+    # A joint of the extrados, as below a gable, begins where that at the springing does, and is
+    # less broad.
+    spans = {}
+    for part, own in ends.items():
+        _, low = min(own, key=lambda joint: (round(joint[0], 9), -joint[1]))
+        high, _ = max(own, key=lambda joint: (round(joint[1], 9), -joint[0]))
+        spans[part] = _widen_to_piers(structure, part, low, high)
+    return spans
 
 
 def _widen_to_piers(

@@ -105,8 +105,18 @@ LOWER = {"rock": square(0, -1)}
             r"'a' and 'b' at \(0.5, 0.5\) m are the same: leave one out$",
         ),
         (LOWER | {"a": [[0, 0], [1, 1], [1, 0], [0, 1]]}, "'a' crosses or touches itself"),
-        (LOWER | {"a": square(0.998, 0)}, "'rock' and 'a' touch along 2 mm only"),
-        (LOWER | {"a": square(3, 3)}, r"'a' rest on nothing"),
+        (
+            LOWER | {"a": square(0.998, 0)},
+            r"touch along 2 mm only at .*, within 0.005 m = 5 times snap, taken for an error",
+        ),
+        (
+            LOWER | {"a": square(3, 3)},
+            "'a' rest on nothing: .*; or of 4 × 5 m in all, is the unit wrong[?]$",
+        ),
+        (  # as of feet for inches
+            {"rock": square(0, -10, 10), "a": square(0, 5, 10)},
+            "^of 10 × 25 m in all, is the unit wrong[?] Or else blocks 'a' rest on nothing",
+        ),
         (
             LOWER | {"a": [[0, 0], [1, 0], [1, 5e-4]]},
             "'a' at .* is no larger than snap = 0.001 m.* or lower snap from 0.001 to 8e-05 m",

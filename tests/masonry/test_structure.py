@@ -260,3 +260,33 @@ def test_a_clear_span_ends_at_the_piers_below_springers():
     ]
     arch = af.masonry.assembled(blocks, af.Contact(1e9, 4e8))
     assert find_clear_spans(arch) == {"arch": (0.5, 3.5)}
+
+
+def test_the_clear_span_below_a_gable_is_that_of_the_intrados():
+    """Joints of the extrados begin at the springing too, at the outer end of its joint."""
+    inner, outer = (
+        [(r * np.cos(a), r * np.sin(a)) for a in np.linspace(np.pi, 0.0, 6)] for r in (1.0, 1.3)
+    )
+    stones = [[inner[k], inner[k + 1], outer[k + 1], outer[k]] for k in range(5)]
+    blocks = [
+        af.Block(tuple(points), af.STONE, f"stone {k}", part="arch", role="ring")
+        for k, points in enumerate(stones)
+    ]
+    for name, sign in (("west", -1.0), ("east", 1.0)):
+        x, y = outer[1]
+        edges = {
+            "pier": [(1.0, -1.0), (1.6, -1.0), (1.6, 0.0), (1.3, 0.0), (1.0, 0.0)],
+            "gable": [(1.3, 0.0), (1.6, 0.0), (1.6, y), (-x, y)],
+        }
+        for part, points in edges.items():
+            corners = [(sign * x, y) for x, y in points][:: int(sign)]
+            blocks.append(
+                af.Block(
+                    tuple(corners), af.STONE, f"{name} {part}", part=f"{name} {part}", role="pier"
+                )
+            )
+    rock = ((-2.0, -2.0), (2.0, -2.0), (2.0, -1.0), (-2.0, -1.0))
+    blocks.append(af.Block(rock, af.STONE, "rock", fixed=True, part="rock"))
+    made = af.masonry.assembled(blocks, af.masonry.STONE_TO_STONE)
+    assert sum(joint.part == "arch" for joint in made.joints) == 8  # two of the extrados
+    assert find_clear_spans(made)["arch"] == pytest.approx((-1.0, 1.0))

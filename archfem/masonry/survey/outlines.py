@@ -36,14 +36,12 @@ from archfem.masonry.materials import (
     Material,
 )
 from archfem.masonry.parts import Direction, assign_roles, find_directions
-from archfem.masonry.structure import CONTACT_TOLERANCE, Structure, suggest_name
+from archfem.masonry.structure import CONTACT_TOLERANCE, LARGE_STONE, Structure, suggest_name
 from archfem.masonry.survey.drawings import Frame, Outline, read_drawing, read_physical_curves
 from archfem.units import G, in_unit
 
 # Gaps and contacts up to this multiple of the tolerance are taken for errors of the survey [-]
 AMBIGUOUS_GAP_RATIO = 5.0
-
-LARGE_STONE = 3.0  # median diagonal above which the unit is probably wrong [m]
 
 # Numbers of places: both ends of an edge, and those around each outline
 Edge = tuple[int, int]
@@ -407,11 +405,13 @@ def _close_gaps(outlines: list[Outline], snap: float) -> Closed:
     _check_gaps(placed, boundaries, outlines, AMBIGUOUS_GAP_RATIO * snap)
     blocks = [Block(tuple(map(as_point, points)), STONE, "") for points in found]
     touches = touching(blocks)
+    least = AMBIGUOUS_GAP_RATIO * snap
     for a, b, (start, end) in touches:
-        if (length := dist(start, end)) <= AMBIGUOUS_GAP_RATIO * snap:
+        if (length := dist(start, end)) <= least:
             raise InvalidStructure(
                 f"'{names[a]}' and '{names[b]}' touch along {1e3 * length:.3g} mm only at "
-                f"{place(start)}: correct the drawing there"
+                f"{place(start)}, within {frame.length(least)} = {AMBIGUOUS_GAP_RATIO:g} times "
+                "snap, taken for an error of the survey: draw its end at the corner nearby"
             )
     return found, float(moved[worst]), touches
 
