@@ -33,6 +33,7 @@ from archfem.cases.toml_file import (
     read_with_base,
     refuse_unknown,
     remove_key,
+    remove_keys,
     set_value,
 )
 from archfem.dynamics.analysis import Analysis
@@ -105,7 +106,8 @@ class Case:
 
         Args:
             path: TOML file.
-            changes: "section.key=value" each, which replaces a value of the file.
+            changes: "section.key=value" each, which replaces a value of the file, or
+                'remove=["section.key", …]'.
 
         Returns:
             The case.
@@ -328,6 +330,9 @@ def read_settings(path: Path, changes: Sequence[str] = ()) -> dict[str, Any]:
     settings = read_with_base(path)
     for text in changes:
         path_of_value, value = parse_change(text)
+        if path_of_value.strip() == "remove":
+            remove_keys(settings, value)
+            continue
         set_value(settings, complete_path(path_of_value), value)
     return settings
 

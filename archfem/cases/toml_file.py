@@ -42,11 +42,7 @@ def read_with_base(path: Path, above: Sequence[Path] = ()) -> dict[str, Any]:
     if not isinstance(base, str):
         raise InvalidInput(f"{path}: base = {base!r} is not the name of a file")
     below = read_with_base(path.parent / base, (*above, path.resolve()))
-    removed = settings.pop("remove", [])
-    if not isinstance(removed, list) or not all(isinstance(key, str) for key in removed):
-        raise InvalidInput(f'{path}: remove = {short_repr(removed)}: write ["section.key", …]')
-    for key in removed:
-        remove_key(below, key)
+    remove_keys(below, settings.pop("remove", []), f"{path}: ")
     return merge_tables(below, settings)
 
 
@@ -101,6 +97,14 @@ def merge_tables(below: Table, above: Table) -> dict[str, Any]:
     return merged
 
 
+def remove_keys(settings: dict[str, Any], removed: Any, place: str = "") -> None:
+    """Remove the tables and values of a list of paths, which is given at a place."""
+    if not isinstance(removed, list) or not all(isinstance(key, str) for key in removed):
+        raise InvalidInput(f'{place}remove = {short_repr(removed)}: write ["section.key", …]')
+    for key in removed:
+        remove_key(settings, key)
+
+
 def remove_key(settings: dict[str, Any], path: str) -> None:
     """Remove the table or value at "section.key"."""
     *parents, last = split_key_path(path)
@@ -108,7 +112,7 @@ def remove_key(settings: dict[str, Any], path: str) -> None:
     for parent in parents:
         table = table.get(parent, {}) if isinstance(table, dict) else {}
     if not isinstance(table, dict) or last not in table:
-        raise InvalidInput(f"remove = '{path}': the base has no such key")
+        raise InvalidInput(f"remove = '{path}': there is no such key")
     del table[last]
 
 

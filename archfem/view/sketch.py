@@ -86,7 +86,9 @@ def _draw_layers(axes: Axes, closed: Sequence[Outline], scale: float) -> None:
     layers = list(dict.fromkeys(each.layer for each in closed))
     for number, layer in enumerate(layers):
         own = [each.drawn for each in closed if each.layer == layer]
-        face = f"{Colour.LINES[number % len(Colour.LINES)]}40"
+        # the colours repeat, stronger each time
+        again, colour = divmod(number, len(Colour.LINES))
+        face = Colour.LINES[colour] + ("40", "80", "c0")[again % 3]
         add_polygons(axes, own, face, label=f"layer '{layer}' ({len(own)})")
     for number, outline in enumerate(closed, 1):
         points = outline.drawn

@@ -185,6 +185,12 @@ def test_a_case_states_only_differences_from_its_base(tmp_path):
     )
     case = af.Case.read(tmp_path / "by_span.toml", ["structure.voussoirs=9"])
     settings = tomllib.loads(case.text())
+    (tmp_path / "all.toml").write_text(BASE.replace("ratio = 0.05", "ratio = 0.02"))
+    changes = ['remove=["structure.radius", "structure.embrace"]', "structure.voussoirs=9"]
+    changes += ["structure.span=4.0", "structure.rise=1.5"]
+    assert af.Case.read(tmp_path / "all.toml", changes).settings == case.settings
+    with pytest.raises(af.InvalidInput, match=r"^remove = 3: write"):
+        af.Case.read(tmp_path / "all.toml", ["remove=3"])
     assert settings["structure"] == {
         "shape": "circular_arch",
         "thickness": "0.55 m",
@@ -202,7 +208,7 @@ def test_a_case_states_only_differences_from_its_base(tmp_path):
         ('base = "nothing.toml"', "there is no case file"),
         ('base = "case.toml"', "is its own base"),
         ("base = 3", "not the name of a file"),
-        ('base = "ring.toml"\nremove = ["structure.rise"]', "the base has no such key"),
+        ('base = "ring.toml"\nremove = ["structure.rise"]', "there is no such key"),
         ('base = "ring.toml"\n[structure]\nradios = 3.0', "did you mean 'radius'"),
     ],
 )

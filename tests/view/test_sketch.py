@@ -123,3 +123,10 @@ def test_polylines_in_x_and_z_are_drawn_flat(tmp_path):
     drawing.modelspace().add_polyline3d([(0, 0, 0), (1, 0, 0), (1, 0, 1)], close=True)
     drawing.saveas(path := tmp_path / "upright.dxf")
     assert draw_outlines(path).axes
+
+
+def test_seven_layers_have_colours_of_their_own(tmp_path):
+    boxes = {f"layer {k}": (float(k), k + 1.0) for k in range(7)}
+    figure = draw_outlines(draw(tmp_path / "seven.dxf", boxes))
+    faces = {tuple(each.get_facecolor()[0]) for each in figure.axes[0].collections}
+    assert len(faces) == 7
