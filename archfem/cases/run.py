@@ -144,9 +144,16 @@ class DeadLoadResult:
 
     @cached_property
     def doubts(self) -> tuple[Doubt, ...]:
-        """Doubts about the model's fidelity and the equilibrium."""
+        """Doubts about the drawing, the model's fidelity and the equilibrium."""
         friction = self.case.analysis.failure_criteria.friction
-        return (*self.dead.model.doubts, *dead_load_doubts(self.dead, friction))
+        lost = list[Doubt]()
+        with suppress(InvalidInput):  # the drawing may be gone, whose blocks the case has
+            survey = read_survey(self.case.settings, self.case.folder)
+            words = "ignored layer '{}' has a closed outline at {} that touches stones along {:.0%}"
+            words += " of its sides, as a stone does, and is left out"
+            remedy = "if it is a stone, draw it on the layer of its part"
+            lost = [Doubt(words, remedy, each) for each in survey.lost] if survey else []
+        return (*self.dead.model.doubts, *lost, *dead_load_doubts(self.dead, friction))
 
     @cached_property
     def finer(self) -> tuple[Analysis, Equilibrium] | None:

@@ -480,6 +480,51 @@ fidelity = "rigid"
     ), said
 
 
+def test_a_stone_on_an_ignored_layer_is_a_doubt(tmp_path, capsys):
+    """A filling between two posts and a lintel; a frame, and notes in and off stones, are none."""
+
+    def box(left, low, right, high):
+        return [(left, low), (right, low), (right, high), (left, high)]
+
+    posts = [box(0, 0, 400, 1000), box(800, 0, 1200, 1000)]
+    layers = {"ROCK": [box(0, -500, 1200, 0)], "POST": posts, "LINTEL": [box(0, 1000, 1200, 1300)]}
+    layers["NOTE"] = [box(401, 1, 799, 999)]
+    layers["FRAME"] = [
+        box(-900, -900, 2000, 2000),
+        box(100, 100, 300, 300),
+        box(1210, 0, 1600, 900),
+    ]
+    drawing = ezdxf.new(units=ezdxf.units.MM)
+    for layer, boxes in layers.items():
+        for points in boxes:
+            drawing.modelspace().add_lwpolyline(points, close=True, dxfattribs={"layer": layer})
+    drawing.saveas(tmp_path / "a.dxf")
+    (tmp_path / "a.toml").write_text(
+        """
+[structure]
+shape = "outlines"
+file = "a.dxf"
+
+[structure.layers]
+ROCK = { fixed = true }
+POST = { role = "pier" }
+LINTEL = { role = "ring" }
+NOTE = { ignore = true }
+FRAME = { ignore = true }
+
+[model]
+fidelity = "rigid"
+"""
+    )
+    assert af.commands.main(["check", str(tmp_path / "a.toml")]) == 3
+    said = capsys.readouterr().out
+    assert said.count("in doubt: ignored layer ") == 1
+    assert (
+        "ignored layer 'NOTE' has a closed outline at (600, 500) mm that touches stones along "
+        "100% of its sides, as a stone does, and is left out; if it is a stone, draw it on the "
+    ) in said
+
+
 def test_median_depths_are_by_part():
     """A pier is twice as deep as the ring: one median would be of neither."""
     portal = af.arch_on_piers(

@@ -37,7 +37,13 @@ from archfem.masonry.materials import (
 )
 from archfem.masonry.parts import Direction, assign_roles, find_directions
 from archfem.masonry.structure import CONTACT_TOLERANCE, LARGE_STONE, Structure, suggest_name
-from archfem.masonry.survey.drawings import Frame, Outline, read_drawing, read_physical_curves
+from archfem.masonry.survey.drawings import (
+    Frame,
+    Outline,
+    read_drawing,
+    read_physical_curves,
+    read_polylines,
+)
 from archfem.units import G, in_unit
 
 # Gaps and contacts up to this multiple of the tolerance are taken for errors of the survey [-]
@@ -87,6 +93,8 @@ class Survey:
         moved: largest displacement of a vertex by snapping [m].
         frame: unit of the coordinates.
         ignored: number of outlines on each ignored layer.
+        lost: ignored outlines that lie between stones as one does: layer, place and the share of
+            the circumference that touches them [-].
     """
 
     blocks: tuple[Block, ...]
@@ -94,6 +102,7 @@ class Survey:
     moved: float
     frame: Frame
     ignored: Mapping[str, int]
+    lost: tuple[tuple[str, str, float], ...] = ()
 
     def __str__(self) -> str:
         counts = [f"'{layer}' with {count} outlines" for layer, count in self.ignored.items()]
@@ -153,7 +162,29 @@ def read_outlines(
         made = tuple(replace(b, corners=_find_corners(b, directions.get(b.part))) for b in made)
     except (InvalidInput, InvalidStructure) as error:
         raise type(error)(f"{path}: {error}") from error
-    return Survey(made, _measure(outlines), moved, outlines[0].frame, ignored)
+    lost = tuple(_find_lost(Path(path), unit, ignored, outlines, snap))
+    return Survey(made, _measure(outlines), moved, outlines[0].frame, ignored, lost)
+
+
+def _find_lost(
+    path: Path, unit: str | None, ignored: Counter[str], outlines: Sequence[Outline], snap: float
+) -> Iterator[tuple[str, str, float]]:
+    """Yield outlines on ignored layers of a DXF file that lie between stones: see `Survey`."""
+    if path.suffix.lower() != ".dxf" or not any(ignored.values()):
+        return
+    import shapely
+
+    stones = shapely.make_valid(np.array([shapely.Polygon(each.points) for each in outlines]))
+    whole, usual = shapely.union_all(stones), float(np.median(shapely.area(stones)))
+    near = shapely.buffer(whole, AMBIGUOUS_GAP_RATIO * snap)
+    for each in read_polylines(path, unit, Counter(), snap)[0]:
+        shape = shapely.make_valid(shapely.Polygon(each.points))
+        # neither a frame nor a fill, nor a note within a stone
+        if each.layer not in ignored or not 0.1 < shape.area / usual < 5.0:
+            continue
+        share = shapely.intersection(shape.boundary, near).length / shape.length
+        if share > 0.4 and shapely.intersection(shape, whole).area < 0.1 * shape.area:
+            yield each.layer, each.frame.place(each.points.mean(axis=0)), share
 
 
 def _measure(outlines: Sequence[Outline]) -> tuple[float, float]:
