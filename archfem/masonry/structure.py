@@ -593,39 +593,33 @@ def largest_displacement(outlines: Sequence[Array], centroids: Array, motion: Ar
 
 
 def find_clear_spans(structure: Structure) -> dict[str, tuple[float, float]]:
-    """Return the clear span of each ring, from its left to its right end [m]."""
-    ends: dict[str, list[tuple[float, float]]] = {}
+    """Return the clear span of each ring, from its left to its right end [m].
+
+    It is between the inner ends of the outermost joints, for those of a lintel are as long as its
+    bearings. A joint of the extrados, as below a gable, begins where that at the springing does,
+    and is less broad. Where the upper stone of a pier is a springer, the span is that of the piers.
+    """
+    ends: dict[str, list[tuple[float, float, Joint]]] = {}
     for joint in structure.joints:
         if joint.role == "ring":
             low, high = sorted((joint.intrados[0], joint.extrados[0]))
-            ends.setdefault(joint.part, []).append((low, high))
-    # Between the inner ends of the outermost joints: those of a lintel are as long as its bearings.
-    # A joint of the extrados, as below a gable, begins where that at the springing does, and is
-    # less broad.
+            ends.setdefault(joint.part, []).append((low, high, joint))
     spans = {}
     for part, own in ends.items():
-        _, low = min(own, key=lambda joint: (round(joint[0], 9), -joint[1]))
-        high, _ = max(own, key=lambda joint: (round(joint[1], 9), -joint[0]))
-        spans[part] = _widen_to_piers(structure, part, low, high)
+        _, low, left = min(own, key=lambda each: (round(each[0], 9), -each[1]))
+        high, _, right = max(own, key=lambda each: (round(each[1], 9), -each[0]))
+        low = min([low, *(end for _, end in _list_springer_beds(structure, left))])
+        spans[part] = low, max([high, *(end for end, _ in _list_springer_beds(structure, right))])
     return spans
 
 
-def _widen_to_piers(
-    structure: Structure, part: str, low: float, high: float
-) -> tuple[float, float]:
-    """Return the span of a ring up to the faces of piers whose upper stones are its springers."""
-    middle = 0.5 * (low + high)
-    stones = {number for joint in structure.joints if joint.part == part for number in joint.blocks}
-    for number in stones:
-        beds = [x for x in structure.joints if x.role == "pier" and number in x.blocks]
-        if not beds:
-            continue
-        left, right = (
-            choose(choose(bed.intrados[0], bed.extrados[0]) for bed in beds)
-            for choose in (min, max)
-        )
-        low, high = (min(low, right), high) if right < middle else (low, max(high, left))
-    return low, high
+def _list_springer_beds(structure: Structure, springing: Joint) -> list[tuple[float, float]]:
+    """Return both ends of the beds of a pier below the springer at a joint [m]."""
+    foot = min(springing.intrados[1], springing.extrados[1])
+    beds = (x for x in structure.joints if x.role == "pier" and {*x.blocks} & {*springing.blocks})
+    below = (bed for bed in beds if max(bed.intrados[1], bed.extrados[1]) < foot)
+    ends = (sorted((bed.intrados[0], bed.extrados[0])) for bed in below)
+    return [(low, high) for low, high in ends]
 
 
 def describe_spans(structure: Structure) -> str:
