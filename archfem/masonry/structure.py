@@ -616,6 +616,7 @@ def find_clear_spans(structure: Structure) -> dict[str, tuple[float, float]]:
 def _list_springer_beds(structure: Structure, springing: Joint) -> list[tuple[float, float]]:
     """Return both ends of the beds of a pier below the springer at a joint [m]."""
     foot = min(springing.intrados[1], springing.extrados[1])
+    foot -= CONTACT_TOLERANCE * structure.size
     beds = (x for x in structure.joints if x.role == "pier" and {*x.blocks} & {*springing.blocks})
     below = (bed for bed in beds if max(bed.intrados[1], bed.extrados[1]) < foot)
     ends = (sorted((bed.intrados[0], bed.extrados[0])) for bed in below)
