@@ -14,8 +14,6 @@ from math import inf, sqrt
 from time import perf_counter
 from typing import Any
 
-import numpy as np
-
 from archfem._display import ProgressReport, call_late_bound
 from archfem._files import align_columns
 from archfem._validation import validate_arguments, validate_methods
@@ -26,7 +24,7 @@ from archfem.dynamics.fall import state_rigid_falls
 from archfem.dynamics.history import Ending, History, first_mechanisms, partial_history
 from archfem.dynamics.monitor import FILL_TENSION, PULLED
 from archfem.dynamics.recorder import Record
-from archfem.dynamics.rocking_body import find_rocking_body
+from archfem.dynamics.rocking_body import describe_first_fall, find_first_fall
 from archfem.dynamics.schemes import EffectiveDamping, Viscous
 from archfem.dynamics.solvers.integrator import Stepper
 from archfem.dynamics.time_history import time_history
@@ -37,8 +35,7 @@ from archfem.joints.criteria import Criteria
 from archfem.limit.mechanism_count import Mechanism
 from archfem.masonry.structure import Structure, join_names
 from archfem.models.model import Doubt, Model, log_doubts_once, merge_doubts
-from archfem.motion.motion import Motion
-from archfem.motion.signal_processing import MAX_PEAK_ACCELERATION
+from archfem.motion.motion import Motion, admissible_range
 from archfem.statics.equilibrium import Equilibrium, dead_load
 from archfem.units import STANDARD_GRAVITY
 
@@ -341,15 +338,6 @@ def check_search(precision: float, between: Sequence[float]) -> None:
         )
 
 
-def admissible_range(between: Sequence[float], motion: Motion) -> tuple[float, float]:
-    """Return a range of scales cut off at the scale at which a motion has a peak of 5 g."""
-    smallest, largest = between
-    peak = max(float(np.abs(motion.component(name)).max()) for name in motion.components)
-    if peak == 0.0:
-        raise InvalidInput(f"motion '{motion.name}' is at rest: no factor on it moves anything")
-    return smallest, max(smallest, min(largest, MAX_PEAK_ACCELERATION / peak))
-
-
 @log_doubts_once()
 def search_scales(
     run_scaled: Callable[[float], ScaledRun],
@@ -475,11 +463,7 @@ class CollapseScale:
         if self.moves <= max(self._stood):
             less = " or less" * ("moves in all" in self.states)
             met = f"a mechanism from {self.moves:#.3g} ×{less}, {met}"
-        text = _say_bracket("stands", self, met)
-        if self.as_one is None:
-            return text
-        falls = f"falls from {self.as_one:#.3g} × on"
-        return f"{text}; as one rigid body it {falls if self.as_one < inf else 'falls at none'}"
+        return _say_bracket("stands", self, met) + describe_first_fall(self.as_one)
 
     def __repr__(self) -> str:
         """Return this, how closely scales were run, and what was varied."""
@@ -518,7 +502,8 @@ class CollapseScale:
                 words, ends = "a time step finds a fall at {:#.3g} ×, and another none", (low, low)
             doubts.append(Doubt(words, "", (ends,)))
         searches = {f"by {1e3 * dt:g} ms": search for dt, search in self.searches.items()}
-        doubts += _doubts_of_searches(searches, COLLAPSE_DEFINITION)
+        of_runs = _doubts_of_searches(searches, COLLAPSE_DEFINITION)
+        doubts += [x for x in of_runs if replace(x, place="") not in self.of_model]
         falls = [(run.scale, run.doubts) for run in self._runs if run.fails(COLLAPSE_DEFINITION)]
         return tuple(state_rigid_falls(doubt, falls) for doubt in doubts)
 
@@ -629,17 +614,6 @@ class CollapseScale:
     def unanswered(self) -> tuple[float, ...]:
         """Scales of runs that were broken off before a state of collapse was known [-]."""
         return tuple(sorted({run.scale for run in self._runs if run.fall is None}))
-
-    def falls(self, dt: float) -> tuple[tuple[float, CollapseState | None], ...]:
-        """Return the scale and the state of collapse of each run with one time step.
-
-        Args:
-            dt: time step [s].
-
-        Returns:
-            Pairs in order of the scales; the state is None where the run was broken off.
-        """
-        return tuple((run.scale, run.fall) for run in self.searches[dt].runs)
 
     def verdict_range(self, structure: Structure, motion: Motion, **options: Any) -> VerdictRange:
         """Compute the range of verdicts over uncertain properties and over scales in the bracket.
@@ -798,11 +772,7 @@ def collapse_scale(
         longer |= searches
         steps = [shorter, 0.5 * shorter]
         searches = _search_steps(search, steps)
-    structure, body = begin.model.structure, find_rocking_body(begin.model.structure)
-    found = CollapseScale(searches, motion.pga, doubt_soft_blocks(structure), longer)
-    if body is None:
-        return found
-    largest = max(run.scale for made in searches.values() for run in made.runs)
-    # half of the push that turns it, which a vertical motion may lower
-    least = max(limits[0], 0.5 * body.start / max(motion.pga, 1e-3))
-    return replace(found, as_one=body.first_fall(motion, (min(least, largest), largest)))
+    largest = max([limits[0], *(run.scale for x in searches.values() for run in x.runs)])
+    as_one = find_first_fall(begin.model.structure, motion, (limits[0], largest))
+    of_model = doubt_soft_blocks(begin.model.structure)
+    return CollapseScale(searches, motion.pga, of_model, longer, as_one)

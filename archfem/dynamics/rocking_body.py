@@ -145,6 +145,28 @@ class RockingBody:
         return inf
 
 
+def find_first_fall(
+    structure: Structure, motion: Motion, between: tuple[float, float]
+) -> float | None:
+    """Return the smallest scale at which a stack falls as one rigid body, infinite for none [-].
+
+    It is None of other structures, and where the body slides.
+    """
+    if (body := find_rocking_body(structure)) is None:
+        return None
+    # from half of the push that turns it on, which a vertical motion may lower
+    least, largest = max(between[0], 0.5 * body.start / max(motion.pga, 1e-3)), between[1]
+    return body.first_fall(motion, (min(least, largest), largest))
+
+
+def describe_first_fall(scale: float | None) -> str:
+    """Describe the scale of `find_first_fall` behind that of courses; "" without one."""
+    if scale is None:
+        return ""
+    falls = f"falls from {scale:#.3g} × on" if scale < inf else "falls at none"
+    return f"; as one rigid body it {falls}"
+
+
 def doubt_courses(structure: Structure, fall: CollapseState, motion: Motion) -> Iterator[Doubt]:
     """Yield a doubt of a stack that as one rigid body falls, stands or moves otherwise."""
     if (body := find_rocking_body(structure)) is None:

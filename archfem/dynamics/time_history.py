@@ -330,6 +330,7 @@ def _announce_long_run(spent: float, done: float, duration: float, long: float =
             done,
             duration,
             spent,
+            extra={"of_pace": True},  # of the machine: no doubt about the answer
         )
 
 

@@ -1,6 +1,6 @@
 """`Motion`: a ground acceleration, read, cut, filtered, rotated and scaled."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from os import PathLike
 from pathlib import Path
@@ -367,3 +367,12 @@ class Motion(ResultDisplay):
             name: change(self.component(name), *args, **options) for name in self.components
         }
         return replace(self, **rows)
+
+
+def admissible_range(between: Sequence[float], motion: Motion) -> tuple[float, float]:
+    """Return a range of scales cut off at the scale at which a motion has a peak of 5 g."""
+    smallest, largest = between
+    peak = max(float(np.abs(motion.component(name)).max()) for name in motion.components)
+    if peak == 0.0:
+        raise InvalidInput(f"motion '{motion.name}' is at rest: no factor on it moves anything")
+    return smallest, max(smallest, min(largest, signal_processing.MAX_PEAK_ACCELERATION / peak))

@@ -39,14 +39,14 @@ from archfem._validation import (
 )
 from archfem.dynamics.analysis import Analysis
 from archfem.dynamics.collapse_state import FALLEN_STATES, CollapseState, doubt_soft_blocks
-from archfem.dynamics.motion_scaling import admissible_range, check_search
+from archfem.dynamics.motion_scaling import check_search
 from archfem.dynamics.recorder import Record
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.masonry.structure import Structure
 from archfem.models.model import Doubt, read_doubts, write_doubts
 from archfem.motion.design_spectra import DesignSpectrum
 from archfem.motion.hazard import DESIGN_PERIOD, MEASURES, Hazard
-from archfem.motion.motion import Motion
+from archfem.motion.motion import Motion, admissible_range
 from archfem.motion.response_spectra import measure_intensity, response_spectrum
 from archfem.motion.suite import Suite
 from archfem.statics.equilibrium import Equilibrium, fill_doubts

@@ -28,7 +28,6 @@ from archfem.dynamics.history import Ending, partial_history
 from archfem.dynamics.motion_scaling import (
     COLLAPSE_DEFINITION,
     ScaledRun,
-    admissible_range,
     check_search,
     search_scales,
 )
@@ -36,7 +35,7 @@ from archfem.errors import DidNotConverge, InvalidInput
 from archfem.joints.criteria import assessed_joints, with_failure_flags
 from archfem.limit.mechanism_count import Mechanism, counted_mechanism
 from archfem.models.model import Doubt
-from archfem.motion.motion import Motion
+from archfem.motion.motion import Motion, admissible_range
 from archfem.motion.response_spectra import measure_intensity, response_spectrum
 from archfem.studies.cache import dead_load_of, ground_motion, lowest_modes
 from archfem.studies.evaluators import Evaluator, Findings, largest_values, run_motion

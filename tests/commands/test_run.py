@@ -18,8 +18,10 @@ import archfem as af
 from archfem.cases.result_text import ResultTable
 from archfem.cases.run import carry_out
 from archfem.commands import margin
-from archfem.commands.run import print_results
-from archfem.dynamics import motion_scaling
+from archfem.commands.run import print_results, record_doubts
+from archfem.dynamics import motion_scaling, time_history
+from archfem.errors import logger
+from archfem.models.model import Doubt
 from archfem.studies import study, variations
 
 RING = Path(__file__).parents[2] / "meshes" / "ring_paper.toml"
@@ -1007,3 +1009,12 @@ assessment = { spectrum = { code = "EC8", ag = 0.22, ground = "C" }, direction =
     found = re.search(r"at most ([\d.]+) \(proved ≥ ([\d.]+)\) times the site's", words)
     factor, proved = map(float, found.groups())
     assert 0.5 * factor < proved < factor
+
+
+def test_warnings_of_runs_are_no_lines_of_an_answer():
+    """Runs keep their doubts, and the pace is that of the machine."""
+    with record_doubts(af.column(breadth=1.0, heights=[1.0])) as doubts:
+        logger.warning("%s", Doubt("energy drifts by {:.2g}", "", (0.1,)))
+        time_history._announce_long_run(6.0, 0.01, 5.0)
+        logger.warning("joints slide")
+    assert doubts == ["in doubt: joints slide"]

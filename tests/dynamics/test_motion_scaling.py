@@ -19,11 +19,11 @@ from archfem.dynamics.motion_scaling import (
     COLLAPSE_DEFINITION,
     MechanismScales,
     ScaledRun,
-    admissible_range,
     search_scales,
 )
 from archfem.errors import logger as log
 from archfem.models.model import Doubt
+from archfem.motion.motion import admissible_range
 
 ROUND_OFF = 1.0 + 1e-9
 DAMPING = af.Rayleigh(0.05, (8.0, 16.0))
@@ -673,6 +673,14 @@ def test_scales_are_smaller_until_the_fill_bears_no_tension():
 
     found = search_scales(shaken, (COLLAPSE_DEFINITION,), 0.05, (0.1, 10.0))
     assert CollapseScale({0.005: found}).held == pytest.approx(0.5)
+
+
+def test_a_doubt_of_the_model_is_not_repeated_as_one_of_its_runs():
+    of_model, of_run = Doubt("fill in one piece", "cut it"), Doubt("energy drifts")
+    search = fallen(1.0, -2.0)
+    runs = tuple(replace(run, doubts=(of_model, of_run)) for run in search.runs)
+    found = CollapseScale({0.005: replace(search, runs=runs)}, of_model=(of_model,))
+    assert [doubt.cause for doubt in found.doubts] == ["fill in one piece", "energy drifts"]
 
 
 def test_doubts_of_many_runs_are_logged_once_by_kind(caplog):
