@@ -104,7 +104,9 @@ def follow_fall(
     Ctrl-C and SIGTERM end it with what was computed.
     """
     try:
-        return _follow_fall(history, model, states, motion, damping, whole)
+        # one report of all passes, each of which may be short
+        with ProgressReport(motion.name, None, rarely=True):
+            return _follow_fall(history, model, states, motion, damping, whole)
     except KeyboardInterrupt:  # before the first step
         return mark_interrupted(history, f"{states[1].time:.4g} s")
 
@@ -288,9 +290,9 @@ def _doubt_joints(structure: Structure, motion: Motion, start: float) -> Iterato
     simulation = RigidBlockSimulation(with_sliding_joints(structure), dt=TRIED_STEPS[0])
     at_rest, end = LooseBlocks.as_built(structure, start), motion.duration + 2.0
     find_lost = mark_lost(structure)
-    name = f"{motion.name}: compared with rigid blocks"
     # without convergence there is nothing to compare with
-    with suppress(DidNotConverge), ProgressReport(name, None, rarely=True):
+    with suppress(DidNotConverge), ProgressReport("compared", None, rarely=True) as progress:
+        progress.show("rigid blocks from rest")
         frames = simulation.frames(at_rest, end, motion, spacing=0.02)
         if not any(find_lost(frame.poses).any() for frame in frames):
             yield Doubt(

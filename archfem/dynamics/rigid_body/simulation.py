@@ -193,8 +193,7 @@ class RigidBlockSimulation:
         stride = max(1, round(spacing / dt))
         steps = int(np.ceil((end - start.time) / dt - 1e-6))
         anchor, since = start.poses, start.time
-        name = "ground at rest" if motion is None else motion.name
-        with ProgressReport(name, end - start.time, rarely=True) as progress:
+        with ProgressReport("loose blocks", end - start.time, rarely=True) as progress:
             for first, last in pairwise([*range(0, steps, stride), steps]):
                 middles = start.time + dt * (np.arange(first, last) + 0.5)
                 run.advance(np.zeros((last - first, 2)) if motion is None else motion.at(middles))
@@ -204,8 +203,8 @@ class RigidBlockSimulation:
                 if shaken or run.largest_displacement(anchor) > 5e-4:
                     anchor, since = run.poses, time
                 resting = time - since >= 0.5
-                words = f"loose blocks at {time:.3g} of {end:.3g} s at most, by steps of"
-                progress.show(f"{words} {1e3 * dt:g} ms", dt * (last - first))
+                words = f"{time:.3g} of {end:.3g} s at most, by steps of {1e3 * dt:g} ms"
+                progress.show(words, dt * (last - first))
                 yield run.frame(time, resting)
                 if resting:
                     return
