@@ -54,7 +54,6 @@ def hold_signals() -> Iterator[None]:
         yield
         return
     held = list[int]()
-    held = list[int]()
     known = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
     own = {number: handler for number, handler in known.items() if callable(handler)}
     for number in own:
