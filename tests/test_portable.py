@@ -34,7 +34,7 @@ animation = true
 """
 
 WITHOUT = """
-import os, signal, subprocess, sys  # subprocess takes msvcrt for Windows
+import asyncio, os, signal, subprocess, sys  # asyncio takes sysconf, subprocess takes msvcrt for Windows
 from types import SimpleNamespace
 for name in {missing}:
     sys.modules[name] = None

@@ -219,7 +219,7 @@ def describe_dead_load(result: DeadLoadResult, *, explain: bool = False) -> str:
     if (idle := joints["name"][joints["N"] <= 1e-6 * joints["N"].max()]).size:
         lines[-1] += f", as nothing is carried by {join_joint_names(idle.values.tolist())}"
     used = result.dead.joints["friction"].values >= (1.0 - 1e-3) * structure.friction
-    if spent := np.count_nonzero(used & structure.judged):
+    if spent := int(np.count_nonzero(used & structure.judged)):
         lines[-1] += f"; V/N is μ at {spent} joint{'s' * (spent > 1)}, which makes no mechanism"
     if structure.heads.any():
         heads = result.dead.joints.isel(joint=structure.heads)
