@@ -34,7 +34,7 @@ animation = true
 """
 
 WITHOUT = """
-import asyncio, os, signal, subprocess, sys  # asyncio takes sysconf, subprocess takes msvcrt for Windows
+import asyncio, os, signal, subprocess, sys  # these take sysconf, and msvcrt on Windows
 from types import SimpleNamespace
 for name in {missing}:
     sys.modules[name] = None
