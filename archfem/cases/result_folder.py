@@ -19,7 +19,7 @@ from archfem.cases.result_text import (
     compare_push,
     compare_with_site,
     describe_pushover,
-    note_massless,
+    note_masses,
 )
 from archfem.cases.run import (
     CASE_FILE,
@@ -201,7 +201,7 @@ def limit_files(case: Case, collapse: Collapse, text: str, doubts: Sequence[str]
     demand = NO_DEMAND if collapse.push else "the given load"
     if not collapse.push and collapse.outcome is Outcome.COLLAPSES:
         site = PushFactors(*collapse.range)
-    lines = [*doubts, *note_massless(collapse.live, collapse.dead)]
+    lines = [*doubts, *note_masses(case.structure, collapse.live, collapse.dead)]
     given = collapse.sentence, lines, demand, site
     stated = state_outcome("limit analysis", *given).as_file("limit")
     return {"limit.txt": text, "limit.csv": joints, "collapse.png": collapse.plot(), **stated}

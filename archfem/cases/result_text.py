@@ -42,6 +42,7 @@ from archfem.limit.rating import Rating
 from archfem.limit.thickness import minimum_thickness
 from archfem.masonry.loads import Action, Settlement, describe_massless
 from archfem.masonry.ring_thickness import Ring
+from archfem.masonry.standing import describe_carried
 from archfem.masonry.structure import (
     Structure,
     describe_spans,
@@ -224,7 +225,7 @@ def describe_dead_load(result: DeadLoadResult, *, explain: bool = False) -> str:
     if structure.heads.any():
         heads = result.dead.joints.isel(joint=structure.heads)
         lines[-1] += f"; of head joints, which do not count, {_describe_largest(heads)}"
-    lines += describe_friction_margin(result.case, structure)
+    lines += [*describe_friction_margin(result.case, structure), *note_masses(structure)]
     lines += filter(None, [structure.assessment, structure.transverse_remark])
     lines += filter(None, [defaults(result.case)])
     if result.strength_use is not None:
@@ -290,7 +291,7 @@ def describe_collapse(structure: Structure, collapse: Collapse, limit: LimitAnal
     crushing = limit.describe_crushing(structure)
     lines += filter(None, [crushing, describe_fill(limit.fill, structure)])
     lines += note_lower_crowns(structure, limit.fill)
-    lines += note_massless(collapse.live, collapse.dead)
+    lines += note_masses(structure, collapse.live, collapse.dead)
     if structure.heads.any() and collapse.outcome is Outcome.COLLAPSES:
         lines.append(
             "blocks are rigid, and elastic joints may bear less: hold a motion a tenth below"
@@ -298,11 +299,14 @@ def describe_collapse(structure: Structure, collapse: Collapse, limit: LimitAnal
     return "\n".join(lines)
 
 
-def note_massless(
-    live: Settlement | Sequence[Action | Settlement], dead: Sequence[Action]
+def note_masses(
+    structure: Structure,
+    live: Settlement | Sequence[Action | Settlement] = (),
+    dead: Sequence[Action] = (),
 ) -> list[str]:
-    """Return a note on loads that stay and are not pushed as weights are, if there are any."""
-    return [f"{NOTE_MARK}{words}"] if (words := describe_massless(live, dead)) else []
+    """Return notes on loads that are not pushed as weights are, and on masses at other heights."""
+    words = describe_massless(live, dead), describe_carried(structure)
+    return [f"{NOTE_MARK}{each}" for each in words if each]
 
 
 def tabulate_ratings(ratings: Iterable[Rating]) -> ResultTable:

@@ -275,6 +275,7 @@ def assess(options: argparse.Namespace) -> int:
     with keep_warnings():
         doubts += _compare_crushing(case, found.values())
     doubts += answers.note_band(case, found.values())
+    doubts += result_text.note_masses(case.structure)
     listed = [f"{DOUBT_MARK}{doubt}" for result in found.values() for doubt in result.doubts]
     every = [*dict.fromkeys([*doubts, *listed])]
     texts = [answers.describe_margin(found.values())]
@@ -504,7 +505,8 @@ def print_results(case: Case, found: Iterable[Result], folder: Path) -> tuple[st
                     _print_first_modes(at_rest, folder)
             elif isinstance(result, Pushover):
                 given = case.pushover
-                notes = result_text.note_massless(given.live, given.dead) if given else []
+                loads = (given.live, given.dead) if given else ()
+                notes = result_text.note_masses(case.structure, *loads)
                 print(result_text.describe_pushover(result, notes))
                 write(results.pushover_files(case, result, notes), folder)
             elif isinstance(result, Suite):

@@ -16,7 +16,7 @@ from archfem.errors import InvalidInput
 from archfem.masonry.assembly import name_joints, touching
 from archfem.masonry.block import Block, as_point
 from archfem.masonry.materials import SOIL_TO_STONE, Contact, Material
-from archfem.masonry.structure import CONTACT_TOLERANCE, Joint, Structure
+from archfem.masonry.structure import CONTACT_TOLERANCE, Joint, Structure, join_names
 from archfem.units import GPa
 
 
@@ -82,6 +82,20 @@ class StandingBody:
 def find_bodies(structure: Structure) -> list[str]:
     """Return the names of the bodies that stand on a structure."""
     return [block.name for block in structure.blocks if block.material.stands_for == block.name]
+
+
+def describe_carried(structure: Structure) -> str:
+    """Describe masses that count at the middle of blocks which stand for them; empty for none."""
+    own = {*find_bodies(structure)}
+    words = (structure.blocks[number].material.stands_for for number in structure.free)
+    carried = sorted({each for each in words if each is not None and each not in own})
+    if not carried:
+        return ""
+    return (
+        f"the mass of {join_names(carried)} counts at the middle of each block that stands for it: "
+        "where it is higher, the structure moves at less than computed; as blocks of its own, or "
+        "in an assessment as [assessment] loads, it acts at its height"
+    )
 
 
 @validate_arguments

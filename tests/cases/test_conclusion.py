@@ -362,7 +362,7 @@ def test_of_unequal_outcomes_the_worst_is_the_first(case):
     )
     assert dict(conclusion.list_facts(data))["verdict"] == f"{text} mm"
     data.verdict_ranges[0].dataset["outcome"] = "run", np.array(["stands", "dislocated"])
-    varied = "falls in none of 2 variations and is dislocated in 1"
+    varied = "falls in none of 2 variations and is dislocated in 1 under 'first'"
     assert dict(conclusion.list_facts(data))["verdict"] == f"{text} mm; {varied}"
     text = conclusion.build_conclusion(data).pieces[0].text
     assert text.startswith("The structure falls under 1 of 3 motions of PGA 0.20 g: c; it is disl")

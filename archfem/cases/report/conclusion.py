@@ -125,7 +125,7 @@ def list_facts(data: ReportData) -> list[tuple[str, str]]:
     did = ", ".join([did, *_say_movement(data)])
     ranges = [x for x in data.verdict_ranges if x.decisive.any()] if len(runs) > 1 else []
     ranges.sort(key=lambda x: (x.falls.sum(), x.dislocated.sum()))
-    others += [x.count for x in ranges[-1:]]
+    others += [f"{x.count} under '{x.dataset.attrs.get('motion')}'" for x in ranges[-1:]]
     verdict = "; ".join([did, *others, *say_fragile(data), *_say_checks(data)])
     return [*signed, ("verdict", verdict), *doubts, *blocks, *peak]
 
@@ -134,7 +134,7 @@ def _say_factors(data: ReportData) -> Iterator[str]:
     """Yield the factors of results without runs; those of checks and vehicles are said apart."""
     for result, row in _capacity_rows(data):
         said = result in (RESULTS["assessment"], RESULTS["rating"])
-        if said or (row.factor == "-" and row.demand not in (NO_DEMAND, UNCOMPARED)):
+        if said or (row.factor == "-" and row.demand != _say_uncompared(data)):
             continue
         text = f"{row.demand}: {row.outcome}" + f", factor {row.factor}" * (row.factor != "-")
         begins = result in PUSHES and row.numbers.get("site")
@@ -356,8 +356,15 @@ def _describe_margin(data: ReportData) -> Iterator[str]:
             yield from _describe_push(data, name, push) if push.site else ()
         for row in data.statements[name].rows:
             if row.factor == "-" and data.runs:  # without runs it is the answer
-                beside = UNCOMPARED if data.case.report.get("demand") else "beside no demand"
-                yield f"{row.result}, {beside}: {row.outcome}"
+                yield f"{row.result}, {_say_uncompared(data)}: {row.outcome}"
+
+
+def _say_uncompared(data: ReportData) -> str:
+    """Say with which demand a push is not compared, and why."""
+    demand = data.case.limit.demand
+    if demand is not None:
+        return f"not compared with the demand of {demand / STANDARD_GRAVITY:.3g} g"
+    return UNCOMPARED if data.case.report.get("demand") else NO_DEMAND
 
 
 def _describe_push(data: ReportData, name: str, push: PushFactors) -> Iterator[str]:
@@ -408,7 +415,8 @@ def _say_motion(data: ReportData, factor: float, site: float) -> str:
     if not any(x.mechanisms.get("verified") or x.outcome in FALLEN_STATES for x in verdicts):
         return ""
     held = all(verdict.outcome in COLLAPSE_STATES[:2] for verdict in verdicts)
-    return f"in the runs it moves{', and falls in none' * held}"
+    of = f" of up to {push:.2f} g" * (len(runs) < len(data.runs))
+    return f"in the runs{of} it moves{', and falls in none' * held}"
 
 
 def _say_vertical(data: ReportData) -> Iterator[str]:
@@ -463,7 +471,7 @@ def _capacity_rows(data: ReportData) -> Iterator[tuple[str, Row]]:
         for row in statement.rows:
             demand = f"{row.demand}{of}"
             if row.demand == NO_DEMAND:
-                demand = UNCOMPARED if data.case.report.get("demand") else NO_DEMAND
+                demand = _say_uncompared(data)
                 peaks = _describe_peaks(data.runs.values()) if data.runs else ""
                 demand += f"; beside it motions of {peaks}" * bool(peaks)
             yield RESULTS[result], row._replace(demand=demand)
