@@ -8,11 +8,11 @@ import numpy as np
 
 from archfem._display import DOUBT_MARK, NOTE_MARK
 from archfem.cases.case import Case
-from archfem.cases.result_text import PushFactors, ResultTable, format_ends
+from archfem.cases.result_text import PushFactors, ResultTable
 from archfem.dynamics.motion_scaling import CollapseScale, MechanismScales
 from archfem.limit.fill_range import FillRange
 from archfem.limit.rating import Rating
-from archfem.models.model import Doubt, read_doubts, write_doubts
+from archfem.models.model import Doubt, Ends, read_doubts, write_doubts
 from archfem.motion.hazard import DESIGN_PERIOD, MEASURES
 from archfem.motion.matching import DEFAULT_BAND
 from archfem.motion.motion import Motion
@@ -64,9 +64,8 @@ class Ratios(NamedTuple):
     @property
     def name(self) -> str:
         """Name of the check, with the direction of one that holds in one alone."""
-        return (
-            ", ".join([self.check, *self.directions]) if len(self.directions) == 1 else self.check
-        )
+        alone = self.directions if len(self.directions) == 1 else ()
+        return ", ".join([self.check, *alone])
 
     @property
     def decisive(self) -> float:
@@ -87,7 +86,7 @@ class Ratios(NamedTuple):
 
     def __str__(self) -> str:
         """Return all ratios in words."""
-        return f"{format_ends(self.least, self.most)}{self.beside}"
+        return f"{Ends((self.least, self.most)):.3g}{self.beside}"
 
 
 class Scales(NamedTuple):
@@ -223,9 +222,8 @@ def state_assessments(found: Mapping[str, KinematicAssessment], lines: Sequence[
         rows.append(Row(*row))
         sentences += [f"kinematic assessment, {ways}: {text}"] if text in last else []
     sentences.append(describe_margin(found.values()))
-    doubts, notes = (
-        [y for x in found.values() for y in getattr(x, k)] for k in ("doubts", "notes")
-    )
+    doubts = [doubt for result in found.values() for doubt in result.doubts]
+    notes = [note for result in found.values() for note in result.notes]
     return Statement(sentences, rows, doubts, notes).with_lines(lines)
 
 

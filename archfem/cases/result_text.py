@@ -51,6 +51,7 @@ from archfem.masonry.structure import (
     join_words,
     list_or_count,
 )
+from archfem.models.model import Ends
 from archfem.motion.matching import Match
 from archfem.motion.motion import Motion
 from archfem.motion.response_spectra import measure_intensity
@@ -385,10 +386,10 @@ def doubt_rating(found: Rating, limit: LimitAnalysis) -> list[str]:
         if fill.mobilisation < least:
             words = f"mobilisation {fill.mobilisation:.2g} counts as {least:.2g}, the active"
             lines.append(f"{NOTE_MARK}{words} pressure; 0 is not without pressure, which is beside")
-    structure, springs = found.structure, list[int]()
+    structure = found.structure
     lines += note_lower_crowns(structure, found.fill)
-    springs += [n for joint in structure.joints if joint.role == "ring" for n in joint.blocks]
-    if any(structure.blocks[number].fixed for number in springs):
+    rings = [joint for joint in structure.joints if joint.role == "ring"]
+    if any(structure.blocks[number].fixed for joint in rings for number in joint.blocks):
         words = 'abutments are taken as immovable: state = "free" tests them, of [structure.'
         lines.append(f"{NOTE_MARK}{words}sidewalls]")
     left_out = ["a second lorry that meets the vehicle", "all that spandrel walls carry"]
@@ -437,6 +438,11 @@ def site_acceleration(case: Case) -> float:
     """Return the ground acceleration of [limit] or the site's spectrum [g]; else NaN."""
     if case.limit.demand is not None:
         return case.limit.demand / STANDARD_GRAVITY
+    return peak_of_spectrum(case)
+
+
+def peak_of_spectrum(case: Case) -> float:
+    """Return the acceleration of the site's spectrum at period zero [g]; NaN without one."""
     spectrum = case.assessment.spectrum or case.target
     return float(spectrum.horizontal(0.0)) if spectrum is not None else np.nan
 
@@ -474,16 +480,11 @@ class PushFactors(NamedTuple):
 
     def __str__(self) -> str:
         """Return both in words."""
-        text = format_ends(self.least, self.most, digits=3 if self.site else 4)
+        text = f"{Ends((self.least, self.most)):.{3 if self.site else 4}g}"
         if self.proved is None:
             return text
         proved = f"proved ≥ {self.proved:.3g}" if self.proved else "no lower bound is known"
         return f"{text} ({proved})"
-
-
-def format_ends(least: float, most: float, digits: int = 3) -> str:
-    """Return both ends of a range of factors, or one where their texts do not differ."""
-    return " to ".join(dict.fromkeys(f"{end:.{digits}g}" for end in (least, most)))
 
 
 def compare_with_site(case: Case, found: Collapse) -> PushFactors | None:

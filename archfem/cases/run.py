@@ -12,6 +12,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from importlib.util import find_spec
+from itertools import zip_longest
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -22,7 +23,6 @@ import xarray as xr
 from archfem import _files
 from archfem._display import call_late_bound
 from archfem._netcdf import read_dataset
-from archfem._typing import Array
 from archfem._validation import validate_arguments
 from archfem.cases.case import Case
 from archfem.cases.structure_keys import read_survey
@@ -383,8 +383,10 @@ def run_time_history(
 
     def complete(dataset: xr.Dataset) -> None:
         dataset.attrs |= attrs
+        vertical = () if motion.vertical is None else motion.vertical
+        samples = [*zip_longest(motion.horizontal, vertical, fillvalue=0.0)]
         # a report measures all of the motion, which a run that falls does not follow to its end
-        dataset[MOTION_VARIABLE] = ("sample", "axis"), _tabulate_samples(motion), {"dt": motion.dt}
+        dataset[MOTION_VARIABLE] = ("sample", "axis"), samples, {"dt": motion.dt}
 
     given: Any = {} if damping is None else {"damping": damping}  # None would be undamped
     try:
@@ -397,15 +399,6 @@ def run_time_history(
         raise
     complete(run.dataset)
     return run
-
-
-def _tabulate_samples(motion: Motion) -> Array:
-    """Return both components of a motion at its own steps, zero after their ends (n, 2) [m/s²]."""
-    parts = [x for x in (motion.horizontal, motion.vertical) if x is not None]
-    samples = np.zeros((max(map(len, parts)), 2))
-    for column, part in enumerate(parts):
-        samples[: len(part), column] = part
-    return samples
 
 
 @contextmanager

@@ -84,8 +84,7 @@ def list_shapes() -> dict[str, Callable[..., Structure]]:
 
 def shape_keys(name: str) -> dict[str, Any]:
     """Return the keys of [structure] for a shape."""
-    keys = {**keys_of_part(list_shapes()[name]), "shape": str, "fill": dict}
-    keys["standing"] = dict
+    keys = {**keys_of_part(list_shapes()[name]), "shape": str, "fill": dict, "standing": dict}
     if name == "blocks":
         keys["material"] = str
         del keys["name"], keys["fill"]  # the name is that of the case

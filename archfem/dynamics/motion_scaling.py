@@ -34,7 +34,7 @@ from archfem.errors import DidNotConverge, InvalidInput
 from archfem.joints.criteria import Criteria
 from archfem.limit.mechanism_count import Mechanism
 from archfem.masonry.structure import Structure, join_names
-from archfem.models.model import Doubt, Model, log_doubts_once, merge_doubts
+from archfem.models.model import Doubt, Model, group_doubts, log_doubts_once, merge_doubts
 from archfem.motion.motion import Motion, admissible_range
 from archfem.statics.equilibrium import Equilibrium, dead_load
 from archfem.units import STANDARD_GRAVITY
@@ -298,6 +298,12 @@ def _find_tension(runs: Iterable[ScaledRun]) -> float:
     return min(doubted, default=inf)
 
 
+def _list_bounds(scales: MechanismScales, definition: str) -> list[ScaledRun]:
+    """Return the runs at both ends of a bracket."""
+    bracket = scales[definition]
+    return [run for run in scales.runs if run.scale in (bracket.lower, bracket.upper)]
+
+
 def _doubts_of_searches(
     searches: Mapping[str, MechanismScales], definition: str
 ) -> tuple[Doubt, ...]:
@@ -305,7 +311,7 @@ def _doubts_of_searches(
 
     Searches are by their settings in words. Doubts that differ in numbers alone are stated once.
     """
-    doubts, of_runs = list[Doubt](), dict[tuple[str, ...], list[tuple[Doubt, str]]]()
+    doubts, of_runs = list[Doubt](), list[Doubt]()
     for settings, scales in searches.items():
         bracket = scales[definition]
         if above := bracket.above:
@@ -319,11 +325,11 @@ def _doubts_of_searches(
             made = f"{len(scales.runs)} run{'s' * (len(scales.runs) != 1)}"
             words = f"the search was interrupted after {made}"
             doubts.append(Doubt(words, "the same command continues it", (), settings))
-        for run in scales.runs:
-            for doubt in run.doubts if run.scale in (bracket.lower, bracket.upper) else ():
-                place = f"{run.scale:#.3g} × {settings}".strip()
-                of_runs.setdefault(doubt.kind, []).append((doubt, place))
-    for same, (first, *others) in (zip(*pairs, strict=True) for pairs in of_runs.values()):
+        for run in _list_bounds(scales, definition):
+            place = f"{run.scale:#.3g} × {settings}".strip()
+            of_runs += [replace(doubt, place=place) for doubt in run.doubts]
+    for same in group_doubts(of_runs):
+        first, *others = [doubt.place for doubt in same]
         likewise = f" (likewise at {join_names(others)})" if others else ""
         doubts.append(merge_doubts(same, f"at {first}{likewise}"))
     return tuple(doubts)
@@ -682,12 +688,7 @@ def _admissible_step(searches: Mapping[float, MechanismScales]) -> float:
     """Return the step that follows sliding in all runs that bound a fall [s]; infinite if any."""
     if any(search.interrupted for search in searches.values()):
         return inf  # it ends here
-    bounds = [
-        run
-        for search in searches.values()
-        for run in search.runs
-        if run.scale in (search[COLLAPSE_DEFINITION].lower, search[COLLAPSE_DEFINITION].upper)
-    ]
+    bounds = (run for each in searches.values() for run in _list_bounds(each, COLLAPSE_DEFINITION))
     return max(LEAST_STEP, min((run.admissible_step for run in bounds), default=inf))
 
 

@@ -186,6 +186,12 @@ class Doubt:
 class Ends(tuple[float, ...]):
     """Least and largest of a number, which have one format; "mm" is that of lengths [m]."""
 
+    @classmethod
+    def of(cls, numbers: Iterable[float]) -> Self:
+        """Return the ends of some numbers."""
+        known = [*numbers]
+        return cls((min(known), max(known)))
+
     def __format__(self, spec: str) -> str:
         """Return both ends, or one where their texts do not differ."""
         if spec == "mm":
@@ -197,6 +203,14 @@ class Ends(tuple[float, ...]):
 def list_ends(value: Any) -> tuple[float, ...]:
     """Return the ends of a range, or a number alone."""
     return value if isinstance(value, tuple) else (value,)
+
+
+def group_doubts(doubts: Iterable[Doubt]) -> Iterable[list[Doubt]]:
+    """Return doubts in groups that differ in numbers alone."""
+    found: dict[tuple[str, ...], list[Doubt]] = {}
+    for doubt in doubts:
+        found.setdefault(doubt.kind, []).append(doubt)
+    return found.values()
 
 
 def merge_doubts(doubts: Sequence[Doubt], place: str = "") -> Doubt:

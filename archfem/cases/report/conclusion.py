@@ -16,7 +16,6 @@ from archfem.cases.case import REPORT_KEYS
 from archfem.cases.report.doubts import (
     HISTORIES,
     VARIATIONS,
-    describe_transverse,
     list_checks,
     list_decisive_doubts,
     list_doubts,
@@ -24,21 +23,16 @@ from archfem.cases.report.doubts import (
     list_notes,
     list_unvaried,
     peak_of_ground,
-    peak_of_spectrum,
     read_spectrum,
     weigh,
 )
 from archfem.cases.report.report_data import SHOWN_RESULTS, ReportData
 from archfem.cases.report.scales import describe_scales, say_first_failure, say_fragile
 from archfem.cases.report.study_findings import read_study, say_what_changes
-from archfem.cases.result_text import PushFactors, format_ends, site_acceleration
+from archfem.cases.result_text import PushFactors, peak_of_spectrum, site_acceleration
 from archfem.dynamics.collapse_state import COLLAPSE_STATES, FALLEN_STATES, CollapseState
 from archfem.dynamics.history import History
-from archfem.dynamics.verdict_range import (
-    HALF_STEP,
-    UNVARIED,
-    VerdictRange,
-)
+from archfem.dynamics.verdict_range import HALF_STEP, UNVARIED, VerdictRange
 from archfem.masonry.structure import Structure, join_names, join_words
 from archfem.models.model import Doubt, Ends
 from archfem.units import STANDARD_GRAVITY, format_mm
@@ -161,7 +155,7 @@ def _say_movement(data: ReportData) -> Iterator[str]:
     verdicts = [run.verdict for run in data.runs.values()]
     sizes = [x.displacement for x in verdicts if x.outcome in COLLAPSE_STATES[:2]]
     if sizes and np.isfinite(sizes).all():
-        yield f"moves by {Ends((min(sizes), max(sizes))):mm}"
+        yield f"moves by {Ends.of(sizes):mm}"
     yield from say_first_failure(data)
 
 
@@ -169,7 +163,7 @@ def _say_checks(data: ReportData) -> Iterator[str]:
     """Yield whether the checks of an assessment are met, and by how much."""
     for check in list_checks(data):
         ratios = [x for x in (check.least, check.most, check.moved, check.bodies) if x is not None]
-        met, by = "is met", f"{format_ends(min(ratios), max(ratios))} × the spectrum"
+        met, by = "is met", f"{Ends.of(ratios):.3g} × the spectrum"
         if check.needed:
             met = "is not met under some assumptions on the fill"
         elif check.least < 1.0:
@@ -177,7 +171,7 @@ def _say_checks(data: ReportData) -> Iterator[str]:
         elif check.by_split:
             met = "is met or not by the split of weights"
         elif check.moved is not None:
-            moves = _say_motion(data, check.least, peak_of_spectrum(data))
+            moves = _say_motion(data, check.least, peak_of_spectrum(data.case))
             met = "is met at rest" + " alone, and it moves" * bool(moves)
             by = f"{check.moved:.3g} by displacements"
         kind = "check" if check.linear else "displacement check"
@@ -186,8 +180,7 @@ def _say_checks(data: ReportData) -> Iterator[str]:
 
 def _describe_peaks(runs: Iterable[History]) -> str:
     """Return the least and the largest peak acceleration of some runs."""
-    peaks = sorted(map(peak_of_ground, runs))
-    return f"PGA {' to '.join(dict.fromkeys(f'{peaks[k]:.2f}' for k in (0, -1)))} g"
+    return f"PGA {Ends.of(map(peak_of_ground, runs)):.2f} g"
 
 
 def summarise_outcomes(data: ReportData, runs: Sequence[History]) -> str:
@@ -249,10 +242,16 @@ def build_conclusion(data: ReportData) -> Section:
 
 
 def _build_transverse(data: ReportData) -> list[TextBlock]:
-    """Build the paragraph on what is not checked across the plane."""
-    text, overturns = describe_transverse(data)
-    manner = "doubt" if overturns else "plain"
-    return [TextBlock(sentence(text), manner, lead="Across its plane?")] if text else []
+    """Build the paragraph on what is not checked across the plane, for results of earthquakes."""
+    if not data.runs and not data.statements.keys() - {"rating", "thickness"}:
+        return []
+    text, (push, _) = data.case.structure.transverse_remark, data.case.structure.transverse_push
+    peaks = [*map(peak_of_ground, data.runs.values()), site_acceleration(data.case)]
+    demand, manner = max((peak for peak in peaks if np.isfinite(peak)), default=0.0), "plain"
+    if push < demand:
+        text += f"; the demand of {demand:.3g} g is {demand / push:.2g} times that"
+        manner = "doubt"
+    return [TextBlock(sentence(text), manner, lead="Across its plane?")]
 
 
 def _list_outdated(data: ReportData) -> Iterator[str]:
@@ -351,7 +350,7 @@ def _describe_margin(data: ReportData) -> Iterator[str]:
     for k, (_, (first, *others)) in enumerate(sorted(margins)):
         rank = ("the least margin is", "the next is", "then follows")[min(k, 2)]
         yield from [f"{rank} {first}", *others]
-    for name in filter({"limit", "pushover"}.__contains__, data.statements):
+    for name in (x for x in ("limit", "pushover") if x in data.statements):
         for push in read_numbers(PushFactors, data.statements[name]):
             yield from _describe_push(data, name, push) if push.site else ()
         for row in data.statements[name].rows:
@@ -386,17 +385,15 @@ def _describe_push(data: ReportData, name: str, push: PushFactors) -> Iterator[s
 def _describe_check(data: ReportData, check: Ratios) -> tuple[float, list[str]]:
     """Return the ratio of a check of an assessment, and its sentences."""
     over = " over what is assumed of the fill" * (check.most > check.least)
-    by, moves = (
-        f"on {name_spectrum(data)}, by {check.name}",
-        _say_motion(data, check.least, peak_of_spectrum(data)),
-    )
+    by = f"on {name_spectrum(data)}, by {check.name}"
+    moves = _say_motion(data, check.least, peak_of_spectrum(data.case))
     if check.moved is not None and moves:  # what moves at less than the push that begins it is
         begins = f"the check passes for what is at rest, and {moves}"  # judged by how far
         return check.moved, [f"{check.moved:.3g} by displacements, {by}", begins]
     fails = f", passed only with {check.needed}" if check.needed else ""
     fails = fails or ", which it fails" * (check.least < 1.0)
     fails = fails or ", which it fails with one weight a body" * check.by_split
-    ends = format_ends(check.least, check.most)
+    ends = f"{Ends((check.least, check.most)):.3g}"
     texts = [f"{ends}{over}{check.beside}, {by}{fails}"]
     if check.moved is not None:
         texts.append(f"{ends} times the spectrum begins to move it")
@@ -434,7 +431,7 @@ def name_spectrum(data: ReportData) -> str:
     code = read_spectrum(data).get("code")
     if code is None:
         return "the spectrum of the motion"
-    return f"the {code} spectrum of PGA {peak_of_spectrum(data):.3g} g"
+    return f"the {code} spectrum of PGA {peak_of_spectrum(data.case):.3g} g"
 
 
 def _build_signatures(report: Mapping[str, str]) -> Grid:
@@ -480,17 +477,17 @@ def _capacity_rows(data: ReportData) -> Iterator[tuple[str, Row]]:
 def _list_ranges_of_steps(data: ReportData) -> Iterator[str]:
     """Yield how far a motion displaces the structure by the steps of its run and variations."""
     for found in data.verdict_ranges:
-        motion = found.dataset.attrs.get("motion")
+        motion = found.dataset.attrs.get("motion", "")
         sizes = [
             each.displacement
             for each in found.single_changes
             if each.name in (UNVARIED, HALF_STEP) and each.outcome in COLLAPSE_STATES[:2]
         ]
-        runs = [run.verdict for run in data.runs.values() if run.dataset.attrs["motion"] == motion]
-        if sizes and runs and runs[0].outcome in COLLAPSE_STATES[:2]:
-            sizes.append(runs[0].displacement)
+        run = data.runs.get(motion)
+        if sizes and run and run.verdict.outcome in COLLAPSE_STATES[:2]:
+            sizes.append(run.verdict.displacement)
             under = f" under '{motion}'" * (len(data.runs) > 1)
-            yield f"{Ends((min(sizes), max(sizes))):mm}{under}"
+            yield f"{Ends.of(sizes):mm}{under}"
 
 
 def _describe_outcomes(data: ReportData) -> Iterator[str]:
@@ -533,8 +530,7 @@ def describe_mechanism(verdict: Any) -> str:
 def describe_lost(structure: Structure, falls: Sequence[CollapseState]) -> str:
     """Return the number of lost blocks, the time of the first, and of one fall which they are."""
     counts, times = [len(fall.blocks) for fall in falls], [fall.time or 0.0 for fall in falls]
-    ends = (Ends((min(each), max(each))) for each in (counts, times))
-    text = "{} blocks, the first at {:.2f} s".format(*ends)
+    text = f"{Ends.of(counts)} blocks, the first at {Ends.of(times):.2f} s"
     return text if len(falls) > 1 else f"{text}: {list_lost(structure, falls[0].blocks)}"
 
 

@@ -10,13 +10,13 @@ from archfem.cases.answers import RESULTS, Ratios, read_numbers
 from archfem.cases.report.motion_rules import note_checks
 from archfem.cases.report.report_data import ReportData
 from archfem.cases.report.study_findings import list_studied, read_study
-from archfem.cases.result_text import site_acceleration
+from archfem.cases.result_text import peak_of_spectrum
 from archfem.dynamics.collapse_state import COLLAPSE_STATES, FALLEN_STATES, RANGE_REMEDY
 from archfem.dynamics.history import History
 from archfem.dynamics.verdict_range import MAX_RATIO_OF_DISPLACEMENTS, VerdictRange
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import join_words
-from archfem.models.model import Doubt, merge_doubts
+from archfem.models.model import Doubt, group_doubts, merge_doubts
 from archfem.statics.assessment_checks import UPPER_BOUND
 from archfem.units import STANDARD_GRAVITY
 
@@ -54,24 +54,16 @@ def list_doubts(data: ReportData) -> list[tuple[str, Doubt]]:
 def _merge_runs(data: ReportData) -> Iterator[Doubt]:
     """Yield each kind of doubt of the runs once, with how many of several runs have it."""
     verdicts = [run.verdict for run in data.runs.values()]
-    for same in group_kinds(x for each in verdicts for x in each.doubts):
+    for same in group_doubts(x for each in verdicts for x in each.doubts):
         count = sum(any(doubt in same for doubt in each.doubts) for each in verdicts)
         yield merge_doubts(same, f"{count} of {len(verdicts)} runs" * (len(verdicts) > 1))
 
 
 def _merge_motions(doubts: Iterable[Doubt]) -> Iterator[Doubt]:
     """Yield each kind of doubt once, under all of its motions, which are the places of some."""
-    for same in group_kinds(doubts):
+    for same in group_doubts(doubts):
         motions = dict.fromkeys(f"'{doubt.place}'" for doubt in same if doubt.place)
         yield merge_doubts(same, f"under {join_words([*motions])}" * bool(motions))
-
-
-def group_kinds(doubts: Iterable[Doubt]) -> Iterable[list[Doubt]]:
-    """Return doubts in groups that differ in numbers alone."""
-    found: dict[tuple[str, ...], list[Doubt]] = {}
-    for doubt in doubts:
-        found.setdefault(doubt.kind, []).append(doubt)
-    return found.values()
 
 
 def list_checks(data: ReportData) -> list[Ratios]:
@@ -99,22 +91,21 @@ def weigh(doubt: Doubt) -> bool:
 
 def _doubt_displacement(data: ReportData, found: VerdictRange) -> Iterator[Doubt]:
     """Yield how the unvaried run of the variations differs from the run under that motion."""
-    motion, base = found.dataset.attrs.get("motion"), found.dataset.isel(run=0)
-    if not motion or base["sampled"] or base["error"].item():
+    run, base = data.runs.get(found.dataset.attrs.get("motion", "")), found.dataset.isel(run=0)
+    if run is None or base["sampled"] or base["error"].item():
         return
-    for run in data.runs.values():
-        verdict = run.verdict
-        if run.dataset.attrs.get("motion") != motion or verdict.outcome not in COLLAPSE_STATES:
-            continue
-        sizes = verdict.displacement, float(base["displacement"])
-        fallen = [each in FALLEN_STATES for each in (verdict.outcome, base["outcome"].item())]
-        own, other = ("falls" if falls else "is displaced by up to {:mm}" for falls in fallen)
-        if fallen[0] != fallen[1] or (
-            not fallen[0] and max(sizes) > MAX_RATIO_OF_DISPLACEMENTS * min(sizes)
-        ):
-            held = (size for size, falls in zip(sizes, fallen, strict=True) if not falls)
-            words = f"the run {own}; unvaried, with another time step or fidelity, it {other}"
-            yield Doubt(words, RANGE_REMEDY, tuple(held))
+    verdict = run.verdict
+    if verdict.outcome not in COLLAPSE_STATES:
+        return
+    sizes = verdict.displacement, float(base["displacement"])
+    fallen = [each in FALLEN_STATES for each in (verdict.outcome, base["outcome"].item())]
+    own, other = ("falls" if falls else "is displaced by up to {:mm}" for falls in fallen)
+    if fallen[0] != fallen[1] or (
+        not fallen[0] and max(sizes) > MAX_RATIO_OF_DISPLACEMENTS * min(sizes)
+    ):
+        held = (size for size, falls in zip(sizes, fallen, strict=True) if not falls)
+        words = f"the run {own}; unvaried, with another time step or fidelity, it {other}"
+        yield Doubt(words, RANGE_REMEDY, tuple(held))
 
 
 def list_notes(data: ReportData) -> dict[str, list[str]]:
@@ -123,33 +114,13 @@ def list_notes(data: ReportData) -> dict[str, list[str]]:
     notes |= {HISTORIES: missed} if (missed := note_checks(data)) else {}
     peaks = [peak_of_ground(run) for run in data.runs.values()]
     if peaks and "assessment" in data.statements:
-        mean, other = np.mean(peaks), peak_of_spectrum(data)
+        mean, other = np.mean(peaks), peak_of_spectrum(data.case)
         if abs(np.log(mean / other)) > np.log(MAX_RATIO_OF_PEAKS):
             notes.setdefault(RESULTS["assessment"], []).append(
                 f"the spectrum has a PGA of {other:.3g} g, and the motions have {mean:.3g} g: the "
                 "margin is not one on the demand of the time histories"
             )
     return notes
-
-
-def describe_transverse(data: ReportData) -> tuple[str, bool]:
-    """Say what is not checked across the plane, and whether the demand overturns it there.
-
-    It is empty where no result is of an earthquake.
-    """
-    structure = data.case.structure
-    if not data.runs and not data.statements.keys() - {"rating", "thickness"}:
-        return "", False
-    peaks = [*map(peak_of_ground, data.runs.values()), site_acceleration(data.case)]
-    known = [peak for peak in peaks if np.isfinite(peak)]
-    push, _ = structure.transverse_push
-    if not known or not push < max(known):
-        return structure.transverse_remark, False
-    times = max(known) / push
-    text = (
-        f"{structure.transverse_remark}; the demand of {max(known):.3g} g is {times:.2g} times that"
-    )
-    return text, True
 
 
 def list_elastic_fill(data: ReportData) -> list[str]:
@@ -190,12 +161,6 @@ def peak_of_ground(run: History) -> float:
     # Files of older versions have the acceleration at their steps alone.
     recorded = np.abs(run.dataset["ground"].values[:, 0]).max()
     return float(run.dataset.attrs.get("pga", recorded)) / STANDARD_GRAVITY
-
-
-def peak_of_spectrum(data: ReportData) -> float:
-    """Return the spectral acceleration of the assessment's demand at period zero [g]."""
-    spectrum = data.case.assessment.spectrum or data.case.target
-    return float(spectrum.horizontal(0.0)) if spectrum is not None else np.nan
 
 
 def read_spectrum(data: ReportData) -> Mapping[str, Any]:

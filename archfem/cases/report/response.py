@@ -16,14 +16,13 @@ from archfem.cases.report.conclusion import (
     sentence,
     summarise_outcomes,
 )
-from archfem.cases.report.doubts import group_kinds
 from archfem.cases.report.motion_rules import tabulate_checks
 from archfem.cases.report.report_data import ReportData, build_player
 from archfem.dynamics.collapse_state import FALLEN_STATES
 from archfem.dynamics.history import History
 from archfem.masonry.joint_closing import describe_closing
 from archfem.masonry.structure import Structure, join_names, join_words
-from archfem.models.model import merge_doubts
+from archfem.models.model import group_doubts, merge_doubts
 from archfem.motion.matching import DEFAULT_BAND
 from archfem.motion.motion import Motion
 from archfem.motion.suite import Suite
@@ -241,7 +240,7 @@ def _build_suite_response(data: ReportData) -> list[Any]:
     own = {name: run.verdict.doubts for name, run in data.runs.items()}
     doubts = [
         (merge_doubts(same).cause, join_words([name for name in own if {*own[name]} & {*same}]))
-        for same in group_kinds(doubt for each in own.values() for doubt in each)
+        for same in group_doubts(doubt for each in own.values() for doubt in each)
     ]
     if doubts:
         tables.append(Grid(("in doubt", "runs"), doubts, "Doubts of the runs", "words"))

@@ -8,7 +8,6 @@ from archfem.cases.answers import Scales, read_numbers
 from archfem.cases.report.doubts import peak_of_ground
 from archfem.cases.report.report_data import ReportData
 from archfem.dynamics.collapse_state import COLLAPSE_STATES
-from archfem.dynamics.history import History
 from archfem.dynamics.monitor import PULLED
 from archfem.dynamics.motion_scaling import UNFINISHED
 from archfem.masonry.structure import join_words
@@ -37,17 +36,12 @@ def list_scales(data: ReportData) -> list[Scales]:
     return read_numbers(Scales, data.statements.get("scale"))
 
 
-def _name_runs(data: ReportData) -> dict[str, History]:
-    """Return the runs by the names of their motions."""
-    return {str(run.dataset.attrs.get("motion", k)): run for k, run in data.runs.items()}
-
-
 def _list_unscaled(data: ReportData) -> dict[str, tuple[str, float]]:
     """Return state and peak [g] of failures under motions that are not scaled as others are."""
     scaled = {each.motion for each in list_scales(data)}
-    runs = {name: run for name, run in _name_runs(data).items() if scaled and name not in scaled}
-    states = {name: _FAILURES.get(run.verdict.outcome) for name, run in runs.items()}
-    return {name: (x, peak_of_ground(runs[name])) for name, x in states.items() if x is not None}
+    runs = {name: run for name, run in data.runs.items() if scaled and name not in scaled}
+    failed = {name: run for name, run in runs.items() if run.verdict.outcome in _FAILURES}
+    return {name: (_FAILURES[x.verdict.outcome], peak_of_ground(x)) for name, x in failed.items()}
 
 
 def say_first_failure(data: ReportData) -> Iterator[str]:
@@ -62,24 +56,23 @@ def say_first_failure(data: ReportData) -> Iterator[str]:
         scales += [x.states[by_all] for x in searches if by_all in x.states]
         if not first or min(scales) >= least:  # a dislocation beyond a fall says nothing
             continue
-        least, ends = min(scales), Ends((min(scales), max(scales)))
+        least, ends = min(scales), Ends.of(scales)
         name = min(first, key=lambda motion: first[motion][0])
-        peaks = sorted(scale * peak for scale, peak in first.values())
         over = " and ".join(["motions"] * several + ["time steps"])
         notes = ["or less"] * (name in unscaled)
         notes += [f"{ends:#.3g} × over {over}"] * (f"{ends[0]:#.3g}" != f"{ends[1]:#.3g}")
         notes += [UNFINISHED] * any(x.unfinished for x in searches)
         motion = f"'{name}'" if several else "the motion"
-        peak = f"{Ends((peaks[0], peaks[-1])):.3g} g"
+        peak = f"{Ends.of(scale * peak for scale, peak in first.values()):.3g} g"
         beside = f" ({', '.join(notes)})" * bool(notes)
         yield f"{_STATES[state][1]} at {least:#.3g} × {motion}, {peak}{beside}"
 
 
 def say_fragile(data: ReportData) -> Iterator[str]:
     """Yield a sentence on each motion that it withstands, and at a smaller scale does not."""
-    runs = _name_runs(data)
     for search in list_scales(data):
-        outcome = runs[search.motion].verdict.outcome if search.motion in runs else ""
+        run = data.runs.get(search.motion)
+        outcome = run.verdict.outcome if run else ""
         weaker = [
             (search.states[state], _STATES[state][0])
             for state in ("falls", "dislocated")
