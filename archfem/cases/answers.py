@@ -218,8 +218,7 @@ def state_assessments(found: Mapping[str, KinematicAssessment], lines: Sequence[
             outcome += ", for the mechanism does not begin to move"
         demand, capacity = (f"{x:.4g} {check.unit}" for x in (check.demand, check.capacity))
         name, numbers = f"assessment: {check.name}, {ways}", ratios._replace(directions=directions)
-        row = name, demand, f"{capacity}, {outcome}", str(ratios), numbers._asdict()
-        rows.append(Row(*row))
+        rows.append(Row(name, demand, f"{capacity}, {outcome}", str(ratios), numbers._asdict()))
         sentences += [f"kinematic assessment, {ways}: {text}"] if text in last else []
     sentences.append(describe_margin(found.values()))
     doubts = [doubt for result in found.values() for doubt in result.doubts]

@@ -479,7 +479,7 @@ class PushFactors(NamedTuple):
     proved: float | None = None  # bound from below, where a search may have missed the least
 
     def __str__(self) -> str:
-        """Return both in words."""
+        """Return both factors in words, and the bound from below where the search has one."""
         text = f"{Ends((self.least, self.most)):.{3 if self.site else 4}g}"
         if self.proved is None:
             return text

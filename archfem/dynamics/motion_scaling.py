@@ -143,7 +143,7 @@ class MechanismScales:
         return _say_bracket("no mechanism", self, met)
 
     def __repr__(self) -> str:
-        """Return this in one line."""
+        """Return the sentence."""
         return self.sentence
 
     @property
@@ -472,7 +472,7 @@ class CollapseScale:
         return _say_bracket("stands", self, met) + describe_first_fall(self.as_one)
 
     def __repr__(self) -> str:
-        """Return this, how closely scales were run, and what was varied."""
+        """Return the sentence, how closely scales were run, and what was varied."""
         steps = join_names([f"{1e3 * dt:g}" for dt in sorted(self._every, reverse=True)])
         varied = f"; varied were the scale and the time step ({steps} ms), and no property"
         return f"{self.sentence}{self._say_tested()}{varied}"

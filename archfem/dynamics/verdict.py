@@ -94,7 +94,7 @@ class Verdict:
 
     @property
     def brief(self) -> str:
-        """The same without lost blocks, and without saying that there is no range."""
+        """Outcome and number of doubts, without lost blocks and the remark on a range."""
         fall = self.fall and replace(self.fall, time=None)
         return self._add_doubts(fall.text if fall else self._outcome_text)
 

@@ -161,7 +161,7 @@ class VerdictRange(ResultDisplay):
 
     @property
     def displacements(self) -> str:
-        """This with its subject, and how many of these runs hardly move."""
+        """Range of the largest displacements, with the number of runs that hardly move."""
         if not self.displacement_ends:
             return ""
         text, rows = f"largest displacements {self.displacement_ends}", self.answers

@@ -70,13 +70,12 @@ class StandingBody:
                 "m: leave it out"
             )
         bottom, height = max(tops), 2.0 * self.centre_of_gravity
-        left, right = self.x - 0.5 * self.length, self.x + 0.5 * self.length
-        corners = [(left, bottom), (right, bottom), (right, bottom + height)]
-        corners.append((left, bottom + height))
+        left, right, top = self.x - 0.5 * self.length, self.x + 0.5 * self.length, bottom + height
+        corners = (left, bottom), (right, bottom), (right, top), (left, top)
         unit_weight = self.weight / (self.length * height * width)
-        words = self.name, self.name  # it stands for itself, at any weight
-        material = Material(30.0 * GPa, 0.2, unit_weight, None, *words)
-        return Block(tuple(corners), material, self.name, part=self.name, role="other")
+        # it stands for itself, at any weight
+        material = Material(30.0 * GPa, 0.2, unit_weight, None, self.name, stands_for=self.name)
+        return Block(corners, material, self.name, part=self.name, role="other")
 
 
 def find_bodies(structure: Structure) -> list[str]:

@@ -24,13 +24,17 @@ from archfem.cases.report.doubts import (
     list_unvaried,
     peak_of_ground,
     read_spectrum,
-    weigh,
 )
 from archfem.cases.report.report_data import SHOWN_RESULTS, ReportData
 from archfem.cases.report.scales import describe_scales, say_first_failure, say_fragile
 from archfem.cases.report.study_findings import read_study, say_what_changes
 from archfem.cases.result_text import PushFactors, peak_of_spectrum, site_acceleration
-from archfem.dynamics.collapse_state import COLLAPSE_STATES, FALLEN_STATES, CollapseState
+from archfem.dynamics.collapse_state import (
+    COLLAPSE_STATES,
+    FALLEN_STATES,
+    RANGE_REMEDY,
+    CollapseState,
+)
 from archfem.dynamics.history import History
 from archfem.dynamics.verdict_range import HALF_STEP, UNVARIED, VerdictRange
 from archfem.masonry.structure import Structure, join_names, join_words
@@ -71,9 +75,6 @@ SECTIONS = {
 
 # Fidelity of the variations of a verdict
 VARIED_FIDELITY = "rigid"
-
-# Results that may be of a push
-PUSHES = RESULTS["limit"], RESULTS["pushover"]
 
 # Vehicles that the head of a report names one by one
 MAX_VEHICLES = 3
@@ -131,8 +132,8 @@ def _say_factors(data: ReportData) -> Iterator[str]:
         if said or (row.factor == "-" and row.demand != _say_uncompared(data)):
             continue
         text = f"{row.demand}: {row.outcome}" + f", factor {row.factor}" * (row.factor != "-")
-        begins = result in PUSHES and row.numbers.get("site")
-        yield f"a push begins to move it at {row.factor} times {row.demand}" if begins else text
+        is_push = row.numbers.get("site")
+        yield f"a push begins to move it at {row.factor} times {row.demand}" if is_push else text
 
 
 def _list_ratings(data: ReportData) -> Iterator[tuple[str, str]]:
@@ -226,7 +227,8 @@ def build_conclusion(data: ReportData) -> Section:
         blocks += [TextBlock(each, lead=lead * (k == 0)) for k, each in enumerate(sentences)]
     blocks += _build_transverse(data)
     for result in filter(doubts.get, doubtful):
-        ordered = sorted(doubts[result], key=weigh)
+        # those that a range answers are of the outcome
+        ordered = sorted(doubts[result], key=lambda x: not x.remedy.startswith(RANGE_REMEDY))
         shown = [sentence(str(replace(x, remedy=""))) for x in ordered[:MAX_DOUBTS]]
         if more := len(doubts[result]) - len(shown):
             shown.append(f"{more} more: see section '{SECTIONS[result]}'.")

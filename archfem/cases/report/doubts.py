@@ -84,11 +84,6 @@ def list_decisive_doubts(data: ReportData, doubts: Iterable[tuple[str, Doubt]]) 
     return list(dict.fromkeys(listed))
 
 
-def weigh(doubt: Doubt) -> bool:
-    """Return the place of a doubt among others: those that a range answers are of the outcome."""
-    return not doubt.remedy.startswith(RANGE_REMEDY)
-
-
 def _doubt_displacement(data: ReportData, found: VerdictRange) -> Iterator[Doubt]:
     """Yield how the unvaried run of the variations differs from the run under that motion."""
     run, base = data.runs.get(found.dataset.attrs.get("motion", "")), found.dataset.isel(run=0)
