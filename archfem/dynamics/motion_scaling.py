@@ -24,7 +24,7 @@ from archfem.dynamics.fall import state_rigid_falls
 from archfem.dynamics.history import Ending, History, first_mechanisms, partial_history
 from archfem.dynamics.monitor import FILL_TENSION, PULLED
 from archfem.dynamics.recorder import Record
-from archfem.dynamics.rocking_body import describe_first_fall, find_first_fall
+from archfem.dynamics.rocking_body import FirstFall, describe_first_fall, find_first_fall
 from archfem.dynamics.schemes import EffectiveDamping, Viscous
 from archfem.dynamics.solvers.integrator import Stepper
 from archfem.dynamics.time_history import time_history
@@ -442,15 +442,14 @@ class CollapseScale:
         pga: peak of the motion [m/s²].
         of_model: doubts that concern every run, whatever its scale.
         longer: runs made before, with steps too long for sliding; no bound rests on them.
-        as_one: smallest scale at which a stack falls as one rigid body, infinite for none; None of
-            other structures [-].
+        as_one: first fall of a stack as one rigid body; None of other structures.
     """
 
     searches: dict[float, MechanismScales]
     pga: float | None = None
     of_model: tuple[Doubt, ...] = ()
     longer: dict[float, MechanismScales] = field(default_factory=dict)
-    as_one: float | None = None
+    as_one: FirstFall | None = None
 
     @property
     def sentence(self) -> str:
@@ -577,7 +576,7 @@ class CollapseScale:
         scales = {state: at for state, at in scales.items() if at <= max(self._stood)}
         scales |= {"dislocated": self.dislocated, "falls": self._least_fall}
         scales["falls by all steps"] = self.upper
-        scales["falls as one"] = inf if self.as_one is None else self.as_one
+        scales["falls as one"] = inf if self.as_one is None else self.as_one.scale
         if self.moves == min((run.scale for run in self._runs), default=inf):
             scales["moves in all"] = self.moves  # and maybe at smaller ones
         return {state: scale for state, scale in scales.items() if scale < inf}

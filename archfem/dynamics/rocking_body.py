@@ -14,11 +14,12 @@ References:
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from math import cos, hypot, inf, isfinite, log, pi, sin
+from math import hypot, inf, isfinite, log, pi
 from typing import NamedTuple
 
 import numpy as np
 
+from archfem._typing import Array
 from archfem.dynamics.collapse_state import (
     DISLOCATION,
     FALLEN_STATES,
@@ -36,8 +37,8 @@ from archfem.motion.motion import Motion
 # least pulses that overturn a block are those of exact integration to 0.1 %
 STEP, REST = 1e-3, 20.0
 
-# Ratio of scales that are run for the first fall [-]
-SCALE_RATIO = 1.05
+# Largest ratio of scales that are run for the first fall: between them a body may fall or stand [-]
+SCALE_RATIO = 1.01
 
 # Rotation from which a body is lost, as any block [rad]
 LOST = pi / 4.0
@@ -48,6 +49,13 @@ class Rocking(NamedTuple):
 
     time: float  # of its fall; infinite where it stands [s]
     displacement: float  # the largest of a corner [m]
+
+
+class FirstFall(NamedTuple):
+    """Smallest multiple of a motion at which a body falls, of some within 1 % of each other."""
+
+    scale: float  # infinite where it falls at none [-]
+    again: tuple[float, float] | None  # least and largest beyond, at which it stands [-]
 
 
 @dataclass(frozen=True)
@@ -75,80 +83,89 @@ class RockingBody:
 
     def rock(self, motion: Motion, scale: float = 1.0) -> Rocking | None:
         """Return the response to a multiple of a motion; None if the body slides."""
-        steps = int((motion.duration + REST) / STEP)
-        ground = scale * motion.at(STEP * (np.arange(steps) + 0.5)) + (0.0, self.gravity)
-        shaken = np.flatnonzero(np.any(ground != (0.0, self.gravity), axis=1)).max(initial=0)
-        angle, speed, farthest, side = 0.0, 0.0, 0.0, 0
-        for k, (across, up) in enumerate(ground.tolist()):
-            is_still = angle == speed == 0.0
-            if is_still:
-                if k > shaken:
-                    break
-                x, y = self.arms[1]
-                side = int(y * across > x * up)  # about the left end, or else the right one
-            turn = self._accelerate((angle, speed, side), across, up)
-            if turn is None:
-                return None
-            if turn or not is_still:
-                angle, speed, side = self._advance(angle, speed, side, turn)
-                farthest = max(farthest, 2.0 * self.reach[side] * sin(0.5 * abs(angle)))
-                if abs(angle) > LOST:
-                    return Rocking(STEP * (k + 1), farthest)
-        return Rocking(inf, farthest)
+        (time,), (displacement,), (slides,) = self.rock_scaled(motion, np.array([scale]))
+        return None if slides else Rocking(float(time), float(displacement))
+
+    def rock_scaled(self, motion: Motion, scales: Array) -> tuple[Array, Array, Array]:
+        """Return times of fall, displacements, and what slides, by multiples of a motion (k,)."""
+        ground = motion.at(STEP * (np.arange(int((motion.duration + REST) / STEP)) + 0.5))
+        shaken = np.flatnonzero(ground.any(axis=1)).max(initial=0)
+        times, farthest = np.full(scales.shape, inf), np.zeros(scales.shape)
+        slides, side = np.zeros(scales.shape, bool), np.zeros(scales.shape, int)
+        # angles of bodies that have fallen or slid are not a number
+        angle, speed, (x, y) = np.zeros(scales.shape), np.zeros(scales.shape), self.arms[1]
+        for k, (along, upward) in enumerate(ground.tolist()):
+            across, up = along * scales, upward * scales + self.gravity
+            still = (angle == 0.0) & (speed == 0.0)
+            if k > shaken and (still | np.isnan(angle)).all():
+                break
+            # about the left end, or else the right one
+            side = np.where(still, y * across > x * up, side)
+            turn, slipping = self._accelerate((angle, speed, side), across, up)
+            slides |= slipping
+            angle[slipping] = np.nan
+            angle, speed, side = self._advance(angle, speed, side, turn)
+            far = 2.0 * np.array(self.reach)[side] * np.sin(0.5 * np.abs(angle))
+            farthest = np.fmax(farthest, far)
+            lost = np.abs(angle) > LOST
+            times[lost], angle[lost] = STEP * (k + 1), np.nan
+        return times, farthest, slides
 
     def _accelerate(
-        self, state: tuple[float, float, int], across: float, up: float
-    ) -> float | None:
-        """Return θ'' under accelerations of ground and weight; None if the body slides or lifts."""
+        self, state: tuple[Array, Array, Array], across: Array, up: Array
+    ) -> tuple[Array, Array]:
+        """Return θ'' under accelerations of ground and weight, and what slides or lifts."""
         angle, speed, side = state
-        x, y = self.arms[side]
-        c, s = cos(angle), sin(angle)
+        x, y = np.array(self.arms)[side].T
+        c, s = np.cos(angle), np.sin(angle)
         x, y = x * c - y * s, x * s + y * c
         turn = (y * across - x * up) / (self.inertia + x * x + y * y)
-        if angle == speed == 0.0 and turn * (2 * side - 1) <= 0.0:
-            turn = 0.0
+        turn[(angle == 0.0) & (speed == 0.0) & (turn * (2 * side - 1) <= 0.0)] = 0.0
         # the force on the foot, over the mass, along it and normal to it
         force = across - y * turn - x * speed**2, up + x * turn - y * speed**2
         along = force[0] * self.foot[0] + force[1] * self.foot[1]
         normal = force[1] * self.foot[0] - force[0] * self.foot[1]
-        return turn if abs(along) <= self.friction * normal else None
+        return turn, np.abs(along) > self.friction * normal
 
     def _advance(
-        self, angle: float, speed: float, side: int, turn: float
-    ) -> tuple[float, float, int]:
-        """Return angle, speed and the end about which the body turns a step later."""
-        speed += STEP * turn
+        self, angle: Array, speed: Array, side: Array, turn: Array
+    ) -> tuple[Array, Array, Array]:
+        """Return angles, speeds and the ends about which bodies turn a step later."""
+        speed = speed + STEP * turn
         after = angle + STEP * speed
-        if angle == 0.0 or after * angle > 0.0:
+        landing = np.flatnonzero((angle != 0.0) & (after * angle <= 0.0))
+        if not landing.size:
             return after, speed, side
-        (x, y), (other, high) = self.arms[side], self.arms[1 - side]
+        side = side.copy()
+        arms = np.array(self.arms)
+        (x, y), (other, high) = arms[side[landing]].T, arms[1 - side[landing]].T
         moment = self.inertia + other * other + high * high
-        share = angle / (angle - after)  # of the step until it lands
-        speed *= max(self.inertia + x * other + y * high, 0.0) / moment
+        share = angle[landing] / (angle - after)[landing]  # of the step until it lands
+        kept = speed[landing] * np.maximum(self.inertia + x * other + y * high, 0.0) / moment
         # slower than what the weight stops within a step
-        if abs(speed) < STEP * self.gravity * abs(other) / moment:
-            return 0.0, 0.0, side
-        return (1.0 - share) * STEP * speed, speed, 1 - side
+        rests = np.abs(kept) < STEP * self.gravity * np.abs(other) / moment
+        speed[landing] = np.where(rests, 0.0, kept)
+        after[landing] = (1.0 - share) * STEP * speed[landing]
+        side[landing] = np.where(rests, side[landing], 1 - side[landing])
+        return after, speed, side
 
-    def first_fall(self, motion: Motion, between: tuple[float, float]) -> float | None:
-        """Return the smallest of some multiples of a motion at which it falls; None if it slides.
-
-        It is infinite if it falls at none [-].
-        """
+    def first_fall(self, motion: Motion, between: tuple[float, float]) -> FirstFall | None:
+        """Return the first fall over multiples of a motion; None if it slides at a smaller one."""
         lower, upper = between
-        scales = lower * SCALE_RATIO ** np.arange(np.ceil(np.log(upper / lower) / log(SCALE_RATIO)))
-        for scale in [*scales.tolist(), upper]:
-            if (found := self.rock(motion, scale)) is None:
-                return None
-            if isfinite(found.time):
-                return scale
-        return inf
+        scales = np.geomspace(lower, upper, int(np.ceil(log(upper / lower) / log(SCALE_RATIO))) + 1)
+        times, _, slides = self.rock_scaled(motion, scales)
+        fell = np.isfinite(times)
+        first = int(fell.argmax()) if fell.any() else len(scales)
+        if slides[:first].any():
+            return None
+        again = scales[first:][~(fell | slides)[first:]].tolist()
+        return FirstFall([*scales.tolist(), inf][first], (again[0], again[-1]) if again else None)
 
 
 def find_first_fall(
     structure: Structure, motion: Motion, between: tuple[float, float]
-) -> float | None:
-    """Return the smallest scale at which a stack falls as one rigid body, infinite for none [-].
+) -> FirstFall | None:
+    """Return the first fall of a stack as one rigid body.
 
     It is None of other structures, and where the body slides.
     """
@@ -159,11 +176,14 @@ def find_first_fall(
     return body.first_fall(motion, (min(least, largest), largest))
 
 
-def describe_first_fall(scale: float | None) -> str:
-    """Describe the scale of `find_first_fall` behind that of courses; "" without one."""
-    if scale is None:
+def describe_first_fall(first: FirstFall | None) -> str:
+    """Describe the result of `find_first_fall` behind that of courses; "" without one."""
+    if first is None:
         return ""
-    falls = f"falls from {scale:#.3g} × on" if scale < inf else "falls at none"
+    falls = f"first falls at {first.scale:#.3g} ×" if first.scale < inf else "falls at none"
+    if first.again:
+        ends = " to ".join(dict.fromkeys(f"{scale:#.3g}" for scale in first.again))
+        falls += f", and stands again at {ends} ×"
     return f"; as one rigid body it {falls}"
 
 

@@ -254,7 +254,7 @@ def test_the_margin_of_a_stack_names_that_of_one_body(case):
     assert say_margin(data_of(case), scale=state("scale", found)) == [
         "the least margin is 1.40 on 'a', PGA 0.20 g",
         "it falls from 1.50 × on",
-        "as one rigid body it falls from 0.677 × 'a' on",
+        "as one rigid body it first falls at 0.677 × 'a'",
     ]
 
 

@@ -126,4 +126,4 @@ def _compare_motions(searches: list[Scales]) -> Iterator[str]:
     as_one = {x.motion: x.states["falls as one"] for x in searches if "falls as one" in x.states}
     if as_one:
         motion = min(as_one, key=as_one.__getitem__)
-        yield f"as one rigid body it falls from {as_one[motion]:#.3g} × '{motion}' on"
+        yield f"as one rigid body it first falls at {as_one[motion]:#.3g} × '{motion}'"
