@@ -249,12 +249,27 @@ def test_a_motion_that_fells_it_at_a_smaller_scale_is_not_robust(case):
     assert "not robust" not in str(say_margin(data, scale=state("scale", found[2])))
 
 
-def test_the_margin_of_a_stack_names_that_of_one_body(case):
-    found = scales("a", 1.4, falls=1.5, falls_as_one=0.677)
-    assert say_margin(data_of(case), scale=state("scale", found)) == [
-        "the least margin is 1.40 on 'a', PGA 0.20 g",
-        "it falls from 1.50 × on",
-        "as one rigid body it first falls at 0.677 × 'a'",
+def test_the_margin_of_a_stack_is_the_lesser_of_courses_and_of_one_body(case):
+    """Under 'b' courses stand to less than under 'a', but one body falls under 'a' before."""
+    found = scales("b", 1.3, falls=1.35, falls_as_one=1.5), scales("a", 1.4, falls=1.5)
+    for at, fails in ((0.677, ", which it fails"), (1.05, "")):
+        one = scales("a", 1.4, falls=1.5, falls_as_one=at)
+        assert say_margin(data_of(case), scale=state("scale", found[0], one))[:2] == [
+            f"the least margin is below {at:#.3g} as one rigid body (1.40 in courses) on 'a', PGA "
+            f"0.20 g{fails}, of 2 motions",
+            "it falls from 1.50 × on",
+        ]
+    said = say_margin(data_of(case), scale=state("scale", *found))
+    assert said[0] == "the least margin is 1.30 on 'b', PGA 0.20 g, of 2 motions"
+    assert said[-1] == "as one rigid body it first falls at 1.50 × 'b'"
+    # an assessment is ranked behind it
+    data = data_of(case)
+    vars(data)["case"] = af.Case.of({**case.settings, "assessment": SPECTRUM})
+    check = state("assessment", answers.Ratios("code", ["right"], 1.1, 1.1))
+    ranked = say_margin(data, assessment=check, scale=state("scale", one))
+    assert [x.partition(" on ")[0] for x in ranked if "the next" in x or "least" in x] == [
+        "the least margin is below 1.05 as one rigid body (1.40 in courses)",
+        "the next is 1.1,",
     ]
 
 

@@ -90,7 +90,7 @@ def describe_scales(data: ReportData) -> Iterator[tuple[float, list[str]]]:
     for name, (state, peak) in unscaled.items():
         fails = f"under which it {_STATES[state][0]}, and which was not scaled"
         yield np.nextafter(1.0, 0.0), [f"below 1 on '{name}', PGA {peak:.2f} g, {fails}"]
-    made = sorted((each for each in searches if each.held), key=lambda each: each.held)
+    made = sorted((each for each in searches if each.held), key=_bound)
     if not made:
         return
     first, states = made[0], made[0].states
@@ -98,6 +98,9 @@ def describe_scales(data: ReportData) -> Iterator[tuple[float, list[str]]]:
     failing = {"dislocated", "falls", "mechanism"} & states.keys()
     met = min((states[state] for state in failing), default=np.inf)
     words = f"{first.held:#.3g}" + f" ({UNFINISHED})" * first.unfinished
+    if _bound(first) < first.held:
+        met = min(met, _bound(first))
+        words = f"below {_bound(first):#.3g} as one rigid body ({words} in courses)"
     words += f" on '{first.motion}', PGA {first.pga:.2f} g" + ", which it fails" * (met <= 1.0)
     words += f", of {len(made)} motions" * (len(made) > 1)
     ends = [
@@ -113,7 +116,12 @@ def describe_scales(data: ReportData) -> Iterator[tuple[float, list[str]]]:
     known = {each.motion for each in searches} | unscaled.keys()
     if left := [f"'{pair}'" for pair in data.pairs if pair not in known]:
         texts.append(f"{join_words(left)} {'were' if left[1:] else 'was'} not scaled")
-    yield first.held, texts
+    yield _bound(first), texts
+
+
+def _bound(search: Scales) -> float:
+    """Return the largest scale up to which it stands, in courses and as one rigid body."""
+    return min(search.held, search.states.get("falls as one", np.inf))
 
 
 def _compare_motions(searches: list[Scales]) -> Iterator[str]:
@@ -124,6 +132,7 @@ def _compare_motions(searches: list[Scales]) -> Iterator[str]:
         texts = [f"{peak:.3g} g ('{x.motion}', {x.states['falls']:#.3g} ×)" for peak, x in ends]
         yield f"over the motions it falls from {' to '.join(texts)} of PGA on"
     as_one = {x.motion: x.states["falls as one"] for x in searches if "falls as one" in x.states}
-    if as_one:
+    # a smaller one is the margin
+    if as_one and min(as_one.values()) > min(map(_bound, searches)):
         motion = min(as_one, key=as_one.__getitem__)
         yield f"as one rigid body it first falls at {as_one[motion]:#.3g} × '{motion}'"
