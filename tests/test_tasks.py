@@ -73,6 +73,32 @@ def test_a_task_runs_and_prints_the_output_that_it_shows(task, tmp_path, monkeyp
 
 
 @pytest.mark.parametrize(
+    ("opening", "area"),
+    [
+        ((-0.45, 0.45, 0.9, 2.7), 17.1),  # its head is a third of a course below the eaves
+        ((-0.45, 0.45, 2.9, 4.1), 17.64),
+        ((-2.3, -1.4, 0.9, 2.1), None),  # beside the edge there is no room for a jamb
+        ((1.5, 2.6, 0.9, 2.1), None),
+    ],
+)
+def test_a_wall_of_the_page_has_the_area_of_its_outline_less_its_opening(
+    opening, area, tmp_path, monkeypatch
+):
+    """4.8 m broad, 2.8 m to the eaves and 5 m to the ridge: 18.72 m²."""
+    monkeypatch.chdir(tmp_path)
+    (code,) = (code for _, code, _ in BLOCK.findall(PAGE) if "def write_wall" in code)
+    exec(code.partition('\nwrite_wall("gable.toml"')[0], space := {})
+    wall = "wall.toml", lambda y: min(2.4, 2.4 * (5.0 - y) / 2.2), [2.8, 5.0], opening
+    if area is None:
+        with pytest.raises(ValueError, match=r"stones of 18\.\d\d m² for a wall of 17\.\d\d m²"):
+            space["write_wall"](*wall)
+        return
+    space["write_wall"](*wall)
+    structure = af.Case.read("wall.toml").structure
+    assert sum(structure.blocks[k].area for k in structure.free) == pytest.approx(area)
+
+
+@pytest.mark.parametrize(
     ("opening", "eaves"),
     [
         (None, 2.5),
