@@ -475,7 +475,10 @@ class Structure(ResultDisplay):
         push, body = self.transverse_push
         text = "nothing is checked across the plane of the drawing"
         if np.isnan(push):
-            return text
+            return (
+                f"{text}; if that is the section of a wall, the wall is checked across its own "
+                "plane here, and in it by a case of its own"
+            )
         loaded = any(self.blocks[number].material.stands_for for number in self.free)
         return (
             f"{text}: held by nothing else, {body} begins to overturn at {push:.3g} g"

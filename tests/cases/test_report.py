@@ -201,7 +201,8 @@ def test_demand_and_capacity_stand_beside_their_doubts(kept, undrawn):
         "were not varied, and displacements have no range.",
     ]
     assert texts[4:] == [
-        "Nothing is checked across the plane of the drawing.",
+        "Nothing is checked across the plane of the drawing; if that is the section of a wall, the "
+        "wall is checked across its own plane here, and in it by a case of its own.",
         "In doubt, limit analysis: A made one.",
         "In doubt, kinematic assessment: It is an upper bound.",
         "Note, kinematic assessment: Faces slide flat.",
