@@ -145,11 +145,11 @@ def _collapse_kind(structure: Structure, lost: list[int], residual: float) -> st
 
 
 def doubt_collapse(
-    structure: Structure, fall: CollapseState, held: bool = False
+    structure: Structure, fall: CollapseState, held: bool = False, rest: float = 0.0
 ) -> Iterator[Doubt]:
     """Yield doubts of a structure that has not fallen but was near another kind of collapse.
 
-    It may be held by the ground, which accelerates to the end.
+    It may be held by the ground, which accelerates to the end, or has a rest [s].
     """
     if fall.kind in FALLEN_STATES:
         return
@@ -157,12 +157,13 @@ def doubt_collapse(
     limit = DISLOCATION * depth
     # a portal that still rocked when its motion ended was dislocated by 70 mm, and at rest by none
     if not fall.resting and fall.displacement > limit:
+        longer = f"rest={max(10, round(2.0 * rest))}"
         yield Doubt(
             "blocks still move at the end: they may come back from {:mm}, or go farther",
             "hold the push longer, until it falls or rests"
             if held
-            else "let the ground rest at the end, `--set motion.rest=10`, or "
-            "suite.pairs.NAME.rest=10",
+            else f"let the ground rest at the end, `--set motion.{longer}`, or "
+            f"suite.pairs.NAME.{longer}",
             (fall.residual,),
         )
     # Of 200 random structures, 7 stand although rigid blocks fall or move farther: all moved by

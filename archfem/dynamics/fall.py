@@ -153,7 +153,8 @@ def _follow_fall(
     # throughout the last fifth, in which a record changes its sign
     push = motion.horizontal * np.sign(motion.horizontal[-1])
     held = bool(push[-len(push) // 5 :].min() > 0.5 * np.abs(push).max())
-    doubts += doubt_collapse(structure, fall, held)
+    rest = motion.duration - motion.dt * np.flatnonzero(motion.horizontal).max(initial=0)
+    doubts += doubt_collapse(structure, fall, held, rest)
     if whole and start.time == 0.0 and ending is not Ending.EVENT:
         doubts += doubt_courses(structure, fall, motion)
     history = with_fall(history, fall).with_doubts((*history.doubts, *doubts))

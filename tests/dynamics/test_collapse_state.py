@@ -144,8 +144,12 @@ def test_what_has_moved_far_and_does_not_rest_is_doubted(kind, largest, end, res
     """In place of a residual displacement near its limit, which a phase of rocking is not."""
     column = af.column(breadth=0.1, heights=[0.3])
     state = collapse_state.CollapseState(kind, None, (), largest, end, resting)
-    for held, remedy in ((False, "motion.rest=10"), (True, "hold the push longer")):
-        doubts = list(collapse_state.doubt_collapse(column, state, held))
+    for held, rest, remedy in (
+        (False, 4.0, "motion.rest=10`"),
+        (False, 9.995, "suite.pairs.NAME.rest=20"),
+        (True, 0.0, "hold the push longer"),
+    ):
+        doubts = list(collapse_state.doubt_collapse(column, state, held, rest))
         assert [doubt.cause for doubt in doubts] == doubted * [
             "blocks still move at the end: they may come back from "
             f"{1e3 * end:.0f} mm, or go farther"

@@ -117,6 +117,16 @@ def test_a_push_to_the_end_is_to_be_held_longer(last, remedy):
     assert [remedy in x.remedy for x in run.doubts if "still move" in x.cause] == [True]
 
 
+def test_what_still_moves_is_judged_by_the_rest_that_its_motion_has(monkeypatch):
+    """Of 64 samples each 0.01 s, the last four at rest."""
+    rests = []
+    monkeypatch.setattr(fall, "doubt_collapse", lambda *given: rests.append(given[-1]) or [])
+    block = af.column(breadth=1.0, heights=[0.4])
+    ground = af.Motion(np.r_[np.full(60, 0.7 * G), np.zeros(4)], 0.01)
+    af.Analysis(block, fidelity="rigid", displacements="large", dt=2e-3).run(ground)
+    assert rests == [pytest.approx(0.04)]
+
+
 @pytest.mark.parametrize(("followed", "outcome"), [(0.2, "unknown"), (0.6, "fallen")])
 @pytest.mark.parametrize("whole", [True, False])
 def test_a_fall_that_cannot_be_followed_keeps_what_is_known(followed, outcome, whole, monkeypatch):
