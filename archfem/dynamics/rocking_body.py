@@ -97,7 +97,7 @@ class RockingBody:
         for k, (along, upward) in enumerate(ground.tolist()):
             across, up = along * scales, upward * scales + self.gravity
             still = (angle == 0.0) & (speed == 0.0)
-            if k > shaken and (still | np.isnan(angle)).all():
+            if (np.isnan(angle) | still & (k > shaken)).all():
                 break
             # about the left end, or else the right one
             side = np.where(still, y * across > x * up, side)
