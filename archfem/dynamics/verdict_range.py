@@ -26,6 +26,13 @@ from archfem.units import format_mm
 MAX_CHANCE, PERMUTATIONS = 0.05, 999
 MAX_EDGES = 250  # conditions of each sense on one property
 
+# What is counted: its runs, and their verb
+COUNTED = {
+    "falls": ("falls", "fall"),
+    "dislocated": ("dislocations", "are dislocated"),
+    "falls or dislocated": ("falls and dislocations", "fall or are dislocated"),
+}
+
 # Displacements of equal runs of other time steps differ by chance up to here [-]
 MAX_RATIO_OF_DISPLACEMENTS = 1.5
 
@@ -61,9 +68,17 @@ class VerdictRange(ResultDisplay):
         return np.asarray(self.dataset["outcome"].values == COLLAPSE_STATES[1])
 
     @property
+    def counted(self) -> str:
+        """What is explained, a key of `COUNTED`: falls, or dislocations where none falls.
+
+        It is both at once where properties separate these, and none separates falls alone.
+        """
+        return self._explained[0]
+
+    @property
     def decisive(self) -> NDArray[np.bool_]:
-        """Whether the structure falls; where it never does, whether it is dislocated (runs,)."""
-        return self.dislocated if self.is_dislocation_worst else self.falls
+        """Whether a run is `counted` (runs,)."""
+        return self._explained[1]
 
     @property
     def is_dislocation_worst(self) -> bool:
@@ -261,32 +276,54 @@ class VerdictRange(ResultDisplay):
                 count = int(self.decisive[self.answered & group].sum())
                 words.append(f"{count} of the {own} that vary {name}")
         share = f"{low:.0%} to {high:.0%} at 95%"
-        if self.is_dislocation_worst:
+        if self.counted != "falls":
             return f"{', '.join(words)}; share of falls {share}"
         return f"{', '.join(words)} ({share})"
 
     @cached_property
-    def where(self) -> str:
-        """The one or two conditions that separate decisive runs from others by more than chance.
+    def _explained(self) -> "tuple[str, NDArray[np.bool_], list[Condition]]":
+        """What is `counted`, whether a run is (runs,), and the conditions that separate these.
+
+        Each of two tests has half of the chance of a false condition (Bonferroni).
+        """
+        events = {"falls": self.falls}
+        if self.is_dislocation_worst:
+            events = {"dislocated": self.dislocated}
+        elif self.dislocated[self.answered].any():
+            events["falls or dislocated"] = self.falls | self.dislocated
+        for name, runs in events.items():
+            if found := self._find_conditions(runs[self.answered], MAX_CHANCE / len(events)):
+                return name, runs, found
+        name, runs = next(iter(events.items()))
+        return name, runs, []
+
+    def _find_conditions(self, decisive: NDArray[np.bool_], max_chance: float) -> "list[Condition]":
+        """Return the one or two conditions that separate decisive runs by more than chance.
 
         They are tested by sampled runs: those of single changes share all other properties.
         """
-        rows, decisive = self.answers, self.decisive[self.answered]
-        chosen, conditions = np.ones(len(decisive), dtype=bool), list[str]()
+        rows, chosen = self.answers, np.ones(len(decisive), dtype=bool)
+        conditions = list[Condition]()
         for _ in range(2):
             tested = chosen & rows["sampled"].values
             among = rows.isel(run=np.flatnonzero(tested))
-            best = _find_condition(among, self.properties, decisive[tested])
+            best = _find_condition(among, self.properties, decisive[tested], max_chance)
             if best is None:
                 break
-            conditions.append(self._condition_text(best))
+            conditions.append(best)
             chosen &= best.holds(rows)
-        runs, verb = (
-            ("dislocations", "are dislocated") if self.is_dislocation_worst else ("falls", "fall")
-        )
+        return conditions
+
+    @property
+    def where(self) -> str:
+        """The one or two conditions that separate decisive runs from others by more than chance."""
+        decisive, conditions = self.decisive[self.answered], self._explained[2]
+        runs, verb = COUNTED[self.counted]
         if not conditions:
             return f"no property separates {runs} from the others by more than chance"
-        inside, where = int(decisive[chosen].sum()), " and ".join(conditions)
+        chosen = np.all([each.holds(self.answers) for each in conditions], axis=0)
+        where = " and ".join(map(self._condition_text, conditions))
+        inside = int(decisive[chosen].sum())
         which = f"all {runs}" if inside == decisive.sum() else f"{inside} of the {runs}"
         return f"{which} are with {where}, where {inside} of {int(chosen.sum())} {verb}"
 
@@ -323,7 +360,7 @@ class VerdictRange(ResultDisplay):
         return cls(read_dataset(path, "file of a verdict's range"))
 
     def tabulate(self) -> tuple[list[str], list[list[str]]]:
-        """Return falls, or else dislocations, by value, and the share that a property explains.
+        """Return what is `counted` by value, and the share that a property explains.
 
         Returns:
             The titles of the columns, and a row for each property.
@@ -339,8 +376,7 @@ class VerdictRange(ResultDisplay):
             explained = [f"{share:.0%}"] if self.is_mixed else []
             rows.append([property_text(name), *explained, ", ".join(cells)])
         head = ["explains, of the variance of the outcome"] if self.is_mixed else []
-        counted = "dislocated" if self.is_dislocation_worst else "falls"
-        return ["property", *head, counted], rows
+        return ["property", *head, self.counted], rows
 
     def table(self) -> str:
         """Return the table of `tabulate` as text."""
@@ -416,22 +452,22 @@ def _list_conditions(rows: xr.Dataset, names: Sequence[str]) -> Iterator[Conditi
 
 
 def _find_condition(
-    rows: xr.Dataset, names: Sequence[str], falls: NDArray[np.bool_]
+    rows: xr.Dataset, names: Sequence[str], falls: NDArray[np.bool_], max_chance: float
 ) -> Condition | None:
-    """Return the condition that separates falls best; None if chance finds one as good.
+    """Return the condition that separates falls best; None if chance may find one as good.
 
     Outcomes in random order have a best condition too, over all properties and edges. It is the
     measure of chance: the test by maxima of Westfall and Young, Resampling-Based Multiple Testing
     (1993), section 2.3.
     """
     conditions = [*_list_conditions(rows, names)]
-    if not conditions:
+    if not conditions or falls.all() == falls.any():
         return None
     members = np.array([condition.holds(rows) for condition in conditions], dtype=float)
     gains, random = _separation(members, falls), np.random.default_rng(0)
     chance = [_separation(members, random.permutation(falls)).max() for _ in range(PERMUTATIONS)]
     as_good = 1 + np.count_nonzero(np.array(chance) > gains.max() - 1e-9)
-    if as_good > MAX_CHANCE * (PERMUTATIONS + 1):
+    if as_good > max_chance * (PERMUTATIONS + 1):
         return None
     return conditions[int(gains.argmax())]
 

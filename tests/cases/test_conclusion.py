@@ -376,7 +376,8 @@ def test_of_unequal_outcomes_the_worst_is_the_first(case):
         "moves by 100 to 200"
     )
     assert dict(conclusion.list_facts(data))["verdict"] == f"{text} mm"
-    data.verdict_ranges[0].dataset["outcome"] = "run", np.array(["stands", "dislocated"])
+    parted = data.verdict_ranges[0].dataset.assign(outcome=("run", ["stands", "dislocated"]))
+    vars(data)["verdict_ranges"] = (VerdictRange(parted),)
     varied = "falls in none of 2 variations and is dislocated in 1 under 'first'"
     assert dict(conclusion.list_facts(data))["verdict"] == f"{text} mm; {varied}"
     text = conclusion.build_conclusion(data).pieces[0].text

@@ -34,7 +34,7 @@ from archfem.cases.toml_file import format_tables, parse_tables
 from archfem.dynamics.collapse_state import DISLOCATION, FALLEN_STATES, shallowest_part
 from archfem.dynamics.history import SIGN_CONVENTION
 from archfem.dynamics.recorder import library_versions
-from archfem.dynamics.verdict_range import VerdictRange
+from archfem.dynamics.verdict_range import COUNTED, VerdictRange
 from archfem.errors import InvalidInput
 from archfem.joints.criteria import assessed_joints
 from archfem.masonry.block import Block
@@ -424,8 +424,7 @@ def _build_range(data: ReportData) -> list[Any]:
         # a command without an answer leaves its reason alone
         found = next(ranges) if place.replace(".txt", ".nc") in data.files else None
         changes = [] if found is None else _tabulate_single_changes(data, found, pair)
-        counted = "Dislocations" if found and found.is_dislocation_worst else "Falls"
-        titled = table.format(counted)
+        titled = table.format(COUNTED[found.counted if found else "falls"][0].capitalize())
         blocks = data.read_result(place.removesuffix(".txt"), named, table=titled)
         if found is not None and found.decisive.any():
             text = blocks[0].text.removesuffix(found.table()).rstrip()
