@@ -606,6 +606,18 @@ def test_a_unit_of_the_case_that_contradicts_the_drawing_is_said(tmp_path, caplo
         af.Case.read(case, ["structure.unit=cm"])
 
 
+def test_a_unit_that_an_impossible_header_demands_is_used_without_a_warning(tmp_path, caplog):
+    """Of a drawing in mm whose header says m: without a unit it is refused."""
+    case = draw_portal(tmp_path)
+    drawing = ezdxf.readfile(tmp_path / "portal.dxf")
+    drawing.units = ezdxf.units.M
+    drawing.saveas(tmp_path / "portal.dxf")
+    with pytest.raises(af.InvalidInput, match='by unit = "mm"'):
+        af.Case.read(case)
+    assert af.Case.read(case, ["structure.unit=mm"]).structure.blocks
+    assert not caplog.records
+
+
 def test_a_law_among_the_names_of_laws_of_a_structure_is_sent_to_its_place(tmp_path):
     change = 'structure.contacts."stone to stone".finish=dressed'
     with pytest.raises(af.InvalidInput, match=r'law under \[contacts\."stone to stone"\], at'):

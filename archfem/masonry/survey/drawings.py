@@ -43,6 +43,7 @@ ANNOTATIONS = (
 )
 MAX_ENTITIES = 100_000  # blocks inserted into blocks may be any number
 UNITS = ("mm", "cm", "m")  # that a drawing without one may have
+SMALLEST_BLOCK, LARGEST_BLOCK = 0.1, 20.0  # typical diagonals by a unit of the drawing [m]
 
 
 @dataclass(frozen=True)
@@ -52,7 +53,7 @@ class Frame:
     factor: float = 1.0  # unit of the coordinates [m]
     unit: str = "m"  # name of the unit
     upwards: float = 1.0  # 1 or -1
-    stated: str = ""  # another unit that the file states
+    stated: str = ""  # another unit that the file states, and that its sizes permit
 
     def place(self, point: Sequence[float]) -> str:
         """Return a place [m] in words, in coordinates of the drawing."""
@@ -176,12 +177,12 @@ def _check_sizes(outlines: list[Outline]) -> None:
     _check_unit([each.points for each in outlines], outlines[0].frame)
 
 
-def _check_unit(polygons: Sequence[Array], frame: Frame, least: float = 0.02) -> None:
-    """Refuse polygons [m] whose size shows that the unit is wrong."""
+def _check_unit(polygons: Sequence[Array], frame: Frame, least: float = 0.02) -> float:
+    """Return the size of a typical polygon [m]; refuse one that shows that the unit is wrong."""
     # the median diagonal is insensitive to a few long blocks, such as a fill
     typical = float(np.median([np.hypot(*np.ptp(each, axis=0)) for each in polygons]))
-    if least <= typical <= 20.0:
-        return
+    if least <= typical <= LARGEST_BLOCK:
+        return typical
     points = np.concatenate(polygons)
     away = np.abs(points).max(axis=0)
     problem = f"a block is typically {typical:.3g} m large"
@@ -307,7 +308,7 @@ def _read_dxf(
         )
     points = [complex(*point[:2]) for each in polylines for point in each.points]
     corners = np.array([point for point in points if abs(point) < 1e12])  # others are refused
-    frame = frame if unit is None else _read_unit(unit, other=frame)
+    header, frame = frame, frame if unit is None else _read_unit(unit, other=frame)
     if frame is None:
         drawn = np.column_stack([corners.real, corners.imag])
         raise _refuse_unit("the drawing does not say its unit ($INSUNITS)", drawn)
@@ -315,7 +316,9 @@ def _read_dxf(
     known = [np.multiply(each.points, frame.factor)[:, :2] for each in polylines if each.points]
     if 0 < len(corners) == len(points):
         # a unit of the case is deliberate, as of a model in a laboratory
-        _check_unit(known, frame, 0.1 if unit is None else 0.02)
+        size = _check_unit(known, frame, SMALLEST_BLOCK if unit is None else 0.02) / frame.factor
+        if header and not SMALLEST_BLOCK <= size * header.factor <= LARGEST_BLOCK:
+            frame = replace(frame, stated="")
     outlines = [_read_polyline(entity, frame, snap, corners) for entity in polylines]
     texts = []
     for entity in read:
