@@ -227,9 +227,8 @@ def _read_unit(unit: str, upwards: float = 1.0, other: Frame | None = None) -> F
 def _refuse_unit(problem: str, points: Array, frame: Frame = Frame()) -> InvalidInput:
     """Return the error of a drawing whose unit is not known, with its breadth in likely ones."""
     breadth = float(np.ptp(points[:, 0])) / frame.factor if len(points) else 0.0
-    sizes = (f'{_read_unit(x).factor * breadth:.3g} m by unit = "{x}"' for x in UNITS)
-    right = "give the unit that makes its breadth right"
-    return InvalidInput(f"{problem}: {right}, {', '.join(sizes)}")
+    sizes = ", ".join(f'{_read_unit(x).factor * breadth:.3g} m by unit = "{x}"' for x in UNITS)
+    return InvalidInput(f"{problem}: give the unit that makes its breadth right, {sizes}")
 
 
 def _as_table(value: Any, name: str) -> dict[str, Any]:
@@ -297,8 +296,7 @@ def _read_dxf(
     layers = {entity.layer for entity in polylines}
     others = [each for each in read if each.kind not in (*POLYLINES, *ANNOTATIONS, "INSERT")]
     if others and not polylines:
-        curves = Counter(entity.kind for entity in others)
-        found = ", ".join(f"{count} {kind}" for kind, count in curves.items())
+        found = ", ".join(f"{n} {kind}" for kind, n in Counter(x.kind for x in others).items())
         raise InvalidInput(f"it has no polylines, but {found}: make a closed one of each stone")
     for kind, layer in ((each.kind, each.layer) for each in others):
         beside = " beside its polylines" if layer in layers else ", which would be left out"
