@@ -294,8 +294,12 @@ def test_results_of_an_earlier_version_are_named_and_not_stated(kept, undrawn, k
     data = report_data.ReportData(found.case, found.runs, found.folder)
     pieces = build_conclusion(data).pieces
     texts = [each.text for each in pieces if each.kind == "words"]
-    made = "Not stated in full, for an earlier version of archfem or another case made it"
-    assert f"{made}: limit analysis (run `archfem limit` again)." in texts
+    said = "Not stated in full, for an earlier version of archfem made it: {}."
+    if "case" in kind:
+        said = "Not stated, for its case, drawing or version of archfem is not that of the runs: {}"
+        said += "; or run `archfem run` again, if the runs are older."
+    assert said.format("limit analysis (run `archfem limit` again)") in texts
+    assert sum(text.startswith("Not stated") for text in texts) == 1
     assert not any("turns" in text for text in texts)
     (table,) = (each for each in pieces[:-1] if each.kind == "grid")
     assert [row[0] for row in table.rows] == [

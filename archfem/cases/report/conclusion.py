@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from archfem._files import read_file_list
+from archfem._files import group_of, read_file_list
 from archfem.cases import result_text
 from archfem.cases.answers import NO_DEMAND, RESULTS, Ratios, Row, read_numbers
 from archfem.cases.case import REPORT_KEYS
@@ -29,6 +29,7 @@ from archfem.cases.report.report_data import SHOWN_RESULTS, ReportData
 from archfem.cases.report.scales import describe_scales, say_first_failure, say_fragile
 from archfem.cases.report.study_findings import read_study, say_what_changes
 from archfem.cases.result_text import PushFactors, peak_of_spectrum, site_acceleration
+from archfem.cases.run import CASE_FILE
 from archfem.dynamics.collapse_state import (
     COLLAPSE_STATES,
     FALLEN_STATES,
@@ -267,20 +268,23 @@ def _list_outdated(data: ReportData) -> Iterator[str]:
         if any(row.factor != "-" and not row.numbers for row in data.statements[name].rows)
     }
     absent = {f"{name}.txt": RESULTS[name] for name in unstated}
-    earlier = [
-        f"{absent[name]} (run `archfem {command}` again)"
-        for command, group in listed.items()
-        for name in (path.rpartition("/")[2] for path in group.files)
-        if name in absent
-    ]
+    own, earlier, other = group_of(listed, CASE_FILE), list[str](), list[str]()
+    for command, group in listed.items():
+        names = [name for path in group.files if (name := path.rpartition("/")[2]) in absent]
+        again = [f"{absent[name]} (run `archfem {command}` again)" for name in names]
+        (earlier if own and group.inputs == own.inputs else other).extend(again)
     for name in _BEGUN.keys() & absent.values():
         if data.folder and (data.folder / _BEGUN[name]).exists():
             yield f"The {name} was begun and has no answer: runs are left to compute."
     if data.case.report.get("project") == PLACEHOLDER:
         yield "The name of the project is that of the template: fill in [report] of the case."
     if earlier:
-        made = "Not stated in full, for an earlier version of archfem or another case made it"
+        made = "Not stated in full, for an earlier version of archfem made it"
         yield f"{made}: {', '.join(earlier)}."
+    if other:
+        # digests of inputs do not say which is the older
+        made = "Not stated, for its case, drawing or version of archfem is not that of the runs"
+        yield f"{made}: {', '.join(other)}; or run `archfem run` again, if the runs are older."
 
 
 def _build_paragraphs(data: ReportData, doubtful: Sequence[str]) -> dict[str, list[str]]:
