@@ -35,7 +35,7 @@ def draw_outlines(
 ) -> Figure:
     """Draw the outlines of a drawing by layer, with their names or numbers.
 
-    Overlaps deeper than half of snap are red, gaps between that and five times snap are orange;
+    Overlaps deeper than half of snap are red, gaps between one and five times snap are orange;
     each has a ring around it. Polylines that are not closed are purple. The coordinates are those
     of the drawing, y upwards.
 

@@ -33,7 +33,9 @@ def legend(figure):
         (0.0, []),
         (0.004, ["gap (1)"]),
         (0.02, []),  # beyond five times snap, an opening
-        (0.0004, []),  # within half of snap, which closes it
+        (0.0004, []),
+        (0.0009, []),  # within snap, which closes it
+        (0.0012, ["gap (1)"]),
         (-0.0004, []),
         (-0.004, ["overlap (1)"]),
         (-0.3, ["overlap (1)"]),
@@ -51,6 +53,17 @@ def test_overlaps_and_narrow_gaps_are_marked(tmp_path, gap, said):
         assert ring.get_ydata() == pytest.approx([0.5])
     texts = {text.get_text() for text in axes.texts}
     assert texts == {"left 1", "right 1"}
+
+
+@pytest.mark.parametrize(("wide", "gaps"), [(0.0018, 1), (0.0009, 0)])
+def test_a_gap_is_marked_by_its_widest_place(tmp_path, wide, gaps):
+    """From nothing at the foot: its mean width is less than snap."""
+    one, other = ([(0, 0), (1, 0), (1, 1), (0, 1)], [(1, 0), (2, 0), (2, 1), (1 + wide, 1)])
+    drawing = ezdxf.new(units=ezdxf.units.M)
+    for points in (one, other):
+        drawing.modelspace().add_lwpolyline(points, close=True)
+    drawing.saveas(tmp_path / "wedge.dxf")
+    assert ("gap (1)" in legend(draw_outlines(tmp_path / "wedge.dxf"))) == bool(gaps)
 
 
 def test_coordinates_are_those_of_the_drawing(tmp_path):

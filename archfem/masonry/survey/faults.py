@@ -26,7 +26,7 @@ def sketch_drawing(
 
 
 def find_faults(closed: Sequence[Outline], snap: float) -> tuple[list[Array], list[Array]]:
-    """Return overlaps and narrow gaps of outlines, as polygons in coordinates of the drawing."""
+    """Return overlaps, and narrow gaps that snap leaves open, in coordinates of the drawing."""
     import shapely
 
     if not closed:
@@ -40,9 +40,11 @@ def find_faults(closed: Sequence[Outline], snap: float) -> tuple[list[Array], li
     grown = shapely.buffer(whole, reach, join_style="mitre", mitre_limit=10.0)
     filled = shapely.buffer(grown, -reach, join_style="mitre", mitre_limit=10.0)
     faults = []
-    for shapes in (common, shapely.difference(filled, whole)):
+    # as deep as half of snap in the mean, or wider than snap at one place
+    for shapes, mean, widest in ((common, 0.5, 0.0), (shapely.difference(filled, whole), 0.0, 1.0)):
         parts = shapely.get_parts(shapely.get_parts(shapes))
         parts = parts[shapely.area(parts) > 0.0]
-        deep = 2.0 * shapely.area(parts) / shapely.length(parts) > 0.5 * near
+        deep = 2.0 * shapely.area(parts) / shapely.length(parts) > mean * near
+        deep &= ~shapely.is_empty(shapely.buffer(parts, -0.5 * widest * near))
         faults.append([shapely.get_coordinates(part.exterior)[:-1] for part in parts[deep]])
     return faults[0], faults[1]
