@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from archfem._typing import Array
+from archfem._typing import Array, Numbers
 from archfem.dynamics.collapse_state import (
     DISLOCATION,
     FALLEN_STATES,
@@ -89,16 +89,19 @@ class RockingBody:
     def rock_scaled(self, motion: Motion, scales: Array) -> tuple[Array, Array, Array]:
         """Return times of fall, displacements, and what slides, by multiples of a motion (k,)."""
         ground = motion.at(STEP * (np.arange(int((motion.duration + REST) / STEP)) + 0.5))
-        shaken = np.flatnonzero(ground.any(axis=1)).max(initial=0)
+        starts, k = self._find_starts(ground, scales.max()), 0
         times, farthest = np.full(scales.shape, inf), np.zeros(scales.shape)
         slides, side = np.zeros(scales.shape, bool), np.zeros(scales.shape, int)
         # angles of bodies that have fallen or slid are not a number
         angle, speed, (x, y) = np.zeros(scales.shape), np.zeros(scales.shape), self.arms[1]
-        for k, (along, upward) in enumerate(ground.tolist()):
-            across, up = along * scales, upward * scales + self.gravity
+        while k < len(ground):
             still = (angle == 0.0) & (speed == 0.0)
-            if (np.isnan(angle) | still & (k > shaken)).all():
-                break
+            if (still | np.isnan(angle)).all():
+                later = starts[np.searchsorted(starts, k) :]
+                if not still.any() or not later.size:
+                    break
+                k = int(later[0])
+            across, up = ground[k, 0] * scales, ground[k, 1] * scales + self.gravity
             # about the left end, or else the right one
             side = np.where(still, y * across > x * up, side)
             turn, slipping = self._accelerate((angle, speed, side), across, up)
@@ -109,7 +112,17 @@ class RockingBody:
             farthest = np.fmax(farthest, far)
             lost = np.abs(angle) > LOST
             times[lost], angle[lost] = STEP * (k + 1), np.nan
+            k += 1
         return times, farthest, slides
+
+    def _find_starts(self, ground: Array, scale: float) -> Numbers:
+        """Return the steps in which a body at rest may turn or slide, at any multiple up to one."""
+        across, up = scale * ground[:, 0], scale * ground[:, 1] + self.gravity
+        (right, high), (left, low) = self.arms
+        turns = (low * across > left * up) | (high * across < right * up)
+        along = across * self.foot[0] + up * self.foot[1]
+        normal = up * self.foot[0] - across * self.foot[1]
+        return np.flatnonzero(turns | (np.abs(along) > self.friction * normal))
 
     def _accelerate(
         self, state: tuple[Array, Array, Array], across: Array, up: Array
