@@ -38,6 +38,10 @@ ROUND_OFF = 1e-12
 # 1e-7 or so, and at the optimum itself none might remain
 HELD_SHARE = 1.0 - 1e-6
 
+# Time after which the simplex method is taken to stall that looks for any state of equilibrium;
+# with 3000 unknowns it takes 0.1 to 4 s [s]
+STALLED_AFTER = 15.0
+
 
 class NoEquilibrium(DidNotConverge):
     """The programme is infeasible: no forces within the limits balance the loads."""
@@ -53,17 +57,21 @@ def solve_linear(
     """Minimise a cost under equations and limits A x <= b; None where it is unbounded."""
     # Residuals are of order one. Where round-off stops the solver, presolve changes its path; then
     # a coarser tolerance lets it end, or the interior point. Without a cost presolve comes first:
-    # it finds at once that fine pieces of fill do not stand, where the simplex method stalls.
+    # it finds at once that fine pieces of fill do not stand, where the simplex method stalls, and
+    # where that stalls all the same, the least residual decides (`minimise_residual`).
     first = (method, not np.any(cost), 1e-9)
     more = (method, True, 1e-9), (method, True, 1e-8), ("highs-ipm", True, 1e-8)
     for way, presolve, tolerance in dict.fromkeys((first, *more)):
         feasibility = (f"{side}_feasibility_tolerance" for side in ("primal", "dual"))
         options = {**dict.fromkeys(feasibility, tolerance), "presolve": presolve}
+        options |= {} if np.any(cost) else {"time_limit": STALLED_AFTER}
         result = linprog(cost, *limits, *equations, bounds, way, options=options)
         if result.status == 2:
             raise NoEquilibrium("no state of equilibrium fulfils the limits")
         if result.status in (0, 3):
             return result if result.status == 0 else None
+        if "time_limit" in options and result.status == 1:
+            break
     raise DidNotConverge(f"the linear programme found no state: {result.message}")
 
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import archfem as af
+from archfem.limit import linear_programme
 from archfem.limit.instability import describe_friction, explain_instability, least_friction
 
 STONE = af.STONE
@@ -185,3 +186,11 @@ def test_fill_that_falls_out_of_a_free_end_is_held_by_higher_walls(above, named)
     end = 0.0 if above[0] < 0.5 else max(block.points[:, 0].max() for block in bridge.blocks)
     assert f"; pieces of the fill fall out of its free end at x = {end:.2f} m, which" in text
     assert "thickness" not in text
+
+
+def test_where_a_search_for_equilibrium_stalls_the_least_residual_decides(monkeypatch):
+    """A block on a slope of 1 in 4 stands from a coefficient of friction of 0.25."""
+    square = [[0.0, 0.0], [1.0, 0.0], [1.0, 0.5], [0.0, 0.5]]
+    stone = on_a_bed(square, tilt=np.arctan(0.25))
+    monkeypatch.setattr(linear_programme, "STALLED_AFTER", 1e-9)
+    assert least_friction(stone) == pytest.approx(0.25, rel=6e-3)  # of the bisection
