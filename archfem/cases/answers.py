@@ -86,7 +86,7 @@ class Ratios(NamedTuple):
 
     def __str__(self) -> str:
         """Return all ratios in words."""
-        return f"{Ends((self.least, self.most)):.3g}{self.beside}"
+        return f"{Ends.of((self.least, self.most)):.3g}{self.beside}"
 
 
 class Scales(NamedTuple):

@@ -31,8 +31,11 @@ class StandingBody:
         centre_of_gravity: height of its centre of gravity above the base [m].
         width: width of the structure, out of plane, that carries it [m]; None for all of it. On
             less its weight counts more, by the whole width over this one.
-        contact: of its base.
+        contact: contact of its base.
         name: name of the block, and of its part.
+
+    Raises:
+        InvalidInput: a value is no number, not above zero, or too large to be metres and newtons.
     """
 
     x: Metres
@@ -49,7 +52,7 @@ class StandingBody:
         check_between(self.weight, f"'{self.name}': weight [N]", 0.0, 1e9, remedy="give newtons")
         for key in ("length", "centre_of_gravity", "width"):
             if (value := getattr(self, key)) is not None:
-                check_between(value, f"'{self.name}': {key} [m]", 0.0, 100.0)
+                check_between(value, f"'{self.name}': {key} [m]", 0.0, 100.0, remedy="give metres")
 
     def place(self, structure: Structure) -> Block:
         """Return the block of this body on the top of a structure.
@@ -62,7 +65,10 @@ class StandingBody:
         """
         tops = [top for block in structure.blocks if (top := block.top(self.x)) is not None]
         if not tops:
-            raise InvalidInput(f"'{self.name}' stands at x = {self.x:.4g} m beside the structure")
+            raise InvalidInput(
+                f"'{self.name}' stands at x = {self.x:.4g} m beside the structure: move it onto a "
+                "block"
+            )
         width = structure.width if self.width is None else self.width
         if width > structure.width:
             raise InvalidInput(
@@ -102,7 +108,7 @@ def carrying(structure: Structure, bodies: Sequence[StandingBody]) -> Structure:
     """Stand bodies on a structure, each on what is level below it.
 
     Args:
-        structure: any one; a fill is cut into pieces before.
+        structure: structure of any kind; a fill that shall be in pieces is cut before.
         bodies: from the lower to the upper one where they stand on each other.
 
     Returns:

@@ -513,9 +513,9 @@ def test_other_states_of_the_fill_have_worst_places_of_their_own(area_load, monk
     bridge = af.bridge(
         arches=[
             af.shapes.Arch(span=5.0, rise=rise, thickness=0.45, voussoirs=9, name=f"{rise}")
-            for rise in (1.2, 2.2)
+            for rise in (1.1, 2.2)
         ],
-        piers=[af.shapes.Pier(gap=1.2, height=3.0, course=3.0, name="pier")],
+        piers=[af.shapes.Pier(gap=1.0, height=3.0, course=3.0, name="pier")],
         sidewalls=[
             af.shapes.Sidewall(length=2.0, height=1.5, state="fixed", name=f"{side} wall")
             for side in ("left", "right")
@@ -538,7 +538,7 @@ def test_other_states_of_the_fill_have_worst_places_of_their_own(area_load, monk
         assert getattr(found, name) == pytest.approx(expected, rel=1e-4)
     whole = replace(fill, mobilisation=1.0)
     there = af.collapse_factor(bridge, live=found.moving.worst.live, fill=whole).factor
-    assert area_load or there > 1.2 * found.full_pressure
+    assert area_load or there > 1.3 * found.full_pressure
 
 
 def test_a_plastic_fill_has_the_factors_of_its_pressure_beside_its_own(monkeypatch):
