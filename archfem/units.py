@@ -35,6 +35,7 @@ COMMON_UNITS = {
     "GPa": ("Pa", 1e9),
     "MPa/mm": ("Pa/m", 1e9),
     "GPa/m": ("Pa/m", 1e9),
+    "degree": ("degree", 1.0),
 }
 
 
@@ -125,7 +126,9 @@ def in_si_unit(values: Sequence[Any]) -> tuple[list[Any], str]:
     texts = [value for value in values if isinstance(value, str)]
     if not texts or not all(re.match(r"\s*[-+]?\.?\d", text) for text in texts):
         return list(values), ""
-    for unit in units:
+    # a common unit is found without the registry of units, which takes a second to load
+    common = COMMON_UNITS.get(texts[0].strip().lstrip("-+.0123456789 "), ("m", 1.0))[0]
+    for unit in (common, *units):
         with suppress(InvalidInput):
             convert = partial(in_unit, unit=unit, key="value")
             return [None if value is None else convert(value) for value in values], unit

@@ -28,6 +28,7 @@ from archfem._files import check_file, hash_content
 from archfem._validation import report_user_errors, validate_arguments
 from archfem.cases.toml_file import Table, check_table
 from archfem.errors import InvalidInput
+from archfem.units import in_si_unit
 
 # Environment variable with the permitted modules; "*" permits those of all cases
 OWN_CODE_VARIABLE = "ARCHFEM_OWN_CODE"
@@ -84,7 +85,8 @@ def hash_inputs(settings: Table, folder: Path = Path()) -> str:
     # Keys are sorted, but the order of arches and piers is their order in the bridge.
     order = _tables_within(settings.get("structure"))
     counted = {key: value for key, value in settings.items() if key != "report"}
-    text = json.dumps([describe_version(), counted, files, order], sort_keys=True, default=str)
+    given = [describe_version(), _in_si_units(counted), files, order]
+    text = json.dumps(given, sort_keys=True, default=str)
     return hashlib.sha256(text.encode()).hexdigest()
 
 
@@ -102,7 +104,27 @@ def hash_sections(
     files = [(str(path), hash_file(path)) for path in list_input_files(named, folder)]
     files += _package_versions(named)
     # keys are not sorted: the order of arches and piers is that in the bridge
-    return hashlib.sha256(json.dumps([tables, files], default=str).encode()).hexdigest()
+    given = [_in_si_units(tables), files]
+    return hashlib.sha256(json.dumps(given, default=str).encode()).hexdigest()
+
+
+def _in_si_units(value: Any) -> Any:
+    """Return values of a case as numbers in SI units, in which equal quantities are equal."""
+    if isinstance(value, Mapping):
+        return {key: _in_si_units(own) for key, own in value.items()}
+    if isinstance(value, list | tuple):
+        return [_in_si_units(own) for own in value]
+    if isinstance(value, str):
+        return _read_quantity(value)
+    return float(value) if type(value) is int else value
+
+
+@cache
+def _read_quantity(text: str) -> float | str:
+    """Return a quantity in its SI unit; other text, such as a date or a name, unchanged."""
+    (number,), unit = in_si_unit([text])
+    # 15 digits are those of the decimal number, without the round-off of a factor
+    return text if unit in ("", "1") else float(f"{number:.15g}")
 
 
 def remove_presentation(settings: Table) -> dict[str, Any]:

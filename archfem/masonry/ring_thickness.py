@@ -9,6 +9,7 @@ from archfem._typing import Array, Metres, Numbers
 from archfem._validation import check_between, validate_arguments, validate_methods
 from archfem.errors import InvalidInput, InvalidStructure
 from archfem.masonry.block import Block, as_point, check_simple
+from archfem.masonry.parts import find_undivided
 from archfem.masonry.structure import CONTACT_TOLERANCE, Joint, Structure, join_names
 
 
@@ -83,8 +84,8 @@ def find_ring(structure: Structure, part: str | None = None) -> Ring:
         part: part that is the ring; None where there is one ring alone.
 
     Raises:
-        InvalidInput: there is no ring, there are several, or it is not one layer of stones between
-            two springings, with nothing on its faces.
+        InvalidInput: there is no ring, there are several, it is drawn in one or two pieces, or it
+            is not one layer of stones between two springings, with nothing on its faces.
 
     Example:
         >>> ring = af.masonry.find_ring(af.circular_arch(radius=1.0, thickness=0.2, embrace=180.0,
@@ -111,6 +112,13 @@ def find_ring(structure: Structure, part: str | None = None) -> Ring:
                 f"'{structure.blocks[k].name}' has {len(numbers)} joints ({names}): a ring whose "
                 "thickness changes is one layer of stones, none missing, that carry nothing else"
             )
+    given = structure.blocks, structure.joints, structure.pairs, structure.ends
+    if len(stones) < 3 and stones & find_undivided(*given).keys():
+        names = join_names([f"'{structure.blocks[k].name}'" for k in sorted(stones)])
+        raise InvalidInput(
+            f"the ring is {names} alone, and a ring hinges at four joints or more: draw the "
+            "outline of each voussoir"
+        )
     return Ring(structure, *_follow_ring(structure, stones, touching))
 
 

@@ -161,6 +161,20 @@ def test_what_is_no_ring_is_refused(build, message):
         build()
 
 
+@pytest.mark.parametrize("pieces", [1, 2])
+def test_a_ring_in_one_or_two_pieces_cannot_hinge(pieces):
+    angles = np.linspace(np.pi, 0.0, 19)
+    blocks = [af.Block([(-3, -1), (3, -1), (3, 0), (-3, 0)], af.STONE, "rock", fixed=True)]
+    for k, own in enumerate(np.split(angles[:18], pieces)):
+        own = np.append(own, angles[(k + 1) * 18 // pieces])
+        unit = np.column_stack([np.cos(own), np.sin(own)]).round(9)
+        corners = [*(1.9 * unit), *(1.5 * unit[::-1])][::-1]
+        blocks.append(af.Block(corners, af.STONE, f"piece {k + 1}", part="arch", role="ring"))
+    drawn = af.masonry.assembled(blocks, af.Contact(1e9, 1e9, friction=0.6))
+    with pytest.raises(af.InvalidInput, match=r"the ring is 'piece 1'.* alone, .* each voussoir"):
+        find_ring(drawn)
+
+
 def test_a_stone_may_be_more_than_twice_as_deep_as_its_neighbours(tmp_path):
     """Its faces end far beyond its joints, whose ends are nearer to the intrados."""
 

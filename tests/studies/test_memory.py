@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.cases.provenance import hash_inputs
+from archfem.cases.provenance import hash_inputs, hash_sections
 from archfem.cases.structure_keys import cached_structure
 from archfem.dynamics import StiffnessDamping
 from archfem.dynamics.solvers import base
@@ -180,6 +180,27 @@ def test_cases_differ_where_their_arches_stand_in_another_order():
     assert len(digests) == 2
     same = {"structure": {"width": 1.0, "piers": piers}}
     assert hash_inputs(same) in digests  # where a number stands says nothing
+
+
+def test_a_quantity_is_the_same_in_any_spelling():
+    def digests(rest, width, friction, title="57 mm"):
+        settings = {
+            "title": title,
+            "structure": {"shape": "column", "breadth": width, "heights": [width, 1]},
+            "motion": {"file": "pulse.csv", "rest": rest},
+            "contacts": {"stone to stone": {"friction": friction}},
+        }
+        case = hash_inputs(settings)
+        return case, hash_sections(settings, Path(), ["structure", "motion", "contacts"])
+
+    first = digests("10 s", "57 mm", 0.5)
+    # 57e-3 and 57 * 1e-3 differ by round-off
+    for other in ((10, 0.057, 0.5), (10.0, "5.7 cm", 0.5), ("10000 ms", 57e-3, 0.5)):
+        assert digests(*other) == first
+    for other in ((1, "57 mm", 0.5), ("10 s", 0.0570001, 0.5), ("10 s", "57 mm", "none")):
+        assert not {*digests(*other)} & {*first}
+    # words that pint would compute are no quantities
+    assert digests(10, 0.057, 0.5, "2026-11-29") != digests(10, 0.057, 0.5, "1986")
 
 
 def test_a_mesh_serves_other_materials_and_no_other_shape():
