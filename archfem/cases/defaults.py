@@ -82,7 +82,7 @@ def list_default_keys(case: Case, item: Material | Contact) -> list[str]:
     section = "materials" if isinstance(item, Material) else "contacts"
     name, given = find_table(case.settings, item)
     # other values follow from a finish, or from the shape
-    preset = PRESETS[section].get(name)
+    preset = PRESETS[section].get(given.get("preset", name))
     return [
         key
         for key in DECIDING_VALUES[section]

@@ -28,7 +28,7 @@ from archfem.masonry.assembly import assembled
 from archfem.masonry.backfill import jointed_fill
 from archfem.masonry.block import Block
 from archfem.masonry.joint_closing import CONDITIONS, FINISHED_KEYS, usual_law, with_finish
-from archfem.masonry.materials import CONTACT_PRESETS, MATERIAL_PRESETS, Contact, Material
+from archfem.masonry.materials import CONTACT_PRESETS, MATERIAL_PRESETS, STONE, Contact, Material
 from archfem.masonry.shapes import bridges, rings
 from archfem.masonry.shapes.bridge_parts import Arch, Backfill, Paving, Pier, Sidewall
 from archfem.masonry.standing import StandingBody, carrying
@@ -39,6 +39,9 @@ Described = TypeVar("Described")
 
 # Parts of which a bridge has several, from left to right, each under its name
 BRIDGE_PARTS: Table = {"arches": Arch, "piers": Pier, "sidewalls": Sidewall}
+
+# Keys of a material: its fields, and the preset that has those that are left out
+MATERIAL_KEYS = {**declared_keys(Material), "preset": str}
 
 # Keys of a contact: its fields, or the finish of the faces in place of stiffnesses and closure
 CONTACT_KEYS = {**declared_keys(Contact), "finish": str}
@@ -298,16 +301,18 @@ def _resolve_preset(settings: Table, section: str, name: str) -> Any:
             f"'{name}' is not among the {section} {sorted(set(presets) | set(tables))}: "
             f'name one of them or write a table [{section}."{name}"]'
         )
-    # A table changes a preset of its name key by key.
+    # A table changes the preset of its name, or the one that it names, key by key.
     keys, place = declared_keys(cls), f"{section}.{name}"
-    values = {key: getattr(presets[name], key) for key in keys} if name in presets else {}
-    given = check_table(tables.get(name, {}), CONTACT_KEYS if cls is Contact else keys, place)
+    known = CONTACT_KEYS if cls is Contact else MATERIAL_KEYS
+    given = check_table(tables.get(name, {}), known, place)
+    preset = check_choice(given.pop("preset", name), f"{place}.preset", {*presets, name})
+    values = {key: getattr(presets[preset], key) for key in keys} if preset in presets else {}
     if "finish" in given:
         values |= _read_finish(given, place)
     values |= given
     if values.get("law") is not None:
         values["law"] = _joint_law(values["law"], f"{section}.{name}.law")
-    return _call(cls, f"{section}.{name}", **{"name": name, **values})
+    return _call(cls, f"{section}.{name}", **{**values, "name": given.get("name", name)})
 
 
 def find_table(settings: Table, item: Material | Contact) -> tuple[str, Table]:
@@ -391,7 +396,12 @@ class _PresetNames:
         for (section, name), item in self.objects.items():
             if PRESETS[section].get(name) != item:
                 table = _list_fields(item)
-                if table.pop("name") != name:
+                del table["name"]
+                if isinstance(item, Material) and item.strength == STONE.strength:
+                    # a changed copy of the preset, whose own values remain defaults
+                    table = {key: x for key, x in table.items() if x != getattr(STONE, key)}
+                    table |= {"preset": STONE.name} if name != STONE.name else {}
+                if item.name != name:
                     table["name"] = item.name
                 sections.setdefault(section, {})[name] = table
         return sections

@@ -89,7 +89,7 @@ def _case_sections() -> dict[str, Schema]:
     analysis = _analysis_sections()
     return analysis | {
         "structure": _any([*map(_shape, structure_keys.list_shapes()), _partial_structure()]),
-        "materials": _by_name(_table_of(Material)),
+        "materials": _by_name(_table(structure_keys.MATERIAL_KEYS, Material)),
         "contacts": _by_name(
             _table(structure_keys.CONTACT_KEYS, Contact, finish=_choice(*CONDITIONS))
         ),

@@ -1,5 +1,7 @@
 """Deciding values that a case does not give are marked as defaults."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -53,6 +55,28 @@ def test_values_that_are_given_are_not():
     assert (
         describe_defaults(af.Case.of({**given, "materials": materials, "contacts": contacts})) == ""
     )
+
+
+@pytest.mark.parametrize("name", ["stone", "light"])
+def test_a_changed_copy_of_the_preset_keeps_its_defaults(tmp_path, name):
+    """Whether it is copied in Python, or by the key `preset`; what is given by hand is given."""
+    column = af.column(breadth=0.6, heights=[1.2, 1.2])
+    light = replace(af.STONE, name=name, unit_weight=16e3, stands_for="a window beside it")
+    blocks = (*column.blocks[:2], replace(column.blocks[2], material=light))
+    analysis = af.Analysis(replace(column, blocks=blocks))
+    case = af.Case.read(analysis.write(tmp_path / "copy.toml"))
+    assert case.analysis == analysis
+    assert list_default_keys(case, light) == ["young", "strength"]
+    assert case.limit.strength is None
+    (key,) = case.settings["materials"]
+    assert (
+        case.settings["materials"][key].items() >= {"preset": "stone", "unit_weight": 16e3}.items()
+    )
+    given = af.Case.read(tmp_path / "copy.toml", [f'materials."{key}".strength="56 MPa"'])
+    assert list_default_keys(given, light) == ["young"]
+    assert given.limit.strength == 56e6
+    with pytest.raises(af.InvalidInput, match=r"materials\..*\.preset = 'marble' is not known"):
+        af.Case.read(tmp_path / "copy.toml", [f'materials."{key}".preset="marble"'])
 
 
 def test_python_and_files_have_the_same_defaults():
