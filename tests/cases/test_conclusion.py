@@ -1,11 +1,14 @@
 """Sentences of a report's conclusion: margins, doubts by weight, and what was not varied."""
 
 import json
+from dataclasses import replace
+from itertools import pairwise
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import xarray as xr
+from loose_blocks import BREADTH, HEIGHT, G, overturns, sine
 
 import archfem as af
 from archfem.cases import answers
@@ -546,6 +549,54 @@ def test_a_demand_that_overturns_it_across_its_plane_is_in_the_conclusion(ag, ov
     # a vehicle is no earthquake
     vars(data)["statements"] = {"rating": answers.Statement([], [])}
     assert conclusion._build_transverse(data) == []
+
+
+def wall_in_bond(**section):
+    """A wall of three courses, as thick and high as the block that rocks."""
+    blocks = [{"name": "ground", "outline": [[0, -1], [4, -1], [4, 0], [0, 0]], "fixed": True}]
+    for k, cuts in enumerate([(0, 1, 2, 3, 4), (0, 1.5, 2.5, 4), (0, 1, 2, 3, 4)]):
+        low, high = (HEIGHT / 3.0 * np.array([k, k + 1])).round(9).tolist()
+        blocks += [
+            {"name": f"{k} {a}", "outline": [[a, low], [b, low], [b, high], [a, high]]}
+            | {"part": "wall", "role": "pier"}
+            for a, b in pairwise(cuts)
+        ]
+    structure = {"shape": "blocks", "width": BREADTH, "gravity": G, "blocks": blocks}
+    return af.Case.of({"structure": structure, **section})
+
+
+def test_a_report_of_a_wall_has_its_falls_across_the_plane_as_one_rigid_body():
+    """The least half sine of frequency p that overturns it, integrated from impact to impact."""
+    edge = 0.33033
+    assert overturns(1.0, 1.002 * edge, 1)
+    assert not overturns(1.0, 0.998 * edge, 1)
+    data = data_of(wall_in_bond(), weak=verdict_of(), strong=verdict_of())
+    vars(data)["motions"] = {
+        name: replace(sine(1.0, edge / share, 1, 1e-3), name=name)
+        for name, share in (("weak", 1.25), ("strong", 0.8))
+    }
+    assert data.falls_across.keys() == {"strip", "whole"}  # a rectangle, which both are
+    for first, name in data.falls_across.values():
+        assert name == "strong"
+        assert 0.8 <= first.scale <= 0.8 * 1.01
+    scale = f"{data.falls_across['strip'][0].scale:#.3g}"
+    of = f"{scale} × 'strong', PGA {edge / 0.8 * G / 9.80665:.2f} g: the strip across the plane"
+    assert say_margin(data)[0].startswith(f"the least margin is below {of}")
+    assert [*conclusion._say_checks(data)] == [
+        f"it first falls at {of} as one rigid body, held by nothing else"
+    ]
+    (text,) = conclusion._build_transverse(data)
+    assert text.text.startswith("Held by nothing else, ")
+    rows = [row for name, row in conclusion._capacity_rows(data) if name == conclusion.ACROSS]
+    assert [(row.demand, row.factor) for row in rows] == [("'strong'", scale)] * 2
+    # without the strong one it stands at the motion, and the margin is above one
+    del data.motions["strong"]
+    del vars(data)["falls_across"]
+    assert 1.25 <= data.falls_across["whole"][0].scale <= 1.25 * 1.01
+    assert [*conclusion._say_checks(data)] == []
+    # a column is no wall in bond, and may be drawn across its plane
+    column = data_of(af.Case.of({"structure": {"shape": "column", "breadth": 1, "heights": [2]}}))
+    assert column.falls_across == {}
 
 
 @pytest.mark.parametrize("demand", [None, "0.2 g"])

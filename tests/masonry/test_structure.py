@@ -240,6 +240,35 @@ def test_a_strip_of_a_gable_overturns_before_the_gable_does():
     assert gable.transverse_push == (pytest.approx(0.6 / 3.0), "a strip from bottom to top")
 
 
+def test_a_wall_across_its_plane_is_a_strip_and_the_whole_less_its_openings():
+    """A door of 1 m in two courses of three; its stones end up to 4 mm from the bed."""
+    rows = [(0.0, 1.0, (0, 1)), (0.0, 1.004, (2, 3, 4)), (1.0, 2.0, (0, 0.5, 1))]
+    rows += [(1.004, 2.0, (2, 2.5, 4)), (2.0, 3.0, (0, 1.5, 3, 4))]
+    blocks = [af.Block(((0, -1), (4, -1), (4, 0), (0, 0)), af.STONE, "ground", fixed=True)]
+    for low, high, cuts in rows:
+        for a, b in pairwise(cuts):
+            outline = ((a, low), (b, low), (b, high), (a, high))
+            blocks.append(af.Block(outline, af.STONE, f"{low} {a}", part="wall", role="pier"))
+    wall = af.masonry.assembled(blocks, af.Contact(1e9, 4e8, friction=0.7), width=0.6)
+    columns = af.masonry.columns_across(wall)
+    strip, whole = columns["strip"], columns["whole"]
+    assert [len(each.free) for each in columns.values()] == [3, 3]
+    assert {joint.contact for joint in whole.joints} == {wall.joints[0].contact}
+    assert strip.weight == pytest.approx(0.6 * 3.0 * 20e3)
+    assert (whole.weight, whole.width) == (pytest.approx(wall.weight), 4.0)
+    weights = [block.area * block.material.unit_weight * 4.0 for block in whole.blocks[1:]]
+    assert weights == pytest.approx([0.6 * 20e3 * area for area in (3.0, 3.0, 4.0)])
+    pushes = [
+        af.collapse_factor(each, live=af.BodyForce(1.0), friction=None).factor
+        for each in columns.values()
+    ]
+    # thickness over height, and over twice the height of the centre
+    assert pushes == pytest.approx(
+        [0.6 / 3.0, 0.3 / ((3 * 0.5 + 3 * 1.5 + 4 * 2.5) / 10)], rel=2e-3
+    )
+    assert wall.transverse_push == (pytest.approx(0.2), "a strip from bottom to top")
+
+
 def test_a_clear_span_ends_at_the_piers_below_springers():
     """An arch of three stones between springers of its piers, whose faces are 3 m apart."""
     corners = {

@@ -37,6 +37,7 @@ from archfem.dynamics.collapse_state import (
     CollapseState,
 )
 from archfem.dynamics.history import History
+from archfem.dynamics.rocking_body import describe_first_fall
 from archfem.dynamics.verdict_range import HALF_STEP, UNVARIED, VerdictRange
 from archfem.masonry.structure import Structure, join_names, join_words
 from archfem.models.model import Doubt, Ends
@@ -88,6 +89,9 @@ _BEGUN = {RESULTS["risk"]: "risk_samples.nc", RESULTS["verdict_range"]: "variati
 
 # Demand of a push beside one that the report states in words
 UNCOMPARED = "not compared with the demand, which [limit] does not give"
+
+# Strip and whole of a wall as rigid bodies
+ACROSS = "across the plane"
 
 # Project in the templates of new cases
 PLACEHOLDER = "Name of the project"
@@ -162,7 +166,7 @@ def _say_movement(data: ReportData) -> Iterator[str]:
 
 
 def _say_checks(data: ReportData) -> Iterator[str]:
-    """Yield whether the checks of an assessment are met, and by how much."""
+    """Yield whether the checks of an assessment and across the plane are met, and by how much."""
     for check in list_checks(data):
         ratios = [x for x in (check.least, check.most, check.moved, check.bodies) if x is not None]
         met, by = "is met", f"{Ends.of(ratios):.3g} × the spectrum"
@@ -178,6 +182,8 @@ def _say_checks(data: ReportData) -> Iterator[str]:
             by = f"{check.moved:.3g} by displacements"
         kind = "check" if check.linear else "displacement check"
         yield f"the {kind} of {check.name} {met} ({by})"
+    for least, text in sorted(_describe_across(data))[:1]:
+        yield from [f"it first falls at {text}"] * (least <= 1.0)
 
 
 def _describe_peaks(runs: Iterable[History]) -> str:
@@ -254,6 +260,9 @@ def _build_transverse(data: ReportData) -> list[TextBlock]:
     if push < demand:
         text += f"; the demand of {demand:.3g} g is {demand / push:.2g} times that"
         manner = "doubt"
+    if data.falls_across:
+        text = text.removeprefix("nothing is checked across the plane of the drawing: ")
+        text += "; strip and whole, as one rigid body each, are in the table below"
     return [TextBlock(sentence(text), manner, lead="Across its plane?")]
 
 
@@ -353,6 +362,7 @@ def _describe_margin(data: ReportData) -> Iterator[str]:
     """Yield the least factor on the demand of an earthquake, maybe as a range, and the others."""
     checks = read_numbers(Ratios, data.statements.get("assessment"))
     margins = [*sorted(_describe_check(data, each) for each in checks)[:1], *describe_scales(data)]
+    margins += [(least, [f"below {text}"]) for least, text in sorted(_describe_across(data))[:1]]
     for k, (_, (first, *others)) in enumerate(sorted(margins)):
         rank = ("the least margin is", "the next is", "then follows")[min(k, 2)]
         yield from [f"{rank} {first}", *others]
@@ -362,6 +372,15 @@ def _describe_margin(data: ReportData) -> Iterator[str]:
         for row in data.statements[name].rows:
             if row.factor == "-" and data.runs:  # without runs it is the answer
                 yield f"{row.result}, {_say_uncompared(data)}: {row.outcome}"
+
+
+def _describe_across(data: ReportData) -> Iterator[tuple[float, str]]:
+    """Yield the scale at which each body across the plane first falls, if any, and in words."""
+    for key, (first, name) in data.falls_across.items():
+        if first.scale < np.inf:
+            peak = f"PGA {data.motions[name].pga / STANDARD_GRAVITY:.2f} g"
+            body = f"the {key} across the plane as one rigid body, held by nothing else"
+            yield first.scale, f"{first.scale:#.3g} × '{name}', {peak}: {body}"
 
 
 def _say_uncompared(data: ReportData) -> str:
@@ -469,6 +488,10 @@ def _capacity_rows(data: ReportData) -> Iterator[tuple[str, Row]]:
         name = f"{VARIATIONS} under '{motion}'" if motion else VARIATIONS
         outcome = "; ".join(filter(None, [computed.count, computed.displacements]))
         yield VARIATIONS, Row(name, "the same motion", outcome + computed.unanswered, "-", {})
+    for key, (first, name) in data.falls_across.items():
+        demand, factor = f"'{name}'", f"{first.scale:#.3g}" if first.scale < np.inf else "-"
+        outcome = describe_first_fall(first).removeprefix("; ") + ", held by nothing else"
+        yield ACROSS, Row(f"{ACROSS}, {key}", demand, outcome, factor, {})
     for result, statement in data.statements.items():
         of = f" of {name_spectrum(data)}" if result == "assessment" else ""
         for row in statement.rows:

@@ -17,8 +17,10 @@ from archfem.cases.case import Case
 from archfem.cases.run import CASE_FILE, MOTION_VARIABLE, RATING_FILE
 from archfem.cases.toml_file import Table, parse_tables
 from archfem.dynamics.history import History
+from archfem.dynamics.rocking_body import FirstFall, find_first_fall
 from archfem.dynamics.verdict_range import VerdictRange
 from archfem.errors import ArchfemError
+from archfem.masonry.shapes.rings import columns_across
 from archfem.models.builder import build
 from archfem.models.discretisation import Discretisation
 from archfem.models.model import Model
@@ -30,6 +32,9 @@ from archfem.view.pages.player_data import MAX_PACKED_BYTES, Scene
 
 # Results that the report shows, and does not state
 SHOWN_RESULTS = ("modes", "accuracy", "verdict_range")
+
+# Multiples of a motion at which a wall may fall across its plane [-]
+SCALES_ACROSS = 0.1, 2.0
 
 # Results of limit analysis, for which blocks are rigid
 STATIC_RESULTS = ("limit", "thickness", "rating", "assessment")
@@ -56,6 +61,24 @@ class ReportData:
     def motions(self) -> dict[str, Motion]:
         """Ground motions as applied: the whole ones, or of earlier versions those at the steps."""
         return {name: read_motion(run, name) for name, run in self.runs.items()}
+
+    @cached_property
+    def falls_across(self) -> dict[str, tuple[FirstFall, str]]:
+        """Least first fall of strip and whole of a wall in bond across its plane, and its motion.
+
+        Each is one rigid body, held by nothing else.
+        """
+        structure, found = self.case.structure, dict[str, tuple[FirstFall, str]]()
+        columns = columns_across(structure) if self.runs and structure.heads.any() else {}
+        for key, column in columns.items():
+            falls = [
+                (first, name)
+                for name, motion in self.motions.items()
+                if (first := find_first_fall(column, motion, SCALES_ACROSS))
+            ]
+            if falls:
+                found[key] = min(falls, key=lambda each: each[0].scale)
+        return found
 
     @cached_property
     def cut_motions(self) -> list[str]:

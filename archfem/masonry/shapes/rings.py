@@ -6,7 +6,7 @@ left springing.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import acos, asin, atan2, degrees, isfinite, pi, radians, sin, tan
 from typing import Any
@@ -209,6 +209,47 @@ def column(
         for k, y in enumerate(levels[1:-1])
     ]
     return Structure(tuple(blocks), tuple(joints), width, gravity, "column")
+
+
+@validate_arguments
+def columns_across(wall: Structure) -> dict[str, Structure]:
+    """Return a wall across its plane, held by nothing else: a strip of it, and the whole.
+
+    Both are as broad as the wall is thick, and have its courses. A course of the whole weighs as
+    much as that of the wall, less its openings, and its joints are as long as the wall.
+
+    Args:
+        wall: structure in its plane; its width is the thickness of the wall.
+
+    Returns:
+        Columns "strip", 1 m long, and "whole".
+
+    Example:
+        >>> list(af.masonry.columns_across(af.column(breadth=3.0, heights=[1.0], width=0.5)))
+        ['strip', 'whole']
+    """
+    blocks = [wall.blocks[number] for number in wall.free]
+    points = [block.points for block in blocks]
+    low, high = (np.array([end(each[:, 1]) for each in points])[:, None] for end in (min, max))
+    levels = [float(low.min())]
+    for y in np.unique([low, high]).tolist():
+        if y - levels[-1] > 0.3 * np.median(high - low):  # beds of a course differ by less
+            levels.append(y)
+    levels[-1] = float(high.max())
+    covered = np.clip(high, levels[:-1], levels[1:]) - np.clip(low, levels[:-1], levels[1:])
+    weights = [[block.area * block.material.unit_weight] for block in blocks]
+    length, heights = float(np.ptp(np.concatenate(points)[:, 0])), np.diff(levels)
+    unit_weights = np.sum(weights * covered / (high - low), axis=0) / (length * heights)
+    contact, material = wall.joints[int(wall.heads.argmin())].contact, blocks[0].material
+    given = {"material": material, "contact": contact, "gravity": wall.gravity}
+    strip = column(breadth=wall.width, heights=heights.tolist(), **given)
+    courses = [
+        replace(block, material=replace(material, unit_weight=weight, stands_for="its length"))
+        for block, weight in zip(strip.blocks[1:], unit_weights.tolist(), strict=True)
+    ]
+    whole = replace(strip, blocks=(strip.blocks[0], *courses), width=length)
+    both = {"strip": strip, "whole": whole}
+    return {key: replace(each, name=f"{wall.name}, {key} across") for key, each in both.items()}
 
 
 @record_origin
