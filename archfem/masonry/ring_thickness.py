@@ -9,7 +9,6 @@ from archfem._typing import Array, Metres, Numbers
 from archfem._validation import check_between, validate_arguments, validate_methods
 from archfem.errors import InvalidInput, InvalidStructure
 from archfem.masonry.block import Block, as_point, check_simple
-from archfem.masonry.parts import find_undivided
 from archfem.masonry.structure import CONTACT_TOLERANCE, Joint, Structure, join_names
 
 
@@ -112,12 +111,10 @@ def find_ring(structure: Structure, part: str | None = None) -> Ring:
                 f"'{structure.blocks[k].name}' has {len(numbers)} joints ({names}): a ring whose "
                 "thickness changes is one layer of stones, none missing, that carry nothing else"
             )
-    given = structure.blocks, structure.joints, structure.pairs, structure.ends
-    if len(stones) < 3 and stones & find_undivided(*given).keys():
-        names = join_names([f"'{structure.blocks[k].name}'" for k in sorted(stones)])
+    if len(stones) < 3:
         raise InvalidInput(
-            f"the ring is {names} alone, and a ring hinges at four joints or more: draw the "
-            "outline of each voussoir"
+            f"ring '{part}' is drawn in {len(stones)} of the three stones or more between four "
+            "joints at which it could hinge: draw the outline of each voussoir"
         )
     return Ring(structure, *_follow_ring(structure, stones, touching))
 

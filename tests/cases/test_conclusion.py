@@ -587,8 +587,8 @@ def test_a_report_of_a_wall_has_its_falls_across_the_plane_as_one_rigid_body():
     ]
     (text,) = conclusion._build_transverse(data)
     assert text.text.startswith("Held by nothing else, ")
-    rows = [row for name, row in conclusion._capacity_rows(data) if name == conclusion.ACROSS]
-    assert [(row.demand, row.factor) for row in rows] == [("'strong'", scale)] * 2
+    rows = [row for name, row in conclusion._capacity_rows(data) if not name]
+    assert [(row.demand, row.factor) for row in rows] == [("'strong', of 0.1 to 2 ×", scale)] * 2
     # without the strong one it stands at the motion, and the margin is above one
     del data.motions["strong"]
     del vars(data)["falls_across"]

@@ -25,7 +25,7 @@ from archfem.cases.report.doubts import (
     peak_of_ground,
     read_spectrum,
 )
-from archfem.cases.report.report_data import SHOWN_RESULTS, ReportData
+from archfem.cases.report.report_data import SCALES_ACROSS, SHOWN_RESULTS, ReportData
 from archfem.cases.report.scales import describe_scales, say_first_failure, say_fragile
 from archfem.cases.report.study_findings import read_study, say_what_changes
 from archfem.cases.result_text import PushFactors, peak_of_spectrum, site_acceleration
@@ -89,9 +89,6 @@ _BEGUN = {RESULTS["risk"]: "risk_samples.nc", RESULTS["verdict_range"]: "variati
 
 # Demand of a push beside one that the report states in words
 UNCOMPARED = "not compared with the demand, which [limit] does not give"
-
-# Strip and whole of a wall as rigid bodies
-ACROSS = "across the plane"
 
 # Project in the templates of new cases
 PLACEHOLDER = "Name of the project"
@@ -262,7 +259,6 @@ def _build_transverse(data: ReportData) -> list[TextBlock]:
         manner = "doubt"
     if data.falls_across:
         text = text.removeprefix("nothing is checked across the plane of the drawing: ")
-        text += "; strip and whole, as one rigid body each, are in the table below"
     return [TextBlock(sentence(text), manner, lead="Across its plane?")]
 
 
@@ -489,9 +485,10 @@ def _capacity_rows(data: ReportData) -> Iterator[tuple[str, Row]]:
         outcome = "; ".join(filter(None, [computed.count, computed.displacements]))
         yield VARIATIONS, Row(name, "the same motion", outcome + computed.unanswered, "-", {})
     for key, (first, name) in data.falls_across.items():
-        demand, factor = f"'{name}'", f"{first.scale:#.3g}" if first.scale < np.inf else "-"
+        demand = f"'{name}', of {SCALES_ACROSS[0]:g} to {SCALES_ACROSS[1]:g} ×"
+        factor = f"{first.scale:#.3g}" if first.scale < np.inf else "-"
         outcome = describe_first_fall(first).removeprefix("; ") + ", held by nothing else"
-        yield ACROSS, Row(f"{ACROSS}, {key}", demand, outcome, factor, {})
+        yield "", Row(f"across the plane, {key}", demand, outcome, factor, {})
     for result, statement in data.statements.items():
         of = f" of {name_spectrum(data)}" if result == "assessment" else ""
         for row in statement.rows:

@@ -68,16 +68,14 @@ class ReportData:
 
         Each is one rigid body, held by nothing else.
         """
-        structure, found = self.case.structure, dict[str, tuple[FirstFall, str]]()
+        structure = self.case.structure
         columns = columns_across(structure) if self.runs and structure.heads.any() else {}
+        found = dict[str, tuple[FirstFall, str]]()
         for key, column in columns.items():
-            falls = [
-                (first, name)
-                for name, motion in self.motions.items()
-                if (first := find_first_fall(column, motion, SCALES_ACROSS))
-            ]
-            if falls:
-                found[key] = min(falls, key=lambda each: each[0].scale)
+            for name, motion in self.motions.items():
+                first = find_first_fall(column, motion, SCALES_ACROSS)
+                if first and (key not in found or first.scale < found[key][0].scale):
+                    found[key] = first, name
         return found
 
     @cached_property

@@ -215,8 +215,9 @@ def column(
 def columns_across(wall: Structure) -> dict[str, Structure]:
     """Return a wall across its plane, held by nothing else: a strip of it, and the whole.
 
-    Both are as broad as the wall is thick, and have its courses. A course of the whole weighs as
-    much as that of the wall, less its openings, and its joints are as long as the wall.
+    Both are as broad as the wall is thick, and have its courses, one at each bed of a stone. A
+    course of the whole weighs as much as that of the wall, less its openings; its joints are as
+    long as the wall.
 
     Args:
         wall: structure in its plane; its width is the thickness of the wall.
@@ -229,27 +230,22 @@ def columns_across(wall: Structure) -> dict[str, Structure]:
         ['strip', 'whole']
     """
     blocks = [wall.blocks[number] for number in wall.free]
-    points = [block.points for block in blocks]
-    low, high = (np.array([end(each[:, 1]) for each in points])[:, None] for end in (min, max))
-    levels = [float(low.min())]
-    for y in np.unique([low, high]).tolist():
-        if y - levels[-1] > 0.3 * np.median(high - low):  # beds of a course differ by less
-            levels.append(y)
-    levels[-1] = float(high.max())
+    ends = np.array([[block.points.min(axis=0), block.points.max(axis=0)] for block in blocks])
+    low, high = ends[:, 0, 1:], ends[:, 1, 1:]
+    levels, length = np.unique(np.round([low, high], 6)), float(np.ptp(ends[:, :, 0]))
     covered = np.clip(high, levels[:-1], levels[1:]) - np.clip(low, levels[:-1], levels[1:])
-    weights = [[block.area * block.material.unit_weight] for block in blocks]
-    length, heights = float(np.ptp(np.concatenate(points)[:, 0])), np.diff(levels)
-    unit_weights = np.sum(weights * covered / (high - low), axis=0) / (length * heights)
-    contact, material = wall.joints[int(wall.heads.argmin())].contact, blocks[0].material
-    given = {"material": material, "contact": contact, "gravity": wall.gravity}
+    weights = np.array([[block.area * block.material.unit_weight] for block in blocks])
+    heights, material = np.diff(levels), blocks[0].material
+    contact = wall.joints[int(wall.heads.argmin())].contact
+    given: Any = {"material": material, "contact": contact, "gravity": wall.gravity}
     strip = column(breadth=wall.width, heights=heights.tolist(), **given)
+    unit_weights = (weights / (high - low) * covered).sum(axis=0) / (length * heights)
     courses = [
         replace(block, material=replace(material, unit_weight=weight, stands_for="its length"))
         for block, weight in zip(strip.blocks[1:], unit_weights.tolist(), strict=True)
     ]
     whole = replace(strip, blocks=(strip.blocks[0], *courses), width=length)
-    both = {"strip": strip, "whole": whole}
-    return {key: replace(each, name=f"{wall.name}, {key} across") for key, each in both.items()}
+    return {"strip": strip, "whole": whole}
 
 
 @record_origin
