@@ -28,6 +28,7 @@ from archfem.limit.mechanism_count import (
     leave_out_walls,
 )
 from archfem.limit.mechanism_kinematics import first_verified_mechanism
+from archfem.masonry.parts import find_directions, is_on_back
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import Structure, join_names
 from archfem.models.model import Doubt
@@ -213,11 +214,15 @@ def doubt_unassessed_joints(joints: xr.Dataset, structure: Structure) -> list[Do
     soft, carrying = set(find_yielding_blocks(structure)), set(joints["role"].values[judged])
     # large displacements follow every stone: there only joints at rings and piers matter
     is_large, blocks = joints.attrs.get("displacements") == "large", structure.blocks
+    touches = [(*joint.blocks, joint.ends) for joint in structure.joints]
+    directions = find_directions(blocks, touches)
+    # what lies on the back of a ring, or bears nothing at rest, is no hinge
+    out = judged | structure.heads | joints["open"].isel(time=0).values
     left_out = [
         number
-        for number, joint in enumerate(structure.joints)
-        if not (judged[number] or structure.heads[number] or soft & set(joint.blocks))
-        and (not is_large or carrying & {blocks[k].role for k in joint.blocks})
+        for number, (a, b, ends) in enumerate(touches)
+        if not (out[number] or soft & {a, b} or is_on_back(blocks[a], blocks[b], ends, directions))
+        and (not is_large or carrying & {blocks[a].role, blocks[b].role})
     ]
     own = joints.isel(joint=left_out)
     flags = find_failed_joints(own)

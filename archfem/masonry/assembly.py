@@ -10,7 +10,7 @@ from archfem._validation import check_type, validate_arguments
 from archfem.errors import InvalidInput, InvalidStructure
 from archfem.masonry.block import Block
 from archfem.masonry.materials import Contact
-from archfem.masonry.parts import Direction, assign_roles, find_directions
+from archfem.masonry.parts import Direction, assign_roles, find_directions, is_on_back
 from archfem.masonry.structure import CONTACT_TOLERANCE, Joint, Structure
 from archfem.units import G
 
@@ -66,11 +66,13 @@ def assembled(
     for a, b, ends in touches:
         if {a, b} not in joined:
             owner = _select_owner(blocks[a], blocks[b], ends, directions)
-            part = owner.part
+            part, role = owner.part, owner.role
+            if role == "ring" and is_on_back(blocks[a], blocks[b], ends, directions):
+                part, role = f"extrados of {part}", "other"
             (x0, y0), (x1, y1) = ends.tolist()
             law = of(blocks[a], blocks[b])
             check_type(law, Contact, "contact of two blocks", "return a Contact from the function")
-            joint = Joint((a, b), (x0, y0), (x1, y1), law, "", part, owner.role)  # named below
+            joint = Joint((a, b), (x0, y0), (x1, y1), law, "", part, role)  # named below
             if part in directions and part not in numbered and directions[part].separates(ends):
                 across[part].append(joint)
             else:

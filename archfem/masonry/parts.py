@@ -329,6 +329,22 @@ def find_directions(
     return {part: _fit_direction(np.array(places), roles[part]) for part, places in stones.items()}
 
 
+def is_on_back(a: Block, b: Block, line: Array, directions: Mapping[str, Direction]) -> bool:
+    """Return whether a joint of two free stones is along the outer face of a ring, no hinge of it.
+
+    The other stone, of a spandrel or a pier, is beyond it. A flat bed below a springing is not.
+    """
+    for ring, other in ((a, b), (b, a)):
+        direction = directions.get(ring.part)
+        if direction is None or ring.role != "ring" or other.role == "ring" or other.fixed:
+            continue
+        if direction.centre is not None or not direction.upright:  # an upright one has none
+            away = other.centroid - line.mean(axis=0)
+            beyond = direction.outward(line.mean(axis=0)) @ away > 0.0
+            return bool(beyond) and not direction.separates(line)
+    return False
+
+
 def _fit_direction(places: Array, role: str) -> Direction:
     """Fit the direction of a part through points (n, 2)."""
     middle = places.mean(axis=0)

@@ -143,6 +143,52 @@ def test_large_displacements_doubt_joints_at_rings_and_piers_alone():
         assert doubted == set(said)
 
 
+def gate(role):
+    """A semicircle on piers, and three spandrel stones a side from its extrados to the outside."""
+    sizes = {"radius": 1.6, "thickness": 0.3, "voussoirs": 12, "pier_breadth": 0.8}
+    bare = af.arch_on_piers(**sizes, courses=[0.6, 0.6], chords=1)
+    x, y = 1.75 * np.cos(np.arange(4) * np.pi / 12.0), 1.75 * np.sin(np.arange(4) * np.pi / 12.0)
+    stones = []
+    for k in range(3):
+        corners = np.array([(x[k], y[k]), (2.0, y[k]), (2.0, y[k + 1]), (x[k + 1], y[k + 1])])
+        for side, points in (("east", corners), ("west", corners[::-1] * (-1.0, 1.0))):
+            given = {"part": f"{side} spandrel", "role": role}
+            stones.append(af.Block(points.tolist(), af.STONE, f"{side} {k}", **given))
+    return af.masonry.assembled([*bare.blocks, *stones], DRY)
+
+
+@pytest.mark.parametrize("role", ["other", "pier"])
+def test_faces_of_a_spandrel_on_the_extrados_are_no_hinges_of_the_arch(role):
+    """All six fail throughout: no mechanism and no doubt. A bed on a pier is one or counts."""
+    structure = gate(role)
+    by_name = {joint.name: joint for joint in structure.joints}
+    backs = [name for name in by_name if name.startswith("voussoir")]
+    assert len(backs) == 6
+    bed = "right pier course 2 to east 0" if role == "other" else "east spandrel, base"
+    for name in backs:
+        assert np.hypot(*by_name[name].ends.T) == pytest.approx(1.75)
+        part = f"{name.split()[-2]} spandrel" if role == "other" else "extrados of arch"
+        assert (by_name[name].part, by_name[name].role) == (part, "other")
+    for kind in ("small", "large"):
+        joints = history(structure, [*backs, bed], kind)
+        assert not any(af.first_mechanisms(af.History(joints, structure)).values())
+        causes = [doubt.cause for doubt in doubt_unassessed_joints(joints, structure)]
+        assert [bed in cause for cause in causes] == [True] * (role == "other")
+        assert not any("voussoir" in cause for cause in causes)
+    counted = dict(zip(by_name, structure.judged, strict=True))
+    assert counted[bed] is np.bool_(role == "pier")
+
+
+def test_a_joint_that_bears_nothing_at_rest_is_no_hinge():
+    """One end of the lintel has no force, from the start on or later."""
+    structure = portal("other")
+    for start, doubted in (0, False), (1, True):
+        found = np.full((2, 4, 3), [1e4, 0.0, 0.0])
+        found[start:, 2] = 0.0
+        joints = af.joints.joint_dataset(structure, found, 0.01 * np.arange(2.0))
+        assert bool(doubt_unassessed_joints(joints, structure)) is doubted
+
+
 def test_fill_that_slides_is_no_doubt_but_left_out():
     """One ring below fill, all of whose joints hinge."""
     arch = af.shapes.Arch(span=4.0, rise=1.6, thickness=0.3, voussoirs=13)
