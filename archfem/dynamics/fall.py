@@ -33,7 +33,7 @@ from archfem.dynamics.rigid_body.simulation import (
     RigidBlockSimulation,
 )
 from archfem.dynamics.rigid_body.time_stepping import MAX_ENERGY_GAIN
-from archfem.dynamics.rocking_body import doubt_courses
+from archfem.dynamics.rigid_body.rocking_body import doubt_courses
 from archfem.dynamics.schemes import StiffnessDamping, Viscous
 from archfem.dynamics.separation import is_overturning, is_resting, swings_little
 from archfem.dynamics.state import State

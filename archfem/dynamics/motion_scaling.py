@@ -24,7 +24,7 @@ from archfem.dynamics.fall import state_rigid_falls
 from archfem.dynamics.history import Ending, History, first_mechanisms, partial_history
 from archfem.dynamics.monitor import FILL_TENSION, PULLED
 from archfem.dynamics.recorder import Record
-from archfem.dynamics.rocking_body import FirstFall, describe_first_fall, find_first_fall
+from archfem.dynamics.rigid_body.rocking_body import FirstFall, describe_first_fall, find_first_fall
 from archfem.dynamics.schemes import EffectiveDamping, Viscous
 from archfem.dynamics.solvers.integrator import Stepper
 from archfem.dynamics.time_history import time_history

@@ -10,7 +10,7 @@ from loose_blocks import BREADTH, HEIGHT, G, floor, overturns, sine
 import archfem as af
 from archfem.dynamics import LooseBlocks, RigidBlockSimulation
 from archfem.dynamics.collapse_state import CollapseState
-from archfem.dynamics.rocking_body import (
+from archfem.dynamics.rigid_body.rocking_body import (
     FirstFall,
     describe_first_fall,
     doubt_courses,

@@ -14,12 +14,13 @@ References:
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from math import hypot, inf, isfinite, log, pi
+from math import cos, hypot, inf, isfinite, log, pi, sin
 from typing import NamedTuple
 
 import numpy as np
 
-from archfem._typing import Array, Numbers
+from archfem._numba import entry, kernel
+from archfem._typing import Array, Flags
 from archfem.dynamics.collapse_state import (
     DISLOCATION,
     FALLEN_STATES,
@@ -86,81 +87,13 @@ class RockingBody:
         (time,), (displacement,), (slides,) = self.rock_scaled(motion, np.array([scale]))
         return None if slides else Rocking(float(time), float(displacement))
 
-    def rock_scaled(self, motion: Motion, scales: Array) -> tuple[Array, Array, Array]:
+    def rock_scaled(self, motion: Motion, scales: Array) -> tuple[Array, Array, Flags]:
         """Return times of fall, displacements, and what slides, by multiples of a motion (k,)."""
         ground = motion.at(STEP * (np.arange(int((motion.duration + REST) / STEP)) + 0.5))
-        starts, k = self._find_starts(ground, scales.max()), 0
-        times, farthest = np.full(scales.shape, inf), np.zeros(scales.shape)
-        slides, side = np.zeros(scales.shape, bool), np.zeros(scales.shape, int)
-        # angles of bodies that have fallen or slid are not a number
-        angle, speed, (x, y) = np.zeros(scales.shape), np.zeros(scales.shape), self.arms[1]
-        while k < len(ground):
-            still = (angle == 0.0) & (speed == 0.0)
-            if (still | np.isnan(angle)).all():
-                later = starts[np.searchsorted(starts, k) :]
-                if not still.any() or not later.size:
-                    break
-                k = int(later[0])
-            across, up = ground[k, 0] * scales, ground[k, 1] * scales + self.gravity
-            # about the left end, or else the right one
-            side = np.where(still, y * across > x * up, side)
-            turn, slipping = self._accelerate((angle, speed, side), across, up)
-            slides |= slipping
-            angle[slipping] = np.nan
-            angle, speed, side = self._advance(angle, speed, side, turn)
-            far = 2.0 * np.array(self.reach)[side] * np.sin(0.5 * np.abs(angle))
-            farthest = np.fmax(farthest, far)
-            lost = np.abs(angle) > LOST
-            times[lost], angle[lost] = STEP * (k + 1), np.nan
-            k += 1
-        return times, farthest, slides
-
-    def _find_starts(self, ground: Array, scale: float) -> Numbers:
-        """Return the steps in which a body at rest may turn or slide, at any multiple up to one."""
-        across, up = scale * ground[:, 0], scale * ground[:, 1] + self.gravity
-        (right, high), (left, low) = self.arms
-        turns = (low * across > left * up) | (high * across < right * up)
-        along = across * self.foot[0] + up * self.foot[1]
-        normal = up * self.foot[0] - across * self.foot[1]
-        return np.flatnonzero(turns | (np.abs(along) > self.friction * normal))
-
-    def _accelerate(
-        self, state: tuple[Array, Array, Array], across: Array, up: Array
-    ) -> tuple[Array, Array]:
-        """Return θ'' under accelerations of ground and weight, and what slides or lifts."""
-        angle, speed, side = state
-        x, y = np.array(self.arms)[side].T
-        c, s = np.cos(angle), np.sin(angle)
-        x, y = x * c - y * s, x * s + y * c
-        turn = (y * across - x * up) / (self.inertia + x * x + y * y)
-        turn[(angle == 0.0) & (speed == 0.0) & (turn * (2 * side - 1) <= 0.0)] = 0.0
-        # the force on the foot, over the mass, along it and normal to it
-        force = across - y * turn - x * speed**2, up + x * turn - y * speed**2
-        along = force[0] * self.foot[0] + force[1] * self.foot[1]
-        normal = force[1] * self.foot[0] - force[0] * self.foot[1]
-        return turn, np.abs(along) > self.friction * normal
-
-    def _advance(
-        self, angle: Array, speed: Array, side: Array, turn: Array
-    ) -> tuple[Array, Array, Array]:
-        """Return angles, speeds and the ends about which bodies turn a step later."""
-        speed = speed + STEP * turn
-        after = angle + STEP * speed
-        landing = np.flatnonzero((angle != 0.0) & (after * angle <= 0.0))
-        if not landing.size:
-            return after, speed, side
-        side = side.copy()
-        arms = np.array(self.arms)
-        (x, y), (other, high) = arms[side[landing]].T, arms[1 - side[landing]].T
-        moment = self.inertia + other * other + high * high
-        share = angle[landing] / (angle - after)[landing]  # of the step until it lands
-        kept = speed[landing] * np.maximum(self.inertia + x * other + y * high, 0.0) / moment
-        # slower than what the weight stops within a step
-        rests = np.abs(kept) < STEP * self.gravity * np.abs(other) / moment
-        speed[landing] = np.where(rests, 0.0, kept)
-        after[landing] = (1.0 - share) * STEP * speed[landing]
-        side[landing] = np.where(rests, side[landing], 1 - side[landing])
-        return after, speed, side
+        body = self.arms, self.reach, self.foot, self.inertia, self.gravity, self.friction
+        found = np.zeros((len(scales), 3))
+        rock_steps(ground, scales, body, found)
+        return found[:, 0], found[:, 1], found[:, 2] > 0.0
 
     def first_fall(self, motion: Motion, between: tuple[float, float]) -> FirstFall | None:
         """Return the first fall over multiples of a motion; None if it slides at a smaller one."""
@@ -173,6 +106,67 @@ class RockingBody:
             return None
         again = scales[first:][~(fell | slides)[first:]].tolist()
         return FirstFall([*scales.tolist(), inf][first], (again[0], again[-1]) if again else None)
+
+
+@entry
+def rock_steps(ground, scales, body, found):  # type: ignore
+    """Follow a body under multiples of a motion (k,): its fall, displacement and sliding (k, 3).
+
+    The body is of the fields of `RockingBody`, with the direction of its foot.
+    """
+    arms, reach, _, inertia, gravity, _ = body
+    for n in range(len(scales)):
+        angle, speed, side, found[n, 0] = 0.0, 0.0, 0, inf
+        for k in range(len(ground)):
+            across, up = scales[n] * ground[k, 0], scales[n] * ground[k, 1] + gravity
+            # at rest: about the left end, or else the right one
+            if angle == 0.0 and speed == 0.0:
+                side = int(arms[1][1] * across > arms[1][0] * up)
+            turn, slips = _accelerate(body, (angle, speed, side), across, up)
+            if slips:
+                found[n, 2] = 1.0
+                break
+            before, speed = angle, speed + STEP * turn
+            angle += STEP * speed
+            if before != 0.0 and angle * before <= 0.0:
+                share = before / (before - angle)  # of the step until it lands
+                speed, side = _land(arms, inertia, gravity, side, speed)
+                angle = (1.0 - share) * STEP * speed
+            found[n, 1] = max(found[n, 1], 2.0 * reach[side] * sin(0.5 * abs(angle)))
+            if abs(angle) > LOST:
+                found[n, 0] = STEP * (k + 1)
+                break
+
+
+@kernel
+def _accelerate(body, state, across, up):  # type: ignore
+    """Return θ'' under accelerations of ground and weight, and whether it slides or lifts."""
+    arms, _, foot, inertia, _, friction = body
+    angle, speed, side = state
+    # arm from the end to the centroid, turned
+    c, s = cos(angle), sin(angle)
+    x, y = arms[side][0] * c - arms[side][1] * s, arms[side][0] * s + arms[side][1] * c
+    turn = (y * across - x * up) / (inertia + x * x + y * y)
+    # at rest the foot supports what would turn it inwards
+    if angle == 0.0 and speed == 0.0 and turn * (2 * side - 1) <= 0.0:
+        turn = 0.0
+    # the force on the foot, over the mass, along it and normal to it
+    right, rise = across - y * turn - x * speed**2, up + x * turn - y * speed**2
+    along, normal = right * foot[0] + rise * foot[1], rise * foot[0] - right * foot[1]
+    return turn, abs(along) > friction * normal
+
+
+@kernel
+def _land(arms, inertia, gravity, side, speed):  # type: ignore
+    """Return the speed kept at an impact, 0 where it comes to rest, and the end about it turns."""
+    (x, y), (other, high) = arms[side], arms[1 - side]
+    # the angular momentum about the other end is kept
+    moment = inertia + other * other + high * high
+    kept = speed * max(inertia + x * other + y * high, 0.0) / moment
+    # slower than what the weight stops within a step
+    if abs(kept) < STEP * gravity * abs(other) / moment:
+        return 0.0, side
+    return kept, 1 - side
 
 
 def find_first_fall(
