@@ -95,8 +95,12 @@ class Scales(NamedTuple):
     motion: str
     pga: float  # of the motion [g]
     held: float  # largest below any at which it does not stand; 0 for none
-    states: Mapping[str, float]  # smallest at which it is in a state, as of `CollapseScale`
+    states: Mapping[str, float]  # smallest that was run at which it is in a state
     unfinished: bool  # whether Ctrl-C has ended the search
+    all_steps: float | None = None  # at which it falls by all time steps
+    as_one: float | None = None  # at which a stack falls as one rigid body
+    moves_in_all: bool = False  # whether it moves as a mechanism at all that were run
+    again: Sequence[float] = ()  # beyond a fall, at which it stands
 
 
 Numbers = TypeVar("Numbers")
@@ -168,12 +172,16 @@ def state_scale(
     """Return the files with what is stated of a search of scales, and with its runs."""
     result, pga, words = RESULTS["scale"], motion.pga / STANDARD_GRAVITY, found.sentence
     files = dict[str, str]()
-    if isinstance(found, CollapseScale):
-        files["scale.csv"] = ResultTable(*found.rows()).csv
-    else:
-        words += "; a fall was not computed"
     held = found.held
     scales = Scales(motion.name, pga, held, found.states, found.interrupted)
+    if isinstance(found, CollapseScale):
+        files["scale.csv"] = ResultTable(*found.rows()).csv
+        ends = found.upper, found.as_one.scale if found.as_one else np.inf
+        reached = [scale if scale < np.inf else None for scale in ends]
+        scales = scales._replace(all_steps=reached[0], as_one=reached[1], again=found.above)
+        scales = scales._replace(moves_in_all=found.moves_in_all)
+    else:
+        words += "; a fall was not computed"
     factor = f"{held:#.3g}" if held else "-"
     row = Row(result, f"'{motion.name}', PGA {pga:.2f} g", words, factor, scales._asdict())
     stated = Statement([f"{result}: {words}"], [row], found.doubts).with_lines(lines)

@@ -107,8 +107,6 @@ def scale(options: argparse.Namespace) -> int:
         write_progress_line("scale", f"{len(made)} runs of the interrupted search are kept")
     with record_doubts(case.structure) as doubts:
         found = search(case.analysis, motion, made=made)
-    # of a run that Ctrl-C ended nothing is kept
-    doubts = [line for line in doubts if not line.startswith(f"{DOUBT_MARK}interrupted at ")]
     files: Files = {**answers.state_scale(found, motion, doubts)}
     doubts += [f"{DOUBT_MARK}{doubt}" for doubt in found.doubts]
     text = "\n".join([f"{motion.name}: {found}", *dict.fromkeys(doubts), "", found.table()])

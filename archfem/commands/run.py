@@ -179,9 +179,9 @@ def record_doubts(structure: Structure) -> Iterator[list[str]]:
     doubts = [f"{DOUBT_MARK}{doubt}" for doubt in structure_doubts(structure)]
     handler = logging.Handler(logging.WARNING)
     handler.emit = lambda record: doubts.append(f"{DOUBT_MARK}{record.getMessage()}")  # type: ignore[method-assign]
-    # doubts of runs are kept by the runs, and their pace is that of the machine
+    # doubts of runs are kept by the runs; interruptions and the pace are no doubts of an answer
     handler.addFilter(lambda record: not any(isinstance(x, Doubt) for x in record.args or ()))
-    handler.addFilter(lambda record: not hasattr(record, "of_pace"))
+    handler.addFilter(lambda record: not hasattr(record, "of_run"))
     logger.addHandler(handler)
     try:
         yield doubts

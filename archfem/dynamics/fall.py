@@ -5,7 +5,7 @@ outside their joints. All blocks then continue as free rigid blocks until they r
 (`dynamics.rigid_body`), from the positions and the momentum of the model.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
@@ -26,6 +26,7 @@ from archfem.dynamics.collapse_state import (
 from archfem.dynamics.history import Ending, History, with_fall
 from archfem.dynamics.loose_fill import Field, interpolate_field, loosen_fill
 from archfem.dynamics.rigid_body.bodies import FallFrame, LooseBlocks, masses_of
+from archfem.dynamics.rigid_body.rocking_body import doubt_courses
 from archfem.dynamics.rigid_body.simulation import (
     MAX_COMPARED_BLOCKS,
     MAX_STEP_CHANGE,
@@ -33,7 +34,6 @@ from archfem.dynamics.rigid_body.simulation import (
     RigidBlockSimulation,
 )
 from archfem.dynamics.rigid_body.time_stepping import MAX_ENERGY_GAIN
-from archfem.dynamics.rigid_body.rocking_body import doubt_courses
 from archfem.dynamics.schemes import StiffnessDamping, Viscous
 from archfem.dynamics.separation import is_overturning, is_resting, swings_little
 from archfem.dynamics.state import State
@@ -94,7 +94,7 @@ def follow_fall(
     states: tuple[State, State],
     motion: Motion,
     damping: Viscous | None,
-    whole: bool = True,
+    whole: bool,
 ) -> History:
     """Add the fall of loose or overturning blocks, and the state of collapse, to a history.
 
@@ -103,38 +103,23 @@ def follow_fall(
     the fall could not be followed to its end and no block was lost, there is no state of collapse.
     Ctrl-C and SIGTERM end it with what was computed.
     """
-    try:
-        # one report of all passes, each of which may be short
-        with ProgressReport(motion.name, None, rarely=True):
-            return _follow_fall(history, model, states, motion, damping, whole)
-    except KeyboardInterrupt:  # before the first step
-        return mark_interrupted(history, f"{states[1].time:.4g} s")
-
-
-def _follow_fall(
-    history: History,
-    model: Model,
-    states: tuple[State, State],
-    motion: Motion,
-    damping: Viscous | None,
-    whole: bool,
-) -> History:
-    """Add a fall and the state of collapse to a history, unless interrupted at once."""
     (start, state), structure, ending = states, model.structure, history.ending
     rocking_ratio = damping.restitution if isinstance(damping, StiffnessDamping) else None
     origin, _ = model.rigid_motions(start.q, start.velocity)
     tilts = ending is Ending.FINISHED and is_overturning(model, state)
     doubts: list[Doubt] = []
     if tilts or ending in (Ending.PARTED, Ending.MET):
-        dataset, frames = simulate_fall(model, state, motion, rocking_ratio, whole)
+        try:
+            dataset, frames = simulate_fall(model, state, motion, rocking_ratio, whole)
+        except KeyboardInterrupt:  # before the first step
+            return mark_interrupted(history, f"{state.time:.4g} s")
         fall = classify_collapse(structure, frames, origin)
         until_lost = [each for each in frames if fall.time is None or each.time <= fall.time]
         dataset.attrs["fall_unsettled_early"] = until_lost[-1].settling.unsettled_share
         attrs = history.dataset.attrs | dataset.attrs
         history = replace(history, dataset=history.dataset.merge(dataset).assign_attrs(attrs))
         doubts += _doubt_fall(structure, dataset)
-        failure = dataset.attrs["fall_failure"]
-        if failure == "interrupted":
+        if (failure := dataset.attrs["fall_failure"]) == "interrupted":
             history = mark_interrupted(history, f"{frames[-1].time:.4g} s, in a fall")
         elif failure:
             words = "loose blocks were followed until {:.2f} s alone, and what comes after is not"
@@ -148,8 +133,7 @@ def _follow_fall(
         resting = resting or swings_little(history)
         fall = replace(classify_collapse(structure, [frame], origin), resting=resting)
     # frames begin where blocks became loose, and a rocking block may have come back before
-    farthest = max(fall.displacement, float(history.dataset.attrs["displacement"]))
-    fall = replace(fall, displacement=farthest)
+    fall = replace(fall, displacement=max(fall.displacement, history.dataset.attrs["displacement"]))
     # throughout the last fifth, in which a record changes its sign
     push = motion.horizontal * np.sign(motion.horizontal[-1])
     held = bool(push[-len(push) // 5 :].min() > 0.5 * np.abs(push).max())
@@ -174,25 +158,24 @@ def _compare_rigid_blocks(
     return history.with_doubts((*history.doubts, *compared))
 
 
-def state_rigid_falls(doubt: Doubt, falls: Iterable[tuple[float, Sequence[Doubt]]]) -> Doubt:
+def state_rigid_falls(doubt: Doubt, falls: Sequence[tuple[float, Sequence[Doubt]]]) -> Doubt:
     """Return the doubt that rigid blocks stand with the scale from which they fall too.
 
     Falls are by their scale, with the doubts of each; other doubts are returned as they are.
     """
     if doubt.words != RIGID_STAND:
         return doubt
-    stand = {scale: any(x.words == RIGID_STAND for x in doubts) for scale, doubts in falls}
-    most = max((scale for scale, alone in stand.items() if alone), default=0.0)
-    if not (both := [scale for scale in stand if scale > most]):
+    alone = [scale for scale, doubts in falls if any(x.words == RIGID_STAND for x in doubts)]
+    if not (both := [scale for scale, _ in falls if scale > max(alone, default=0.0)]):
         return replace(doubt, words=f"{doubt.words}; nor do they at a larger scale that was run")
-    words = f"{doubt.words}; from {{:#.3g}} × the motion on they fall as rigid blocks too"
+    words = f"{doubt.words}; where it falls at {{:#.3g}} × the motion and more, they fall too"
     return replace(doubt, words=words, values=(*doubt.values, min(both)))
 
 
 def mark_interrupted(history: History, when: str) -> History:
     """Return a history as one that Ctrl-C or SIGTERM ended, and log that it is kept."""
     outcome = f"interrupted at {when}"
-    logger.warning("%s: what was computed is kept", outcome)
+    logger.warning("%s: what was computed is kept", outcome, extra={"of_run": True})
     attrs = {"ended": str(Ending.INTERRUPTED), "outcome": outcome}
     return replace(history, dataset=history.dataset.assign_attrs(attrs))
 

@@ -34,7 +34,7 @@ from archfem.errors import DidNotConverge, InvalidInput
 from archfem.joints.criteria import Criteria
 from archfem.limit.mechanism_count import Mechanism
 from archfem.masonry.structure import Structure, join_names
-from archfem.models.model import Doubt, Model, group_doubts, log_doubts_once, merge_doubts
+from archfem.models.model import Doubt, Ends, Model, group_doubts, log_doubts_once, merge_doubts
 from archfem.motion.motion import Motion, admissible_range
 from archfem.statics.equilibrium import Equilibrium, dead_load
 from archfem.units import STANDARD_GRAVITY
@@ -285,7 +285,7 @@ def _say_scale(scale: float, pga: float | None) -> str:
 def _say_bracket(state: str, found: Any, met: str) -> str:
     """Return a bracket in words, from the state at its lower bound to the event above it."""
     if scale := found.states.get("tension"):
-        met = f"from {scale:#.3g} × on {PULLED}: {met}"
+        met = f"at {scale:#.3g} × {PULLED}: {met}"
     met = f"{UNFINISHED}, {met}" if found.interrupted else met
     if not found.held:  # the smaller ones, if any were run, have no answer
         return f"{met}; no smaller scale is known to survive"
@@ -453,7 +453,7 @@ class CollapseScale:
 
     @property
     def sentence(self) -> str:
-        """Scales around the fall, and from which it is dislocated, which is no fall, in words."""
+        """Scales around the fall, and the least at which it is dislocated, in words."""
         least, met = self._least_fall, "falls at no scale that was tried"
         if least < inf:
             met = f"falls at {_say_scale(least, self.pga)}"
@@ -463,11 +463,13 @@ class CollapseScale:
         if least < self.upper:
             at = f"first falls at {self.upper:#.3g} ×" if self.upper < inf else "falls at no scale"
             met = f"{met}, {'the other' if len(self.searches) == 2 else 'the last'} time step {at}"
+        if self.above:
+            met = f"{met}, and stands again at {Ends.of(self.above):#.3g} ×"
         if self.dislocated < inf:
-            met = f"dislocated from {self.dislocated:#.3g} ×, {met}"
+            met = f"dislocated at {self.dislocated:#.3g} ×, {met}"
         if self.moves <= max(self._stood):
-            less = " or less" * ("moves in all" in self.states)
-            met = f"a mechanism from {self.moves:#.3g} ×{less}, {met}"
+            less = " or less" * self.moves_in_all
+            met = f"a mechanism at {self.moves:#.3g} ×{less}, {met}"
         return _say_bracket("stands", self, met) + describe_first_fall(self.as_one)
 
     def __repr__(self) -> str:
@@ -566,19 +568,19 @@ class CollapseScale:
         return min(runs, default=inf)
 
     @property
-    def states(self) -> dict[str, float]:
-        """Smallest scales at which it moves, is dislocated and falls [-].
+    def moves_in_all(self) -> bool:
+        """Whether it moves at the smallest scale that was run, and maybe at smaller ones."""
+        return self.moves == min((run.scale for run in self._runs), default=0.0)
 
-        Those of a fall are of any step, of all steps, and of one rigid body. That of "tension" is
-        one at which it stands, and its fill bears more of it than soil does.
+    @property
+    def states(self) -> dict[str, float]:
+        """Smallest scales run at which it moves, is dislocated, and falls by any step [-].
+
+        That of "tension" is one at which it stands, and its fill bears more of it than soil does.
         """
         scales = {"tension": _find_tension(self._runs), "moves": self.moves}
         scales = {state: at for state, at in scales.items() if at <= max(self._stood)}
         scales |= {"dislocated": self.dislocated, "falls": self._least_fall}
-        scales["falls by all steps"] = self.upper
-        scales["falls as one"] = inf if self.as_one is None else self.as_one.scale
-        if self.moves == min((run.scale for run in self._runs), default=inf):
-            scales["moves in all"] = self.moves  # and maybe at smaller ones
         return {state: scale for state, scale in scales.items() if scale < inf}
 
     @property

@@ -131,13 +131,12 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
     recorder = _make_recorder(stepper, first, dt, record or Record(), criteria)
     adaptive = AdaptiveStepper(stepper, tolerance, first, SlipError(model.structure, motion, first))
     try:
-        recorder.add(first)
         monitors = event, LooseningMonitor.of(model, start) if model.large_displacements else None
         batches = _take_steps(adaptive, start, dt, motion.duration)
         ending, outcome = _run_steps(batches, recorder, monitors, motion)
     except KeyboardInterrupt:
         ending, outcome = Ending.INTERRUPTED, f"interrupted at {recorder.state.time:.4g} s"
-        logger.warning("%s: what was computed is kept", outcome)
+        logger.warning("%s: what was computed is kept", outcome, extra={"of_run": True})
     except DidNotConverge as error:
         words = f"failed at {recorder.state.time:.4g} s: {error}"
         error.history = recorder.build_history(motion, Ending.FAILED, words)
@@ -151,7 +150,8 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
     if not model.large_displacements or ending is Ending.INTERRUPTED:
         return history
     whole = recorder.record.whole_fall
-    return follow_fall(history, model, (start, recorder.state), motion, viscous, whole)
+    with ProgressReport(motion.name, None, rarely=True):  # of all passes, which may be short
+        return follow_fall(history, model, (start, recorder.state), motion, viscous, whole)
 
 
 def run_analysis(analysis: Analysis, motion: Motion) -> History:
@@ -267,11 +267,13 @@ def _check_types(**arguments: Any) -> None:
 def _make_recorder(
     stepper: Stepper, first: Batch, dt: float | None, record: Record, criteria: Criteria
 ) -> Recorder:
-    """Return the recorder of a run, with its validity checks."""
+    """Return the recorder of a run, with its start and its validity checks."""
     equation = stepper.equation
     damps, drag = isinstance(equation.scheme, HHT), equation.drag
     monitor = RunMonitor(equation.model, first, damps=damps, mass_damping=drag)
-    return Recorder(monitor, first.state(0), stepper.name, dt, record, criteria)
+    recorder = Recorder(monitor, first.state(0), stepper.name, dt, record, criteria)
+    recorder.add(first)
+    return recorder
 
 
 # What may end a run: an event, and blocks that become loose where displacements are large
@@ -330,7 +332,7 @@ def _announce_long_run(spent: float, done: float, duration: float, long: float =
             done,
             duration,
             spent,
-            extra={"of_pace": True},  # of the machine: no doubt about the answer
+            extra={"of_run": True},  # of the machine: no doubt about the answer
         )
 
 

@@ -58,10 +58,11 @@ def state(result, *numbers, words="in words", factor="1.1"):
     return answers.Statement([words], rows)
 
 
-def scales(motion, held, unfinished=False, **states):
-    """Made-up results of a search of scales under a motion of 0.2 g."""
-    found = {name.replace("_", " "): scale for name, scale in states.items()}
-    return answers.Scales(motion, 0.2, held, found, unfinished)
+def scales(motion, held, **given):
+    """Made-up results of a search of scales under a motion of 0.2 g: states, and other fields."""
+    states = ("tension", "moves", "dislocated", "falls", "mechanism")
+    found = {name: given.pop(name) for name in states if name in given}
+    return answers.Scales(motion, 0.2, held, found, given.pop("unfinished", False), **given)
 
 
 def say_margin(data, **statements):
@@ -189,7 +190,7 @@ def test_a_check_of_what_begins_to_move_is_one_of_displacements_where_it_moves(c
 
 def test_the_margin_of_scales_ends_where_it_is_dislocated(case):
     every = [
-        scales("a", 1.38, moves=0.85, moves_in_all=0.85, dislocated=1.41, falls=4.5),
+        scales("a", 1.38, moves=0.85, moves_in_all=True, dislocated=1.41, falls=4.5),
         scales("b", 2.0, falls=2.1),
         scales("c", 0.0, falls=1.0),
     ]
@@ -197,18 +198,24 @@ def test_the_margin_of_scales_ends_where_it_is_dislocated(case):
     vars(data)["pairs"] = ("a", "b", "c", "d")
     assert say_margin(data, scale=state("scale", *every)) == [
         "the least margin is 1.38 on 'a', PGA 0.20 g, of 2 motions",
-        "it moves as a mechanism from 0.850 × or less on, is dislocated from 1.41 × on and falls "
-        "from 4.50 × on",
-        "over the motions it falls from 0.2 g ('c', 1.00 ×) to 0.9 g ('a', 4.50 ×) of PGA on",
+        "of the scales that were run it first moves as a mechanism at 0.850 × or less, is "
+        "dislocated at 1.41 × and falls at 4.50 ×",
+        "over the motions it first falls at 0.2 g ('c', 1.00 ×) to 0.9 g ('a', 4.50 ×) of PGA",
         "no scale is known up to which it stands under 'c'",
         "'d' was not scaled",
     ]
     small = scales("a", 0.5, mechanism=0.55)
     assert say_margin(data, scale=state("scale", small))[:2] == [
         "the least margin is 0.500 on 'a', PGA 0.20 g, which it fails",
-        "it forms a mechanism from 0.550 × on",
+        "of the scales that were run it first forms a mechanism at 0.550 ×",
     ]
-    assert say_margin(data, scale=state("scale", scales("a", 1.5)))[1] == "it falls in no run"
+    assert say_margin(data, scale=state("scale", scales("a", 1.5)))[1] == (
+        "of the scales that were run it first falls at none"
+    )
+    beyond = scales("a", 1.4, falls=1.5, again=[1.6, 2.0])
+    assert say_margin(data, scale=state("scale", beyond))[1] == (
+        "of the scales that were run it first falls at 1.50 × and stands again at 1.60 to 2.00 ×"
+    )
     for least, fails in ((1.3, ""), (0.9, ", which it fails")):
         begun = scales("a", 0.7, unfinished=True, moves=0.5, falls=least)
         assert say_margin(data, scale=state("scale", begun))[0] == (
@@ -224,7 +231,7 @@ def test_what_fails_under_a_motion_that_was_not_scaled_has_a_margin_below_one(ca
         "the least margin is below 1 on 'b', PGA 0.20 g, under which it is dislocated, and which "
         "was not scaled",
         "the next is 1.40 on 'a', PGA 0.20 g",
-        "it is dislocated from 2.00 × on and falls from 4.00 × on",
+        "of the scales that were run it first is dislocated at 2.00 × and falls at 4.00 ×",
         "'c' was not scaled",
     ]
     assert dict(conclusion.list_facts(data))["verdict"] == (
@@ -254,13 +261,13 @@ def test_a_motion_that_fells_it_at_a_smaller_scale_is_not_robust(case):
 
 def test_the_margin_of_a_stack_is_the_lesser_of_courses_and_of_one_body(case):
     """Under 'b' courses stand to less than under 'a', but one body falls under 'a' before."""
-    found = scales("b", 1.3, falls=1.35, falls_as_one=1.5), scales("a", 1.4, falls=1.5)
+    found = scales("b", 1.3, falls=1.35, as_one=1.5), scales("a", 1.4, falls=1.5)
     for at, fails in ((0.677, ", which it fails"), (1.05, "")):
-        one = scales("a", 1.4, falls=1.5, falls_as_one=at)
+        one = scales("a", 1.4, falls=1.5, as_one=at)
         assert say_margin(data_of(case), scale=state("scale", found[0], one))[:2] == [
             f"the least margin is below {at:#.3g} as one rigid body (1.40 in courses) on 'a', PGA "
             f"0.20 g{fails}, of 2 motions",
-            "it falls from 1.50 × on",
+            "of the scales that were run it first falls at 1.50 ×",
         ]
     said = say_margin(data_of(case), scale=state("scale", *found))
     assert said[0] == "the least margin is 1.30 on 'b', PGA 0.20 g, of 2 motions"
@@ -280,7 +287,7 @@ def test_the_answer_has_displacements_the_first_fall_and_the_checks(case):
     """First falls are of all motions and time steps, on page 1 in one range; bounds decide none."""
     first, other = (
         scales("a", 1.1, falls=1.3),
-        scales("b", 1.1, falls=1.41, falls_by_all_steps=1.51),
+        scales("b", 1.1, falls=1.41, all_steps=1.51),
     )
     steps, rigid = "its time steps find the first fall at {:.3g} ×", Doubt("none falls as rigid")
     scaled = [

@@ -19,7 +19,7 @@ from archfem.cases.result_text import ResultTable
 from archfem.cases.run import carry_out
 from archfem.commands import margin
 from archfem.commands.run import print_results, record_doubts
-from archfem.dynamics import motion_scaling, time_history
+from archfem.dynamics import fall, motion_scaling, time_history
 from archfem.errors import logger
 from archfem.models.model import Doubt
 from archfem.studies import study, variations
@@ -256,7 +256,7 @@ def test_a_range_is_of_each_motion_of_a_suite_and_replaces_none_of_another(
         (
             "large",
             "step",
-            r"tap: stands at \S+ g \(.*\), a mechanism from 0.976 ×, dislocated from \S+ ×, falls",
+            r"tap: stands at \S+ g \(.*\), a mechanism at 0.976 ×, dislocated at \S+ ×, falls",
         ),
         ("small", "mechanism", r"tap: no mechanism at \S+ g \(.*, first mechanism at .*, by "),
     ],
@@ -295,8 +295,8 @@ motion = {{ file = "tap.txt", dt = 0.01, units = "m/s2" }}
     said = again.splitlines()[0].partition(": ")[2].partition(";")[0]
     assert f"Scale of the motion: {said}" in words  # the conclusion
     met = "falls" if runs else "forms a mechanism"
-    margin = rf"is {factor[1]} on 'tap', PGA [\d.]+ g(, which it fails)?\. It [^.]*.*?{met} from "
-    assert re.search(margin, words)
+    margin = rf"is {factor[1]} on 'tap', PGA [\d.]+ g(, which it fails)?\. Of the scales that were "
+    assert re.search(rf"{margin}run it first [^.]*.*?{met} at ", words)
     shown = words.split("Scale of the motion")[-1]  # the section
     assert ("at the scales [× the motion]" if runs else head) in shown
     if runs:  # a row for each step and outcome
@@ -347,7 +347,10 @@ def test_scales_of_the_pairs_of_a_suite_stand_side_by_side(searched, tmp_path, c
     words = " ".join(read_page((out / "report.html").read_text(encoding="utf-8")).words)
     least = f"The least margin is {factors['strong']} on 'strong', PGA "
     assert least in words
-    assert ", of 2 motions. It moves as a mechanism from " in words.partition(least)[2]
+    assert (
+        ", of 2 motions. Of the scales that were run it first moves as a mechanism at "
+        in words.partition(least)[2]
+    )
     assert " 'middle' was not scaled." in words
     for pair in ("strong", "weak"):
         assert f"Residual displacement under '{pair}' over the scale" in words
@@ -362,7 +365,7 @@ def test_scales_of_the_pairs_of_a_suite_stand_side_by_side(searched, tmp_path, c
     assert af.commands.main(["report", str(out)]) == 0
     words = " ".join(read_page((out / "report.html").read_text(encoding="utf-8")).words)
     assert least in words
-    assert ", of 3 motions. It " in words
+    assert ", of 3 motions. Of the scales that were run it first " in words
     assert "not scaled" not in words
     assert af.commands.main([*given, "--set", "materials.stone.unit_weight=21e3"]) in (0, 3)
     assert made[3:] == ["weak", "strong", "middle"]
@@ -378,7 +381,7 @@ def test_an_interrupted_search_of_a_pair_continues(searched, tmp_path, monkeypat
         history = compute(*args, **options)
         if searches == ["weak", "strong"] and runs.count("strong") == 3:  # as Ctrl-C does
             history.dataset.attrs["ended"] = "interrupted"
-            af.errors.logger.warning("interrupted at 0.5 s: what was computed is kept")
+            fall.mark_interrupted(history, "0.5 s")
         return history
 
     monkeypatch.setattr(motion_scaling, "time_history", shake)

@@ -11,6 +11,7 @@ import pytest
 from glued import glued
 
 import archfem as af
+from archfem.cases import answers
 from archfem.dynamics import CollapseScale, mechanism_scales, motion_scaling
 from archfem.dynamics.collapse_state import CollapseState
 from archfem.dynamics.fall import RIGID_STAND
@@ -21,6 +22,7 @@ from archfem.dynamics.motion_scaling import (
     ScaledRun,
     search_scales,
 )
+from archfem.dynamics.rigid_body.rocking_body import FirstFall
 from archfem.errors import logger as log
 from archfem.models.model import Doubt
 from archfem.motion.motion import admissible_range
@@ -377,7 +379,7 @@ def fallen(*scales):
 @pytest.mark.parametrize(
     ("scales", "stated"),
     [
-        ((1.0, -2.0, -3.0, -4.0), "; from 3.00 × the motion on they fall as rigid blocks too"),
+        ((1.0, -2.0, -3.0, -4.0), "; where it falls at 3.00 × the motion and more, they fall too"),
         ((1.0, -2.0), "; nor do they at a larger scale that was run"),
     ],
 )
@@ -399,14 +401,27 @@ def test_collapse_is_between_a_stable_and_a_falling_run_at_every_step():
     assert found.bracket(0.005).upper == 2.5
     assert str(found) == (
         "stands at 1.00 × the motion, falls at 2.00 × the motion, the other time step first falls "
-        "at 2.50 ×; stands at every smaller scale that was run: from 0.500 × on they are up to a "
-        "factor of 2.00 apart, and none between was run; varied were the scale and the time step "
-        "(10, 5 ms), and no property"
+        "at 2.50 ×, and stands again at 2.70 to 3.00 ×; stands at every smaller scale that was "
+        "run: from 0.500 × on they are up to a factor of 2.00 apart, and none between was run; "
+        "varied were the scale and the time step (10, 5 ms), and no property"
     )
     assert [str(doubt) for doubt in found.doubts] == [
         "by 10 ms: it is not monotonic: above a fall it survives 3.00 × the motion",
         "by 5 ms: it is not monotonic: above a fall it survives 2.70 × the motion",
     ]
+    moved = [replace(run, mechanisms={"verified": True}) for run in fallen(0.5, 1.5).runs]
+    all_moved = CollapseScale({0.01: MechanismScales(("collapse",), (*moved, *fallen(-2.0).runs))})
+    assert (found.moves_in_all, all_moved.moves_in_all) == (False, True)
+    # a statement has what the reports need of these
+    for each, as_one, expected in (
+        (found, FirstFall(1.8, None), (2.5, 1.8, False, [2.7, 3.0], {"falls": 2.0})),
+        (all_moved, None, (2.0, None, True, [], {"moves": 0.5, "falls": 2.0})),
+    ):
+        searched = replace(each, as_one=as_one)
+        files = answers.state_scale(searched, af.Motion(np.ones(9), 0.01), [])
+        stated = answers.Statement.read(files["scale.json"])
+        (read,) = answers.read_numbers(answers.Scales, stated)
+        assert (read.all_steps, read.as_one, read.moves_in_all, read.again, read.states) == expected
     never = CollapseScale({0.01: fallen(1.0, -2.0), 0.005: fallen(1.0, 2.0)})
     assert (never.lower, never.upper, never.above) == (1.0, inf, ())
     assert str(never) == (
@@ -426,15 +441,15 @@ def test_smaller_scales_at_which_it_is_dislocated_are_said():
         for run in found.runs
     ]
     said = str(CollapseScale({0.005: replace(found, runs=tuple(runs))}))
-    assert said.startswith("stands at 1.00 × the motion, dislocated from 1.10 ×, falls at 1.40")
+    assert said.startswith("stands at 1.00 × the motion, dislocated at 1.10 ×, falls at 1.40")
     assert "; stands or is dislocated at every smaller scale that was" in said
-    for first, words in ((1, "dislocated"), (0, "a mechanism from 1.00 × or less, dislocated")):
+    for first, words in ((1, "dislocated"), (0, "a mechanism at 1.00 × or less, dislocated")):
         moved = [replace(run, mechanisms={"verified": k >= first}) for k, run in enumerate(runs)]
         said = str(CollapseScale({0.005: replace(found, runs=tuple(moved))}))
-        assert said.startswith(f"stands at 1.00 × the motion, {words} from 1.10 ×, falls at 1.40 ×")
+        assert said.startswith(f"stands at 1.00 × the motion, {words} at 1.10 ×, falls at 1.40 ×")
     rests = [replace(run, mechanisms={"verified": k > 1}) for k, run in enumerate(found.runs)]
     said = str(CollapseScale({0.005: replace(found, runs=tuple(rests))}))
-    assert said.startswith("stands at 1.30 × the motion, a mechanism from 1.20 ×, falls at 1.40 ×")
+    assert said.startswith("stands at 1.30 × the motion, a mechanism at 1.20 ×, falls at 1.40 ×")
     bound = CollapseScale({0.005: replace(found, runs=(*runs[:1], runs[1], found.runs[-1]))})
     assert "; stands at every smaller scale that was run" in str(bound)
 
@@ -454,7 +469,7 @@ def test_scales_without_an_answer_bound_what_is_known():
     words = "by 10 ms: runs without an answer were at 7.00 × the motion: the first came loose"
     assert words in map(str, said.doubts)
     assert str(said).startswith(
-        "stands at 1.00 g (2.00 × the motion), dislocated from 3.00 ×, falls in no run that has an "
+        "stands at 1.00 g (2.00 × the motion), dislocated at 3.00 ×, falls in no run that has an "
         "answer (3 have none, the first at 5.00 ×); stands or is dislocated or has no answer at "
     )
 
@@ -517,7 +532,7 @@ def test_a_search_continues_from_its_runs(monkeypatch, large):
         (
             "dislocated",
             (1.0, -2.0),
-            "dislocated from 1.00 ×, falls at 1.00 g (2.00 × the motion); no smaller scale is ",
+            "dislocated at 1.00 ×, falls at 1.00 g (2.00 × the motion); no smaller scale is ",
         ),
         ("stands", (1.0, 2.0), "stands at 1.00 g (2.00 × the motion), falls at no scale that was"),
         ("stands", (-1.0, -2.0), "falls at 0.500 g (1.00 × the motion); no smaller scale is kno"),
@@ -642,7 +657,7 @@ def test_no_margin_is_claimed_where_the_fill_bears_more_tension_than_soil():
     assert (found.lower, found.held, found.states["tension"]) == (4.0, 1.0, 2.0)
     words = "in doubt, as the elastic fill bears tension of over 5.8 kPa"
     assert str(found).startswith(
-        f"stands at 1.00 × the motion, from 2.00 × on {words}: falls at 8.00 × the motion"
+        f"stands at 1.00 × the motion, at 2.00 × {words}: falls at 8.00 × the motion"
     )
     # one doubt of the runs that bound the fall, with the range of its numbers
     (doubt,) = found.doubts
@@ -653,14 +668,14 @@ def test_no_margin_is_claimed_where_the_fill_bears_more_tension_than_soil():
     # all of them in tension: nothing is known; tension beyond the fall says nothing
     every = CollapseScale({dt: pulled(search, 0.5) for dt, search in runs.items()})
     assert every.held == 0.0
-    assert str(every).startswith(f"from 1.00 × on {words}: falls at 8.00 × the motion")
+    assert str(every).startswith(f"at 1.00 × {words}: falls at 8.00 × the motion")
     assert "; no smaller scale is known to survive" in str(every)
     beyond_it = CollapseScale({dt: pulled(search, 8.0) for dt, search in runs.items()})
     assert (beyond_it.held, "tension" in beyond_it.states) == (4.0, False)
     small = searched(dict.fromkeys(DEFINITIONS, beyond(2.5)))
     held = pulled(small, 1.5)
     assert 1.0 <= held.held < 1.5 <= small.held
-    assert f"from {held.states['tension']:#.3g} × on {words}: first mechanism at" in str(held)
+    assert f"at {held.states['tension']:#.3g} × {words}: first mechanism at" in str(held)
 
 
 def test_scales_are_smaller_until_the_fill_bears_no_tension():

@@ -51,9 +51,8 @@ def say_first_failure(data: ReportData) -> Iterator[str]:
     for state in ("falls", "dislocated", "mechanism"):
         first = {x.motion: (x.states[state], x.pga) for x in searches if state in x.states}
         first |= {name: (1.0, peak) for name, (found, peak) in unscaled.items() if found == state}
-        by_all = f"{state} by all steps"
         scales = [scale for scale, _ in first.values()]
-        scales += [x.states[by_all] for x in searches if by_all in x.states]
+        scales += [x.all_steps for x in searches if x.all_steps and state == "falls"]
         if not first or min(scales) >= least:  # a dislocation beyond a fall says nothing
             continue
         least, ends = min(scales), Ends.of(scales)
@@ -103,13 +102,14 @@ def describe_scales(data: ReportData) -> Iterator[tuple[float, list[str]]]:
         words = f"below {_bound(first):#.3g} as one rigid body ({words} in courses)"
     words += f" on '{first.motion}', PGA {first.pga:.2f} g" + ", which it fails" * (met <= 1.0)
     words += f", of {len(made)} motions" * (len(made) > 1)
-    ends = [
-        f"{_STATES[state][0]} from {scale:#.3g} ×{' or less' * (f'{state} in all' in states)} on"
-        for state, scale in states.items()
-        if state in _STATES
-    ]
-    ends += [] if {"falls", "mechanism"} & states.keys() else ["falls in no run"]
-    texts = [words, f"it {join_words(ends)}", *_compare_motions(searches)]
+    less = {"moves": " or less" * first.moves_in_all}
+    ends = [f"{_STATES[x][0]} at {scale:#.3g} ×{less.get(x, '')}" for x, scale in states.items()]
+    if not {"falls", "mechanism"} & states.keys():
+        ends += ["falls at none"]
+    elif first.again:  # a crossing is not claimed
+        ends += [f"stands again at {Ends.of(first.again):#.3g} ×"]
+    texts = [words, f"of the scales that were run it first {join_words(ends)}"]
+    texts += _compare_motions(searches)
     # a search without a scale that holds may have the least of all
     if none := [f"'{each.motion}'" for each in searches if not each.held]:
         texts.append(f"no scale is known up to which it stands under {join_words(none)}")
@@ -121,17 +121,17 @@ def describe_scales(data: ReportData) -> Iterator[tuple[float, list[str]]]:
 
 def _bound(search: Scales) -> float:
     """Return the largest scale up to which it stands, in courses and as one rigid body."""
-    return min(search.held, search.states.get("falls as one", np.inf))
+    return min(search.held, search.as_one or np.inf)
 
 
 def _compare_motions(searches: list[Scales]) -> Iterator[str]:
-    """Yield the peaks from which some motions fell it, and the first fall as one rigid body."""
+    """Yield the peaks of its first falls over motions, and the first fall as one rigid body."""
     falls = {x.states["falls"] * x.pga: x for x in searches if "falls" in x.states}
     if len(falls) > 1:
         ends = [(peak, falls[peak]) for peak in (min(falls), max(falls))]
         texts = [f"{peak:.3g} g ('{x.motion}', {x.states['falls']:#.3g} ×)" for peak, x in ends]
-        yield f"over the motions it falls from {' to '.join(texts)} of PGA on"
-    as_one = {x.motion: x.states["falls as one"] for x in searches if "falls as one" in x.states}
+        yield f"over the motions it first falls at {' to '.join(texts)} of PGA"
+    as_one = {x.motion: x.as_one for x in searches if x.as_one}
     # a smaller one is the margin
     if as_one and min(as_one.values()) > min(map(_bound, searches)):
         motion = min(as_one, key=as_one.__getitem__)
