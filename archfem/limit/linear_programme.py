@@ -24,6 +24,7 @@ from scipy.optimize import OptimizeResult, linprog
 from scipy.sparse import csgraph
 from scipy.sparse.linalg import splu
 
+from archfem._recent import RecentResults
 from archfem._typing import Array, Flags, Numbers
 from archfem.errors import DidNotConverge
 from archfem.joints.rigid_kinematics import jump_rates
@@ -80,10 +81,10 @@ class RigidBlocks:
     """Rigid blocks of a structure, with forces at the two ends of each joint."""
 
     structure: Structure
-    # chains that were found, by the blocks left out of them
-    _chains: dict[bytes, "Chains"] = field(default_factory=dict, init=False)
-    # last balances that were reduced, by what they depend on
-    _reductions: dict[tuple[bytes, ...], "ReducedBalance"] = field(default_factory=dict, init=False)
+    # by what they depend on; a search without dilatancy alternates between four, eight leave room
+    _reductions: RecentResults["ReducedBalance"] = field(
+        default_factory=lambda: RecentResults(8), init=False
+    )
 
     @property
     def force_unit(self) -> float:
@@ -163,17 +164,9 @@ class RigidBlocks:
         """Return the balance in few unknowns, kept for programmes of other loads and costs."""
         parts = columns.indptr, columns.indices, columns.data, friction, coheres
         key = tuple(part.tobytes() for part in parts)
-        if key not in self._reductions:
-            single = _find_single_blocks(columns)
-            if (blocks := single.tobytes()) not in self._chains:
-                links, pivots = _find_chains(self.structure, single)
-                self._chains[blocks] = Chains(self.balance, links, pivots)
-            # a search without dilatancy alternates between four; eight leave room
-            if len(self._reductions) == 8:
-                self._reductions.pop(next(iter(self._reductions)))
-            chains = self._chains[blocks]
-            self._reductions[key] = ReducedBalance(chains, columns, friction, coheres)
-        return self._reductions[key]
+        return self._reductions.look_up(
+            key, lambda: ReducedBalance(self, columns, friction, coheres)
+        )
 
     def load(self, actions: Sequence[BodyForce | PointLoad]) -> Array:
         """Return the generalised forces of actions on the free blocks (3 n_free,) [N, N, N m]."""
@@ -385,59 +378,50 @@ class Programme:
         return replace(found, value=value, forces=state.forces, unknowns=unknowns)
 
 
-class Chains:
-    """Blocks with two joints, the links, which pass the forces of one on to the other.
-
-    Their balance is solved for the forces of one joint each, the pivots. A chain of any length,
-    such as a ring, then has the unknowns of a single joint.
-    """
-
-    def __init__(self, balance: sparse.csr_matrix, links: Numbers, pivots: Numbers) -> None:
-        """Factorise the balance of the links for the forces of their pivots."""
-        self.pivots = pivots
-        self.is_pivot = np.zeros(balance.shape[1], dtype=bool)
-        self.is_pivot.reshape(3, -1)[:, pivots] = True
-        self.kept = np.ones(balance.shape[0], dtype=bool)
-        self.kept.reshape(-1, 3)[links] = False
-        self.passed, self.balance = balance[~self.kept], balance[self.kept]
-        if len(links):
-            self.factors = splu(self.passed[:, self.is_pivot].tocsc())
-
-
 class ReducedBalance:
     """Equilibrium in few unknowns v, of which joint forces are x = T v + t, with t of the load.
 
-    Limits of the pivots become rows. In other joints forces are sums >= 0 of generators of the
-    friction cone, a compression at either end with a shear of ±μ times it. They need no rows. The
-    last of v are z. Programmes of the same friction and columns share it.
+    Blocks with two joints, the links, pass the forces of one on to the other. Their balance is
+    solved for the forces of one joint each, the pivots. A chain of any length, such as a ring, then
+    has the unknowns of a single joint. Limits of the pivots become rows. In other joints forces are
+    sums >= 0 of generators of the friction cone, a compression at either end with a shear of ±μ
+    times it. They need no rows. The last of v are z. Programmes of the same friction and columns
+    share it.
     """
 
     def __init__(
-        self, chains: Chains, columns: sparse.csr_matrix, friction: Array, coheres: Flags
+        self, blocks: RigidBlocks, columns: sparse.csr_matrix, friction: Array, coheres: Flags
     ) -> None:
         """Eliminate chains, and express the other forces by generators."""
-        self._chains, used = chains, ~chains.is_pivot[: len(friction)]
+        balance, single = blocks.balance, _find_single_blocks(columns)
+        links, self._pivots = _find_chains(blocks.structure, single)
+        self._is_pivot = np.zeros(balance.shape[1], dtype=bool)
+        self._is_pivot.reshape(3, -1)[:, self._pivots] = True
+        self._kept = np.ones(balance.shape[0], dtype=bool)
+        self._kept.reshape(-1, 3)[links] = False
+        self._balance, used = balance[self._kept], ~self._is_pivot[: len(friction)]
         # these carry shear without compression
         self._alone = np.flatnonzero(used & (coheres | ~np.isfinite(friction)))
         self._map = _cone_generators(friction, used, self._alone, columns.shape[1])
         self._count = self._map.shape[1] - columns.shape[1]
         entries = columns.data, columns.indices + self._count, columns.indptr
         loads = sparse.csr_matrix(entries, (columns.shape[0], self._map.shape[1]))
-        if len(chains.pivots):
-            self._eliminate(loads[~chains.kept])
-        self._equations = chains.balance @ self._map + loads[chains.kept]
-        self._slides = chains.pivots[np.isfinite(friction[chains.pivots])]
-        self._rows = _pivot_limits(friction, chains.pivots, self._slides)
+        if len(links):
+            self._eliminate(balance[~self._kept], loads[~self._kept])
+        self._equations = self._balance @ self._map + loads[self._kept]
+        self._slides = self._pivots[np.isfinite(friction[self._pivots])]
+        self._rows = _pivot_limits(friction, self._pivots, self._slides)
         self._limits = self._rows @ self._map
 
-    def _eliminate(self, loads: sparse.csr_matrix) -> None:
+    def _eliminate(self, passed: sparse.csr_matrix, loads: sparse.csr_matrix) -> None:
         """Solve the balance of the links of chains for the forces of their pivots."""
-        passed_on = (self._chains.passed @ self._map + loads).tocsc()
+        self._factors = splu(passed[:, self._is_pivot].tocsc())
+        passed_on = (passed @ self._map + loads).tocsc()
         # only forces at the end of a chain and loads act on its links
         acting = np.flatnonzero(np.diff(passed_on.indptr))
-        solved = self._chains.factors.solve(-passed_on[:, acting].toarray())
+        solved = self._factors.solve(-passed_on[:, acting].toarray())
         row, column = np.nonzero(solved)
-        place = np.flatnonzero(self._chains.is_pivot)[row], acting[column]
+        place = np.flatnonzero(self._is_pivot)[row], acting[column]
         self._map = self._map + sparse.csr_matrix((solved[row, column], place), self._map.shape)
 
     def solve(self, programme: Programme, further: Limits, large: int = 600) -> Optimum | None:
@@ -446,9 +430,9 @@ class ReducedBalance:
         In walls the simplex method takes 40 iterations a block. Without an objective any state
         will do, which it finds faster.
         """
-        chains, constant = self._chains, np.zeros(self._map.shape[0])
-        if len(chains.pivots):
-            constant[chains.is_pivot] = chains.factors.solve(programme.load[~chains.kept])
+        constant = np.zeros(self._map.shape[0])
+        if len(self._pivots):
+            constant[self._is_pivot] = self._factors.solve(programme.load[~self._kept])
         force_cost, cost = np.zeros_like(constant), np.zeros(self._map.shape[1])
         if programme.force_cost is not None:
             force_cost += programme.force_cost
@@ -457,12 +441,12 @@ class ReducedBalance:
             cost[np.abs(cost) < ROUND_OFF * np.abs(cost).max()] = 0.0
         cost[self._count :] += programme.unknown_cost
         strength = np.tile(programme.cohesion[self._slides], 2)
-        limits = Limits(self._rows, np.concatenate([np.zeros(2 * len(chains.pivots)), strength]))
+        limits = Limits(self._rows, np.concatenate([np.zeros(2 * len(self._pivots)), strength]))
         reduced = self._limits
         if len(further.bounds):
             limits = limits.joined(further)
             reduced = sparse.vstack([reduced, further.rows @ self._map], format="csr")
-        load = programme.load[chains.kept] - chains.balance @ constant
+        load = programme.load[self._kept] - self._balance @ constant
         method = "highs-ipm" if len(load) > large and cost.any() else "highs-ds"
         rows = reduced, limits.bounds - limits.rows @ constant
         equations = self._equations, load
@@ -488,14 +472,13 @@ class ReducedBalance:
         self, result: OptimizeResult, force_cost: Array, rows: sparse.csr_matrix
     ) -> Array:
         """Return the multipliers of the balance of all blocks (3 n_free,)."""
-        chains = self._chains
-        every = np.empty(len(chains.kept))
-        every[chains.kept] = result.eqlin.marginals
-        if len(chains.pivots):
+        every = np.empty(len(self._kept))
+        every[self._kept] = result.eqlin.marginals
+        if len(self._pivots):
             # the forces of pivots are unknowns without bounds: their reduced costs vanish
-            cost = force_cost - chains.balance.T @ result.eqlin.marginals
+            cost = force_cost - self._balance.T @ result.eqlin.marginals
             cost -= rows.T @ result.ineqlin.marginals
-            every[~chains.kept] = chains.factors.solve(cost[chains.is_pivot], trans="T")
+            every[~self._kept] = self._factors.solve(cost[self._is_pivot], trans="T")
         return every
 
 

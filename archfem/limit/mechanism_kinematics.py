@@ -25,6 +25,7 @@ from scipy.optimize import nnls
 from scipy.sparse.csgraph import dijkstra
 
 from archfem._display import ProgressReport
+from archfem._recent import RecentResults
 from archfem._typing import Array, Flags, Numbers
 from archfem._validation import check_type, validate_arguments
 from archfem.joints.criteria import Criteria, find_lasting, with_failure_flags
@@ -198,19 +199,13 @@ def first_verified_mechanism(
     freedoms = dict(zip(instants.tolist(), joint_freedoms(*failures), strict=True))
     # Instants with the same pattern of freedoms share the answer, and each motion is solved once.
     moves: dict[bytes, bool] = {}
-    mechanisms: dict[int, VerifiedMechanism] = {}
-
-    def verify(instant: int) -> VerifiedMechanism:
-        if instant not in mechanisms:
-            mechanisms[instant] = verifier.verify(joints.isel(time=instant))
-        return mechanisms[instant]
 
     def find_motion(instant: int) -> int | None:
         pattern = freedoms[instant].tobytes()
         if pattern not in moves:
             progress.show(f"{times[instant]:.3g} of {times[-1]:.3g} s, {len(moves)} patterns")
             permitted = verifier.loop_check.permits_motion(freedoms[instant])
-            moves[pattern] = permitted and verify(instant).kind != "none"
+            moves[pattern] = permitted and verifier.verify(joints.isel(time=instant)).kind != "none"
         return instant if moves[pattern] else None
 
     times, duration = joints["time"].values, Criteria.of(joints).duration
@@ -218,7 +213,7 @@ def first_verified_mechanism(
         first = find_lasting(freedoms, times, duration, find_motion)
     if first is None:
         return None
-    found = verify(first)
+    found = verifier.verify(joints.isel(time=first))
     return replace(found, moved=follow_mechanism(joints, found.moved))
 
 
@@ -267,7 +262,10 @@ class Verifier:
             InvalidInput: `joints` has several instants, or is of another structure.
         """
         check_instant(self.structure, joints)
-        scaled = self._find_motion(self.freedoms(joints))
+        freedoms = self.freedoms(joints)
+        scaled = self._motions.look_up(
+            freedoms.tobytes(), lambda: _largest_motion(self.blocks, freedoms)
+        )
         tolerance = 1e-6  # least motion, relative to the largest allowed, that counts as one
         gaps = (self.blocks.kinematics @ (self.blocks.coordinate_units * scaled)).reshape(3, -1)
         working = np.flatnonzero(np.abs(gaps).max(axis=0) > tolerance)
@@ -286,18 +284,9 @@ class Verifier:
         return VerifiedMechanism(moved, counted_mechanism(joints), regions.expand_motion(motion))
 
     @cached_property
-    def _motions(self) -> dict[bytes, Array]:
-        """Largest motions by the freedoms: many histories share them."""
-        return {}
-
-    def _find_motion(self, freedoms: Array) -> Array:
-        """Return the largest motion that freedoms permit, scaled (3 n_free,)."""
-        pattern = freedoms.tobytes()
-        if pattern not in self._motions:
-            if len(self._motions) >= MAX_KNOWN_PATTERNS:
-                self._motions.clear()
-            self._motions[pattern] = _largest_motion(self.blocks, freedoms)
-        return self._motions[pattern]
+    def _motions(self) -> RecentResults[Array]:
+        """Largest motions by the freedoms, scaled (3 n_free,): many histories share them."""
+        return RecentResults(MAX_KNOWN_PATTERNS)
 
     def verify_if_moving(self, joints: xr.Dataset) -> VerifiedMechanism | None:
         """Search for a motion as `verify` does, after the fast check of the loops.
@@ -432,18 +421,15 @@ class LoopCheck:
         return np.where(np.abs(basis) > 1e-12, basis, 0.0)  # round-off: the joint is in no loop
 
     @cached_property
-    def _answer_cache(self) -> dict[bytes, bool]:
+    def _answers(self) -> RecentResults[bool]:
         """Answers of `permits_motion` by the freedoms: many histories share them."""
-        return {}
+        return RecentResults(MAX_KNOWN_PATTERNS)
 
     def permits_motion(self, freedoms: Array) -> bool:
         """Return whether the failed joints may permit a motion of the parts."""
-        pattern = freedoms.tobytes()
-        if pattern not in self._answer_cache:
-            if len(self._answer_cache) >= MAX_KNOWN_PATTERNS:
-                self._answer_cache.clear()
-            self._answer_cache[pattern] = self._closes_any_loops(freedoms.reshape(3, -1))
-        return self._answer_cache[pattern]
+        return self._answers.look_up(
+            freedoms.tobytes(), lambda: self._closes_any_loops(freedoms.reshape(3, -1))
+        )
 
     def _closes_any_loops(self, freedoms: Array, large: int = 50) -> bool:
         """Return `permits_motion`, by the loops between bodies.
