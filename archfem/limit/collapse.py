@@ -182,6 +182,11 @@ class Collapse(ResultDisplay):
         return name_mechanism(self.structure, self.motion) + ONE_OF_MANY * bool(many)
 
     @property
+    def _loads(self) -> list[Action]:
+        """Actions of `live` that are no settlement."""
+        return [action for action in self.live if not isinstance(action, Settlement)]
+
+    @property
     def _headline(self) -> str:
         """The name of the mechanism in place of the outcome, or after it."""
         name = self.mechanism_name if self.outcome is not Outcome.SETTLES else ""
@@ -319,11 +324,8 @@ def collapse_factor(
         refuse_bonds(structure)
     stays = tuple(list_loads(dead)) if dead else ()
     result = _solve_loads(structure, loads, stays, friction, strength, fill)
-    stood = result.outcome is not Outcome.INFEASIBLE
-    if isinstance(fill, Fill) and stood and not isinstance(loads, Settlement):
-        given = structure, friction, strength
-        over_fill = _vary_assumptions(*given, fill, loads, stays, result.factor)
-        result = replace(result, over_fill=over_fill)
+    if isinstance(fill, Fill) and result.outcome is not Outcome.INFEASIBLE:
+        result = replace(result, over_fill=_vary_assumptions(result, friction, strength, fill))
     return result
 
 
@@ -338,8 +340,7 @@ def solve_least(
     if structure is None or over is None or over.ends[0] in (0.0, found.factor):
         return found
     _, assumed = vary_fill(fill)[min(over.values, key=over.values.__getitem__)]
-    loads = [action for action in found.live if not isinstance(action, Settlement)]
-    given = structure, loads, found.dead, friction, strength, assumed
+    given = structure, found._loads, found.dead, friction, strength, assumed
     return replace(_solve_loads(*given), over_fill=over)
 
 
@@ -353,7 +354,13 @@ def _solve_loads(
 ) -> Collapse:
     """Return the result of `collapse_factor` without its range over a fill."""
     if isinstance(fill, PlasticFill):
-        result = _bound_collapse(structure, loads, stays, friction, strength, fill)
+        if isinstance(loads, Settlement):
+            raise InvalidInput(
+                "a settlement and a plastic fill: the bounds are of loads that grow; give the fill "
+                "as af.limit.Fill, or a load"
+            )
+        search = refine_bounds(structure, loads, friction, strength, fill, stays)
+        result = read_bounds(structure, bound_least_factor({"load": search})["load"], friction)
     else:
         stones, programme = self_weight_programme(structure, friction, strength, fill, stays)
         if not (isinstance(loads, Settlement) or stones.load(loads).any()):
@@ -503,27 +510,22 @@ def _solve_collapse(
 
 
 def _vary_assumptions(
-    structure: Structure,
-    friction: str | None,
-    strength: float | None,
-    fill: Fill,
-    live: Sequence[Action],
-    dead: Sequence[Action],
-    factor: float,
+    found: Collapse, friction: str | None, strength: float | None, fill: Fill
 ) -> FillRange | None:
     """Return the factors of a push under all assumptions on a fill, that of itself being known."""
-    if not sum_body_forces([*live, *dead])[0]:
+    if found.structure is None or not sum_body_forces([*found._loads, *found.dead])[0]:
         return None
     values = {}
     for assumption, (_, assumed) in vary_fill(fill).items():
-        values[assumption] = factor
+        values[assumption] = found.factor
         if assumed == fill:
             continue
-        stones, programme = self_weight_programme(structure, friction, strength, assumed, dead)
+        given = found.structure, friction, strength, assumed, found.dead
+        stones, programme = self_weight_programme(*given)
         if not is_balanced(programme.minimise_residual(), programme):
             values[assumption] = 0.0
             continue
-        loaded = programme.with_load_factor(stones.load(live))
+        loaded = programme.with_load_factor(stones.load(found._loads))
         optimum, least = loaded.solve(), np.inf
         if friction == "nonassociated":
             optimum, solutions = search_nonassociated(loaded, optimum, -1.0)
@@ -547,24 +549,6 @@ def _read_without_optimum(
         return _read_result(stones, dead, unbounded, np.inf, at_rest)
     result = _read_result(stones, dead, Outcome.BRACKETED, bound, _without_forces(at_rest))
     return replace(result, upper=upper)
-
-
-def _bound_collapse(
-    structure: Structure,
-    live: Settlement | list[Action],
-    dead: Sequence[Action],
-    friction: str | None,
-    strength: float | None,
-    fill: PlasticFill,
-) -> Collapse:
-    """Return the result of `collapse_factor` with a plastic fill."""
-    if isinstance(live, Settlement):
-        raise InvalidInput(
-            "a settlement and a plastic fill: the bounds are of loads that grow; give the fill as "
-            "af.limit.Fill, or a load"
-        )
-    search = refine_bounds(structure, live, friction, strength, fill, dead)
-    return read_bounds(structure, bound_least_factor({"load": search})["load"], friction)
 
 
 def read_bounds(structure: Structure, bounds: FillBounds, friction: str | None) -> Collapse:
