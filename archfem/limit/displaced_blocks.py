@@ -19,7 +19,7 @@ from scipy.sparse import csgraph, csr_matrix
 
 from archfem._typing import Array, Flags, Numbers
 from archfem.errors import DidNotConverge
-from archfem.joints.rigid_kinematics import jump_entries, jump_rates
+from archfem.joints.rigid_kinematics import jump_rates
 from archfem.limit.linear_programme import NoEquilibrium, solve_linear
 from archfem.masonry.block import rotate
 from archfem.masonry.loads import AttachedLoad
@@ -295,15 +295,17 @@ class Bodies:
 
     def rates(self, contacts: Sequence[Contact]) -> Array:
         """Return rates of the contacts' gaps and slips (2, n_contacts, 3 n_bodies)."""
-        rates = np.zeros((2, len(contacts), self.count, 3))
-        for rate, jumps in zip(rates, self._jumps(contacts), strict=True):
-            row, body, values = jump_entries(*jumps)
-            np.add.at(rate, (row, body), values)
-        return rates.reshape(2, len(contacts), -1)
+        return np.array([each.toarray() for each in self.sparse_rates(contacts)])
 
     def sparse_rates(self, contacts: Sequence[Contact]) -> list[csr_matrix]:
         """Return the rates of gaps and of slips, each (n_contacts, 3 n_bodies)."""
-        return [jump_rates(*jumps) for jumps in self._jumps(contacts)]
+        points = np.array([contact.point for contact in contacts]).reshape(-1, 2)
+        normal = np.array([contact.normal for contact in contacts]).reshape(-1, 2)
+        along = np.stack([normal[:, 1], -normal[:, 0]], axis=1)
+        # a jump is the motion of the corner's block less that of the face's
+        pairs = np.array([(c.face, c.corner) for c in contacts], dtype=np.intp).reshape(-1, 2)
+        given = points, self.body[pairs], self.references
+        return [jump_rates(each, *given) for each in (normal, along)]
 
     @cached_property
     def fill_forces(self) -> tuple[csr_matrix, csr_matrix]:
@@ -334,15 +336,6 @@ class Bodies:
         if velocity is not None:
             dead += further.T @ (further @ velocity < 0.0)
         return np.asarray(dead)
-
-    def _jumps(self, contacts: Sequence[Contact]) -> list[tuple[Array, Array, Numbers, Array]]:
-        """Return the arguments of `jump_rates` for gaps and for slips."""
-        points = np.array([contact.point for contact in contacts]).reshape(-1, 2)
-        normal = np.array([contact.normal for contact in contacts]).reshape(-1, 2)
-        along = np.stack([normal[:, 1], -normal[:, 0]], axis=1)
-        # a jump is the motion of the corner's block less that of the face's
-        pairs = np.array([(c.face, c.corner) for c in contacts], dtype=np.intp).reshape(-1, 2)
-        return [(each, points, self.body[pairs], self.references) for each in (normal, along)]
 
 
 def find_mechanism(
