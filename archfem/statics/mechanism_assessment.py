@@ -128,7 +128,7 @@ class KinematicAssessment(ResultDisplay):
     path: MechanismPath | None
     notes: tuple[str, ...]
     doubts: tuple[Doubt, ...]
-    of_bodies: "KinematicAssessment | None"
+    of_bodies: "KinematicAssessment | None" = None
     least: "KinematicAssessment | None" = None
 
     @property
@@ -376,12 +376,10 @@ class _Search:
         placed = PlacedBlocks.at_rest(stones, loads, self.direction, pressure)
         friction = stones.friction if self.friction else np.full(len(stones.joints), np.inf)
         mechanism = find_first_mechanism(placed, joints, friction)
-        given = self.spectrum, self.rules, self.confidence_factor
         if mechanism is None:
-            return _Oscillator(placed, None, 0, bool(weights), *given).assess(self.q)
+            return _Oscillator(self, placed, None, 0, bool(weights)).assess()
         path, holds, doubt = self._follow(placed, joints, friction, mechanism)
-        oscillator = _Oscillator(placed, path, holds, bool(weights), *given, searched=doubt)
-        return oscillator.assess(self.q)
+        return _Oscillator(self, placed, path, holds, bool(weights), searched=doubt).assess()
 
     def _follow(
         self, placed: PlacedBlocks, joints: list[int], friction: Array, first: KinematicChain
@@ -497,13 +495,11 @@ def assess_parts(
 class _Oscillator:
     """Equivalent oscillator of a mechanism, and the demand on it."""
 
+    given: _Search
     placed: PlacedBlocks
     path: MechanismPath | None
     holds: int  # last place at which the joints that do not move hold
     fill: bool  # whether some of the loads are the weight of a fill
-    spectrum: DesignSpectrum | Motion
-    rules: LimitState
-    confidence_factor: float
     by_body: bool = False  # whether each body that moves as one has one weight
     searched: Doubt | None = None  # about a factor that was searched without dilatancy
 
@@ -599,7 +595,7 @@ class _Oscillator:
     @property
     def doubts(self) -> list[Doubt]:
         """Why a ratio may be too high: another code's spectrum, a fill left out, other joints."""
-        found = self.rules.doubt(self.spectrum)
+        found = self.given.rules.doubt(self.given.spectrum)
         if self.searched:
             share = f"its linear ratio is e* = {self.e_star:.3g} times that of this one at least"
             words = f"whatever moves at this alpha_0, {share}"
@@ -616,28 +612,29 @@ class _Oscillator:
             found.append(Doubt(words, remedy, (UPPER_BOUND,)))
         return found
 
-    def assess(self, q: float) -> KinematicAssessment:
+    def assess(self) -> KinematicAssessment:
         """Return the assessment, the linear check with a behaviour factor q."""
         curve, path, structure = self.curve, self.path, self.placed.structure
-        ground = float(spectral_acceleration(self.spectrum, np.zeros(1), 0.05)[0])
+        given, confidence, q = self.given, self.given.confidence_factor, self.given.q
+        ground = float(spectral_acceleration(given.spectrum, np.zeros(1), 0.05)[0])
         alpha_0, a_0, d_0, secant = np.inf, np.inf, np.inf, np.nan
         mass, control, displacement = 0.0, "", None
         if path is not None:
             alpha_0, a_0 = float(curve["alpha"][0]), float(curve["a"][0])
             mass = self.e_star * (self.weights[0].sum() / structure.gravity)
             control = structure.blocks[self.control].name
-            starts = a_0 / self.confidence_factor / ground  # ratio at which it is set in motion
+            starts = a_0 / confidence / ground  # ratio at which it is set in motion
             if len(path.factors) > 1:
                 displacement = self._check_displacement(starts)
             if path.end is PathEnd.FALLS:
                 d_0 = float(curve["d"][-1])
                 secant = self._secant_period(0.16 * d_0)
-        name = f"linear, q = {q:g}, FC = {self.confidence_factor:g}"
-        capacity = q * a_0 / self.confidence_factor
+        name = f"linear, q = {q:g}, FC = {confidence:g}"
+        capacity = q * a_0 / confidence
         source = "Circolare 7/2019, C8.7.1.2.1.5 and C8.7.1.2.1.7, eq. C8.7.1.8"
         found = KinematicAssessment(
             structure,
-            self.spectrum,
+            given.spectrum,
             self.placed.direction,
             alpha_0,
             mass,
@@ -648,15 +645,25 @@ class _Oscillator:
             curve,
             AssessmentCheck(name, capacity, ground, "m/s²", capacity / ground, np.nan, source),
             displacement,
-            self.rules,
-            self.confidence_factor,
+            given.rules,
+            confidence,
             control,
             path,
             tuple(self.notes(alpha_0)),
             tuple(self.doubts),
-            None,
         )
-        return found if self.by_body else _split_weights(found, replace(self, by_body=True), q)
+        return found if self.by_body else self._split_weights(found)
+
+    def _split_weights(self, found: KinematicAssessment) -> KinematicAssessment:
+        """Return it with the ratios of one weight a body, and doubts where these fail."""
+        found = replace(found, of_bodies=(whole := replace(self, by_body=True).assess()))
+        if whole.e_star > 1.001 * found.e_star:
+            found = replace(found, linear=replace(found.linear, bodies=whole.linear.ratio))
+            if found.displacement is not None and whole.displacement is not None:
+                moved = replace(found.displacement, bodies=whole.displacement.ratio)
+                found = replace(found, displacement=moved)
+        split = [doubt for check in found.checks for doubt in check.doubt_split()]
+        return replace(found, doubts=(*found.doubts, *split))
 
     def _secant_period(self, displacement: float) -> float:
         """Return the secant period of the capacity curve at a displacement [s]."""
@@ -666,29 +673,15 @@ class _Oscillator:
 
     def _check_displacement(self, starts: float) -> AssessmentCheck:
         """Check the displacement of the capacity curve against the spectrum."""
-        rules = self.rules
+        rules = self.given.rules
         capacity = rules.share * float(self.curve["d"][-1])
         secant = self._secant_period(rules.secant_share * capacity)
         # FC reduces the accelerations of the curve
-        period = rules.period_factor / 2.0 * np.sqrt(self.confidence_factor) * secant
+        period = rules.period_factor / 2.0 * np.sqrt(self.given.confidence_factor) * secant
         # The largest spectral displacement up to the period; code spectra grow with it.
         periods = period * np.linspace(0.0, 1.0, 41)[1:]
-        acceleration = spectral_acceleration(self.spectrum, periods, rules.damping)
+        acceleration = spectral_acceleration(self.given.spectrum, periods, rules.damping)
         demand = float((acceleration * (periods / (2.0 * np.pi)) ** 2).max())
         ratio = max(capacity / demand, starts)
         period = float(period)
         return AssessmentCheck(rules.name, capacity, demand, "m", ratio, period, rules.source)
-
-
-def _split_weights(
-    found: KinematicAssessment, of_bodies: _Oscillator, q: float
-) -> KinematicAssessment:
-    """Return an assessment with the ratios of one weight a body, and doubts where these fail."""
-    found = replace(found, of_bodies=(whole := of_bodies.assess(q)))
-    if whole.e_star > 1.001 * found.e_star:
-        found = replace(found, linear=replace(found.linear, bodies=whole.linear.ratio))
-        if found.displacement is not None and whole.displacement is not None:
-            moved = replace(found.displacement, bodies=whole.displacement.ratio)
-            found = replace(found, displacement=moved)
-    split = [doubt for check in found.checks for doubt in check.doubt_split()]
-    return replace(found, doubts=(*found.doubts, *split))

@@ -626,8 +626,11 @@ def test_notes_tell_where_the_curve_is_an_upper_bound(ring):
         (last - 1, 0.9995, ["beyond d* = "]),
         (last, 0.99895, ["sliding that dilates"]),
     ):
-        given = ring.spectrum, ring.limit_state, ring.confidence_factor
-        oscillator = mechanism_assessment._Oscillator(placed, ring.path, holds, False, *given)
+        rules = ring.limit_state, ring.confidence_factor, 2.0
+        given = mechanism_assessment._Search(
+            RING, ring.spectrum, 1.0, "coulomb", None, None, (), *rules
+        )
+        oscillator = mechanism_assessment._Oscillator(given, placed, ring.path, holds, False)
         notes = [*oscillator.notes(share * factor), *oscillator.doubts]
         assert all(str(x).startswith(start) for x, start in zip(notes, said, strict=True))
 
