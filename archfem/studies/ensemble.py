@@ -174,22 +174,19 @@ def ensemble(
     # a structure that does not stand is refused before any run; parts suffice for all processes
     prepared = [prepare_histories(analysis, change) for change in varied]
     count = 1 if workers == 1 else min(len(runs), max(1, 2 * workers // len(varied)))
-    parts, places = [], []
-    for number, change in enumerate(varied):
+    parts, found = [], dict[int, dict[str, Any]]()
+    for change, run in zip(varied, prepared, strict=True):
         for chosen in np.array_split(np.arange(len(runs)), count):
-            run = prepared[number] if workers == 1 else None
-            chosen_runs = [runs[k] for k in chosen]
-            parts.append(EnsemblePart(analysis, tuple(change.items()), chosen_runs, run))
-            places.append((chosen, number))
-    table = _empty_table(analysis, motions, factors, varied)
+            own, some = run if workers == 1 else None, [runs[k] for k in chosen]
+            parts.append(EnsemblePart(analysis, tuple(change.items()), some, own))
     for k, row in evaluate_with_progress(
         [*enumerate(parts)], evaluate_part, workers, name="ensemble"
     ):
         if row["error"]:
             raise ArchfemError(f"histories of change {dict(parts[k].changes)}: {row['error']}")
-        _store_findings(table, places[k], row["found"])
-    dimensions = [len(motions), len(factors), len(varied)]
-    dataset = _label_table(table, dimensions, analysis, motions, factors)
+        found[k] = row["found"]
+    joints = [joint.name for joint in analysis.structure.joints]
+    dataset = _join_parts([found[k] for k in range(len(parts))], varied, motions, factors, joints)
     if changes is None:
         dataset = dataset.isel(change=0)
     return Ensemble(dataset, analysis, tuple(motions), tuple(varied))
@@ -259,52 +256,31 @@ def _reduce(
     }
 
 
-def _empty_table(
-    analysis: Analysis, motions: Sequence[Motion], scales: Sequence[float], changes: Sequence[Any]
-) -> dict[str, Any]:
-    """Return arrays over runs and changes, without findings."""
-    shape = len(motions) * len(scales), len(changes)
-    joints = len(analysis.structure.joints)
-    table: dict[str, Any] = {name: np.full(shape, np.nan) for name in PEAKS}
-    table |= {name: np.empty(shape, object) for name in ("outcome", "ended", "error")}
-    table["time"] = np.full((*shape, len(ALL_DEFINITIONS)), np.nan)
-    table["failed"] = np.zeros((*shape, len(ALL_DEFINITIONS), joints), bool)
-    return table
-
-
-def _store_findings(
-    table: dict[str, Any], place: tuple[Any, int], found: Mapping[str, Any]
-) -> None:
-    """Store the findings of a part at the numbers of its runs and of its change."""
-    runs, change = place
-    for name, column in table.items():
-        values = found[name].split("\n") if isinstance(found[name], str) else found[name]
-        column[runs, change] = np.reshape(values, (len(runs), *column.shape[2:]))
-
-
-def _label_table(
-    table: Mapping[str, Any],
-    dimensions: Sequence[int],
-    analysis: Analysis,
+def _join_parts(
+    parts: Sequence[Mapping[str, Any]],
+    changes: Sequence[Any],
     motions: Sequence[Motion],
     scales: Sequence[float],
+    joints: Sequence[str],
 ) -> xr.Dataset:
-    """Return the findings over motion, scale and change."""
+    """Return the findings of parts, by change and then by run, over motion, scale and change."""
     names = {"largest_displacement": "displacement", "residual_displacement": "residual"}
+    units = PEAKS | {"time": "s"}
+    further = {"time": (len(ALL_DEFINITIONS),), "failed": (len(ALL_DEFINITIONS), len(joints))}
     variables = {}
-    for name, column in table.items():
-        values = column.astype(str) if column.dtype == object else column
-        dims = ("motion", "scale", "change", "definition", "joint")[: column.ndim + 1]
-        units = {"units": PEAKS[name]} if name in PEAKS else {}
-        values = values.reshape(*dimensions, *column.shape[2:])
-        variables[names.get(name, name)] = dims, values, units
-    variables["time"][2]["units"] = "s"
-    labels = [motion.name or f"motion {k}" for k, motion in enumerate(motions, start=1)]
-    joints = [joint.name for joint in analysis.structure.joints]
+    for name, first in parts[0].items():
+        column = [
+            part[name].split("\n") if isinstance(first, str) else part[name] for part in parts
+        ]
+        values = np.concatenate(column, dtype=bool if name == "failed" else None, casting="unsafe")
+        shape = len(changes), len(motions), len(scales), *further.get(name, ())
+        dims = ("change", "motion", "scale", "definition", "joint")[: len(shape)]
+        attributes = {"units": units[name]} if name in units else {}
+        variables[names.get(name, name)] = dims, values.reshape(shape), attributes
     coordinates = {
-        "motion": labels,
+        "motion": [motion.name or f"motion {k}" for k, motion in enumerate(motions, start=1)],
         "scale": list(scales),
         "definition": list(ALL_DEFINITIONS),
-        "name": ("joint", joints),
+        "name": ("joint", list(joints)),
     }
-    return xr.Dataset(variables, coordinates)
+    return xr.Dataset(variables, coordinates).transpose("motion", "scale", "change", ...)
