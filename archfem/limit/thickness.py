@@ -71,7 +71,9 @@ def minimum_thickness(
 
 
 def _find_bracket(
-    build: Callable[[float], Structure], is_stable: Callable[[float], bool]
+    build: Callable[[float], Structure],
+    is_stable: Callable[[float], bool],
+    tolerance: float = 1e-9,
 ) -> tuple[float, float]:
     """Return an unstable thickness and a stable one, at most twice as large [m]."""
     thin, is_start = _find_thin_member(build)
@@ -86,19 +88,10 @@ def _find_bracket(
             if is_stable(2.0 * thin):
                 return thin, 2.0 * thin
         except InvalidStructure as error:
-            return thin, _largest_thickness(build, is_stable, thin, error)
+            refusal = error
+            break
         thin *= 2.0
-
-
-def _largest_thickness(
-    build: Callable[[float], Structure],
-    is_stable: Callable[[float], bool],
-    low: float,
-    refusal: InvalidStructure,
-    tolerance: float = 1e-9,
-) -> float:
-    """Return the largest thickness up to twice `low` that can be built; it must stand [m]."""
-    high = 2.0 * low
+    low, high = thin, 2.0 * thin  # the largest one between that can be built must stand
     while high - low > tolerance * high:
         middle = 0.5 * (low + high)
         try:
@@ -107,7 +100,7 @@ def _largest_thickness(
         except InvalidStructure as error:
             high, refusal = middle, error
     if is_stable(low):
-        return low
+        return thin, low
     raise InvalidInput(
         f"no thickness makes it stand: {low:.6g} m does not, and no greater one can be built "
         f"({refusal}): change the other lengths"
