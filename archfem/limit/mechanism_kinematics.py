@@ -22,7 +22,7 @@ import xarray as xr
 from numpy.typing import NDArray
 from scipy import sparse
 from scipy.optimize import nnls
-from scipy.sparse.csgraph import dijkstra
+from scipy.sparse.csgraph import connected_components, dijkstra
 
 from archfem._display import ProgressReport
 from archfem._recent import RecentResults
@@ -378,29 +378,15 @@ class LoopCheck:
         judged = [k for k in structure.free if structure.blocks[k].part in self.parts]
         return np.array(judged, dtype=np.intp)
 
-    @cached_property
-    def _vertices(self) -> list[tuple[int, int]]:
-        """Numbers of the two bodies at each joint if every block is one, 0 for the ground."""
-        structure = self.blocks.structure
-        pairs = (structure.first_coordinates // 3 + 1)[structure.pairs]
-        return [(one, other) for one, other in pairs.tolist()]
-
     def find_bodies(self, failed: Flags) -> Numbers:
         """Return the body of each block, -1 for the ground, where some joints have failed."""
-        # a forest of blocks, each tree of which is a body; SciPy's components take longer in rings
         structure = self.blocks.structure
-        above = list(range(len(structure.free) + 1))
-
-        def root(vertex: int) -> int:
-            while above[vertex] != vertex:
-                above[vertex] = vertex = above[above[vertex]]
-            return vertex
-
-        for number in np.flatnonzero(~failed).tolist():
-            one, other = map(root, self._vertices[number])
-            above[max(one, other)] = min(one, other)  # the ground stays the root of its tree
-        roots = np.array([root(vertex) for vertex in above])
-        return np.unique(roots, return_inverse=True)[1][structure.first_coordinates // 3 + 1] - 1
+        vertices = structure.first_coordinates // 3 + 1  # number of each block, 0 for the ground
+        joined = vertices[structure.pairs[~failed]].T
+        shape = len(structure.free) + 1, len(structure.free) + 1
+        graph = sparse.csr_matrix((np.ones(joined.shape[1]), (joined[0], joined[1])), shape)
+        # numbered by their first vertex, hence 0 with the ground
+        return np.asarray(connected_components(graph, directed=False)[1][vertices] - 1)
 
     def self_stresses(self, joints: Numbers, bodies: Numbers) -> Array:
         """Return an orthonormal basis R of the self-stresses of joints (3 n_joints, r) [-]."""

@@ -28,6 +28,7 @@ from scipy.special import ndtr
 from archfem._display import DOUBT_MARK, ResultDisplay
 from archfem._files import align_columns
 from archfem._netcdf import read_dataset, write_dataset
+from archfem._recent import RecentResults
 from archfem._typing import Array
 from archfem._validation import (
     check_choice,
@@ -479,9 +480,9 @@ class CollapseRisk(ResultDisplay):
         return unscaled * rows["lower"].values, unscaled * rows["upper"].values
 
     @cached_property
-    def _curve_cache(self) -> dict[str, Fragility]:
+    def _curves(self) -> RecentResults[Fragility]:
         """Fragility curves that were fitted, by intensity measure."""
-        return {}
+        return RecentResults(len(MEASURES))
 
     def fragility(self, measure: str | None = None) -> Fragility:
         """Return the lognormal fragility over all alternatives.
@@ -495,10 +496,7 @@ class CollapseRisk(ResultDisplay):
         """
         self.check_answered()
         name = measure or self.hazard.measure
-        if name not in self._curve_cache:
-            low, high = self.capacities(name)
-            self._curve_cache[name] = fragility(high, low)
-        return self._curve_cache[name]
+        return self._curves.look_up(name, lambda: fragility(*reversed(self.capacities(name))))
 
     @cached_property
     def best_measure(self) -> str:
