@@ -99,24 +99,16 @@ def run(options: argparse.Namespace) -> int:
 
 
 @contextmanager
-def _print_at_end(folder: Path, command: str, title: str = "") -> Iterator[list[str]]:
-    """Print the output of a block when its results are in place, below a title and a verdict."""
+def _print_at_end(folder: Path, command: str, text: str = "") -> Iterator[list[str]]:
+    """Print the output of a block when its results are in place, below a text and a verdict."""
     output, verdict = io.StringIO(), list[str]()
     try:
         with redirect_stdout(output):
             yield verdict
     finally:
-        if title:
-            print(": ".join([title, *filter(None, verdict)]))
+        if text:
+            print(": ".join([text, *filter(None, verdict)]))
         print(_name_published_files(output.getvalue(), folder, command), end="")
-
-
-@contextmanager
-def _replace_results(command: str, case: Case, folder: Path) -> Iterator[Path]:
-    """Yield the draft folder of a command; its output is printed when the results are in place."""
-    inputs = case.hash_inputs()
-    with _print_at_end(folder, command), replace_results(folder, command, inputs) as draft:
-        yield draft
 
 
 def write_results(
@@ -131,36 +123,25 @@ def write_results(
 
     Those of a pair of a suite are written to its own folder, and replace none of another pair.
     """
-    output = io.StringIO()
-    name = name_group(command, pair)
-    if pair is not None:
-        place = PurePath(pair)
-        draw = partial(lambda given: {str(place / key): x for key, x in given().items()}, draw)
-    try:
-        # a reader of the text, such as `head`, may leave before its end
-        with redirect_stdout(output):
-            _replace_files(name, case, out, draw)
-    finally:
-        print(f"{text}\n{output.getvalue()}", end="")
+    if out is None:
+        print(text)
+        return
+    name, inputs, place = name_group(command, pair), case.hash_inputs(), PurePath(pair or "")
+    # a reader of the text, such as `head`, may leave before its end
+    with _print_at_end(Path(out), name, text):
+        folder = create_result_folder(out)
+        run = intact_file_list(folder).get("run")
+        with replace_results(folder, name, inputs) as draft:
+            files: Files = {str(place / key): content for key, content in draw().items()}
+            # a run has the case of the folder, in which [report] may have changed
+            if run is None or run.inputs == inputs:
+                files = {**case_files(case), **files}
+            write(files, draft)
 
 
 def name_group(command: str, pair: str | None) -> str:
     """Return the name of a command's results in the list of a folder, as the command is called."""
     return command if pair is None else f"{command} --pair {pair}"
-
-
-def _replace_files(command: str, case: Case, out: str | None, draw: Callable[[], Files]) -> None:
-    """Replace the files of a command in its folder, if one is given."""
-    if out is None:
-        return
-    folder = create_result_folder(out)
-    run = intact_file_list(folder).get("run")
-    with _replace_results(command, case, folder) as draft:
-        files = draw()
-        # a run has the case of the folder, in which [report] may have changed
-        if run is None or run.inputs == case.hash_inputs():
-            files = {**case_files(case), **files}
-        write(files, draft)
 
 
 def _name_published_files(text: str, folder: Path, command: str) -> str:
@@ -220,7 +201,8 @@ def modes(options: argparse.Namespace) -> int:
     """Compute the modes of a case about its dead load: table, picture, film of the first two."""
     case, folder = Case.read(options.case, options.changes), create_result_folder(options.out)
     print(case.title)
-    with _replace_results("modes", case, folder) as draft:
+    given = folder, "modes"
+    with _print_at_end(*given), replace_results(*given, case.hash_inputs()) as draft:
         at_rest = DeadLoadResult.of(case)
         print(result_text.describe_dead_load(at_rest))
         computed = print_modes(at_rest, options.count, draft)
@@ -237,14 +219,12 @@ def limit(options: argparse.Namespace) -> int:
     """Find the collapse factor of the loads in [limit], and the mechanism."""
     case = Case.read(options.case, options.changes)
 
-    def show(found: Collapse, text: str) -> None:
-        lines = [*dict.fromkeys(doubts)]  # the other sense may have the same
-        text = "\n".join([text, *lines])
+    def show(found: Collapse, text: str, lines: Sequence[str]) -> None:
         files = partial(results.limit_files, case, found, text, lines)
         write_results("limit", case, options.out, f"{case.title}\n{text}", files)
 
     with record_doubts(case.structure) as doubts:
-        show_both_senses(case, case.limit.solve(case.structure), show)
+        show_both_senses(case, case.limit.solve(case.structure), show, doubts)
     return doubt_code(doubts)
 
 
@@ -288,8 +268,8 @@ def assess(options: argparse.Namespace) -> int:
     text = "\n\n".join(filter(None, [*texts, "\n".join(every)]))
 
     def draw() -> Files:
-        mechanisms = [k for k, result in enumerate(found.values()) if result.path is not None]
-        figures = {f"assessment_{k}.png": list(found.values())[k].plot() for k in mechanisms}
+        numbered = {f"assessment_{k}.png": result for k, result in enumerate(found.values())}
+        figures = {name: each.plot() for name, each in numbered.items() if each.path is not None}
         stated = answers.state_assessments(found, doubts).as_file("assessment")
         return {"assessment.txt": text, **stated, **figures}
 
@@ -486,7 +466,7 @@ def print_results(case: Case, found: Iterable[Result], folder: Path) -> tuple[st
     """Print results, write their files, and return the verdict and whether any is in doubt."""
     # `carry_out` yields dead load, pushover, suite, runs and limit analysis in this order.
     runs: dict[str, History] = {}
-    of_limit: list[str] = []
+    of_limit = False
     if (survey := read_survey(case.settings, case.folder)) is not None:
         print(survey)
     with record_doubts(case.structure) as doubts:
@@ -495,7 +475,8 @@ def print_results(case: Case, found: Iterable[Result], folder: Path) -> tuple[st
         write_progress_line(case.title, f"dead load of {len(case.structure.free)} blocks")
         for result in found:
             if isinstance(result, Collapse):
-                of_limit = _print_limit(case, result, doubts, folder)
+                show_both_senses(case, result, partial(_print_limit, case, folder), doubts)
+                of_limit = len(doubts) > 0
             elif isinstance(result, DeadLoadResult):
                 at_rest = result
                 print(result_text.describe_dead_load(at_rest))
@@ -524,18 +505,12 @@ def print_results(case: Case, found: Iterable[Result], folder: Path) -> tuple[st
     return verdict, any([of_limit, at_rest.doubts, *(run.doubts for run in runs.values())])
 
 
-def _print_limit(case: Case, first: Collapse, doubts: list[str], folder: Path) -> list[str]:
-    """Print limit analysis in both senses, write its files, and return its doubts."""
-    of_limit: list[str] = []
-
-    def show(found: Collapse, text: str) -> None:
-        of_limit.extend(dict.fromkeys(doubts))
-        text = "\n".join([text, *of_limit])
-        print(text)
-        write(results.limit_files(case, found, text, of_limit), folder)
-
-    show_both_senses(case, first, show)
-    return of_limit
+def _print_limit(
+    case: Case, folder: Path, found: Collapse, text: str, doubts: Sequence[str]
+) -> None:
+    """Print limit analysis, and write its files."""
+    print(text)
+    write(results.limit_files(case, found, text, doubts), folder)
 
 
 def _print_first_modes(at_rest: DeadLoadResult, folder: Path, max_modes: int = 4) -> None:

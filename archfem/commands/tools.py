@@ -8,7 +8,7 @@ import os
 import re
 import shutil
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from importlib import import_module, metadata
 from importlib.util import find_spec
@@ -69,7 +69,7 @@ def _check_case(options: argparse.Namespace) -> int:
     if case.limit.live and case.limit.friction == "nonassociated":
         print("limit analysis: `archfem limit` searches sliding without dilatancy, in both senses")
     elif case.limit.live:
-        show_both_senses(case, case.limit.solve(case.structure), lambda _, text: print(text))
+        show_both_senses(case, case.limit.solve(case.structure), lambda _, text, __: print(text))
     # Unreadable records are errors before the dead load is computed.
     case.check_ground()
     at_rest = DeadLoadResult.of(case)
@@ -164,10 +164,15 @@ def example(options: argparse.Namespace) -> None:
         )
 
 
-def show_both_senses(case: Case, first: Collapse, show: Callable[[Collapse, str], None]) -> None:
+def show_both_senses(
+    case: Case,
+    first: Collapse,
+    show: Callable[[Collapse, str, Sequence[str]], None],
+    doubts: Sequence[str] = (),
+) -> None:
     """Show a result of limit analysis beside that of the other sense, each at its least end.
 
-    Where the rest is cut short, the result is shown.
+    Doubts are lines that both may add to. Where the rest is cut short, the result is shown.
     """
     # where a structure does not stand, the load plays no part
     other = None if first.outcome is Outcome.INFEASIBLE else case.limit.opposite
@@ -181,7 +186,8 @@ def show_both_senses(case: Case, first: Collapse, show: Callable[[Collapse, str]
             left = ""
     finally:
         found, text = result_text.describe_limit(case, first, opposite)
-        show(found, f"{text}{left}")
+        lines = [*dict.fromkeys(doubts)]  # both senses may have the same
+        show(found, "\n".join([f"{text}{left}", *lines]), lines)
 
 
 def print_motions(suite: Suite) -> None:
