@@ -52,8 +52,9 @@ from archfem.studies.study import STUDIED_CASE_KEYS, STUDY_KEYS
 
 Schema = dict[str, Any]
 
-_MOTION, _SPECTRUM, _CRITERIA = (
-    {"$ref": f"#/definitions/{name}"} for name in ("motion", "spectrum", "criteria")
+_MOTION, _SPECTRUM, _CRITERIA, _STANDING, _FILL = (
+    {"$ref": f"#/definitions/{name}"}
+    for name in ("motion", "spectrum", "criteria", "standing", "fill")
 )
 
 
@@ -80,6 +81,8 @@ def build_schema() -> Schema:
             "motion": _motion(),
             "spectrum": _any(_spectrum(code) for code in _list_own_spectra()),
             "criteria": _table_of(Criteria),
+            "standing": _parts_by_name(StandingBody),
+            "fill": _table(structure_keys.fill_keys(), law=_choice("elastic", "jointed")),
         },
     }
 
@@ -117,11 +120,11 @@ def _shape(name: str) -> Schema:
 
 def _parts_of_structure(name: str) -> dict[str, Schema]:
     """Return the schemas of the tables in [structure]."""
-    parts: dict[str, Schema] = {"standing": _parts_by_name(StandingBody)}
+    parts: dict[str, Schema] = {"standing": _STANDING}
     if name == "blocks":
         rows = {"blocks": Block, "joints": Joint}
         return parts | {key: _list(_part(cls)) for key, cls in rows.items()}
-    parts["fill"] = _table(structure_keys.fill_keys(), law=_choice("elastic", "jointed"))
+    parts["fill"] = _FILL
     if name == "outlines":
         parts |= {"layers": _by_name(_part(Layer)), "contacts": {"type": "object"}}
     elif name == "bridge":
