@@ -1,12 +1,22 @@
 """Exception classes, one for each remedy; messages give the value, the reason and the remedy."""
 
 import logging
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
 # Receives the warnings of all rooms
 logger = logging.getLogger("archfem")
+
+
+@contextmanager
+def filter_log(keep: Callable[[logging.LogRecord], bool]) -> Iterator[None]:
+    """Filter what is logged within a block."""
+    logger.addFilter(keep)
+    try:
+        yield
+    finally:
+        logger.removeFilter(keep)
 
 
 @contextmanager
@@ -19,11 +29,8 @@ def keep_warnings() -> Iterator[list[str]]:
             warnings.append(record.getMessage())
         return not is_warning
 
-    logger.addFilter(keep)
-    try:
+    with filter_log(keep):
         yield warnings
-    finally:
-        logger.removeFilter(keep)
 
 
 class ArchfemError(Exception):

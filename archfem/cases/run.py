@@ -8,7 +8,7 @@ import logging
 import os
 import shutil
 from collections.abc import Callable, Collection, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from importlib.util import find_spec
@@ -34,7 +34,7 @@ from archfem.dynamics.history import Ending, History, partial_history
 from archfem.dynamics.schemes import Viscous
 from archfem.dynamics.slip_error import least_compression
 from archfem.dynamics.time_history import time_history
-from archfem.errors import ArchfemError, DidNotConverge, InvalidInput, logger
+from archfem.errors import ArchfemError, DidNotConverge, InvalidInput, filter_log, logger
 from archfem.joints.criteria import assessed_joints
 from archfem.limit.collapse import Collapse
 from archfem.masonry.stiffness_ratio import soften_joints
@@ -401,8 +401,7 @@ def run_time_history(
     return run
 
 
-@contextmanager
-def log_prefix(*names: str) -> Iterator[None]:
+def log_prefix(*names: str) -> AbstractContextManager[None]:
     """Prefix warnings of a block with names, so that those of many runs can be distinguished."""
 
     def add_prefix(record: logging.LogRecord) -> bool:
@@ -411,11 +410,7 @@ def log_prefix(*names: str) -> Iterator[None]:
             record.named = True
         return True
 
-    logger.addFilter(add_prefix)
-    try:
-        yield
-    finally:
-        logger.removeFilter(add_prefix)
+    return filter_log(add_prefix)
 
 
 def _run_pair(

@@ -40,6 +40,11 @@ def measure_sector(points: Array, centre: Array) -> tuple[float, Array, float]:
     return area, centre + reach * bisector, about_centre - area * reach**2
 
 
+def measure_path(points: Array) -> Array:
+    """Compute the length of a polyline up to each of its points (n,) [m]."""
+    return np.append(0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
+
+
 def rotate(points: Array, angle: float | Array) -> Array:
     """Rotate points about the origin, anticlockwise (…, 2)."""
     c, s = np.cos(angle), np.sin(angle)

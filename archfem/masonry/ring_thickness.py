@@ -8,7 +8,7 @@ import numpy as np
 from archfem._typing import Array, Metres, Numbers
 from archfem._validation import check_between, validate_arguments, validate_methods
 from archfem.errors import InvalidInput, InvalidStructure
-from archfem.masonry.block import Block, as_point, check_simple
+from archfem.masonry.block import Block, as_point, check_simple, measure_path
 from archfem.masonry.structure import CONTACT_TOLERANCE, Joint, Structure, join_names
 
 
@@ -202,7 +202,7 @@ def _walk(count: int, start: int, end: int, forbidden: set[int]) -> Numbers:
 
 def _shares(path: Array) -> Array:
     """Return the share of the length of a path at each of its points (n,)."""
-    along = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1)))
+    along = measure_path(path)
     return along / along[-1]
 
 

@@ -16,6 +16,8 @@ from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 
 from archfem._display import ResultDisplay
 from archfem._typing import Array, Metres, MetresPerSecondSquared
@@ -561,19 +563,12 @@ def record_origin(shape: Shape) -> Shape:
 
 def find_supported_blocks(structure: Structure, blocks: Iterable[int]) -> set[int]:
     """Return those of some blocks that are joined to a fixed one through others of them."""
-    neighbours: dict[int, list[int]] = {number: [] for number in blocks}
-    for one, other in (joint.blocks for joint in structure.joints):
-        if one in neighbours and other in neighbours:
-            neighbours[one].append(other)
-            neighbours[other].append(one)
-    # search from the supports
-    reached = [number for number in neighbours if structure.blocks[number].fixed]
-    supported = set(reached)
-    while reached:
-        new = set(neighbours[reached.pop()]) - supported
-        supported |= new
-        reached += new
-    return supported
+    own, pairs = [*blocks], structure.pairs.reshape(-1, 2)
+    links = pairs[np.isin(pairs, own).all(axis=1)].T
+    graph = coo_matrix((np.ones(links.shape[1]), links), 2 * [len(structure.blocks)])
+    pieces = connected_components(graph, directed=False)[1]
+    held = {pieces[number] for number in own if structure.blocks[number].fixed}
+    return {number for number in own if pieces[number] in held}
 
 
 def rigid_motion_matrix(points: Array, centroid: Array) -> Array:

@@ -17,7 +17,7 @@ import numpy as np
 from scipy import sparse
 
 from archfem._typing import Array, Numbers
-from archfem.errors import InvalidInput, logger
+from archfem.errors import InvalidInput, filter_log
 from archfem.joints.operator import JointOperator
 from archfem.masonry.loads import Action, BodyForce, Settlement
 from archfem.masonry.structure import Structure
@@ -233,11 +233,8 @@ def log_doubts_once() -> Iterator[None]:
         logged.update(kinds)
         return not known
 
-    logger.addFilter(is_new)
-    try:
+    with filter_log(is_new):
         yield
-    finally:
-        logger.removeFilter(is_new)
 
 
 def write_doubts(doubts: Iterable[Doubt]) -> str:

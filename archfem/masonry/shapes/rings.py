@@ -22,7 +22,7 @@ from archfem._validation import (
     validate_arguments,
 )
 from archfem.errors import InvalidStructure
-from archfem.masonry.block import Block, Point, as_point, check_points
+from archfem.masonry.block import Block, Point, as_point, check_points, measure_path
 from archfem.masonry.materials import STONE, STONE_TO_STONE, Contact, Material
 from archfem.masonry.structure import Joint, Structure, record_origin
 from archfem.units import G, in_degrees
@@ -471,7 +471,7 @@ def elliptical_arch(  # noqa: PLR0913  (all are lengths and properties of one ri
     def points(angle: Array) -> Array:
         return np.column_stack([-half * np.cos(angle), rise * np.sin(angle)])
 
-    distances = _cumulative_length(points(angles))
+    distances = measure_path(points(angles))
 
     def section(share: Array) -> Faces:
         # The length of an ellipse has no closed form: its inverse is interpolated.
@@ -566,7 +566,7 @@ def arch_along(
         )
     # Stones are numbered from the left, whichever way the points are listed.
     points = points if points[0, 0] < points[-1, 0] else points[::-1]
-    distances = _cumulative_length(points)
+    distances = measure_path(points)
     slope = np.gradient(points, distances, axis=0, edge_order=2)
 
     def section(share: Array) -> Faces:
@@ -577,11 +577,6 @@ def arch_along(
         return inner, inner + thickness * normal
 
     return ring.assemble(ring.divide(section), "arch")
-
-
-def _cumulative_length(points: Array) -> Array:
-    """Return the length of a polyline up to each of its points (n,) [m]."""
-    return np.append(0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
 
 
 def _mirror_stones(left: list[Faces], count: int) -> list[Faces]:
