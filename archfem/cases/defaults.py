@@ -110,7 +110,8 @@ def list_fill_values(case: Case) -> Iterator[tuple[str, str, bool]]:
 
 def list_defaults(case: Case) -> list[Default]:
     """Return the deciding values that a case does not give, with key and reason."""
-    return [*_list_properties(case), *_list_settings(case)]
+    # a fill in pieces has a contact with stone for each depth of soil
+    return [*dict.fromkeys([*_list_properties(case), *_list_settings(case)])]
 
 
 def _list_properties(case: Case) -> Iterator[Default]:

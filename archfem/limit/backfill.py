@@ -27,6 +27,7 @@ from archfem.limit.linear_programme import Optimum, Programme, RigidBlocks
 from archfem.limit.mechanism_kinematics import RigidRegions, find_rigid_regions, take_all_rigid
 from archfem.masonry.loads import Action, BodyForce, PointLoad
 from archfem.masonry.materials import STONE
+from archfem.masonry.standing import find_bodies
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import CONTACT_TOLERANCE, Structure
 
@@ -120,14 +121,26 @@ class FillProfile:
     @cached_property
     def _unit_weights(self) -> Array:
         """Unit weights of the slices (n,) [N/m³]."""
+        cut = self.slices
         weights = np.array([block.material.unit_weight for block in self.structure.blocks])
-        return np.asarray(weights[self.slices.block])
+        weights = weights[cut.block]
+        for number in self._bodies:  # which rest on their feet alone
+            own, area = cut.block == number, cut.area
+            feet = own & (cut.bottom.max(axis=1) < cut.bottom[own].min() + self.near)
+            weights[own] *= feet[own] * area[own].sum() / area[feet].sum()
+        return np.asarray(weights)
 
-    def columns(self, lever: float = 0.0) -> tuple[Numbers, Array, Array]:
-        """Return stone, place and weight of every column of fill (n,), (n, 2) [m], (n,) [N].
+    @cached_property
+    def _bodies(self) -> list[int]:
+        """Numbers of the bodies that stand on the structure."""
+        return [self.structure.block_number(name) for name in find_bodies(self.structure)]
+
+    def columns(self, lever: float = 0.0) -> tuple[Numbers, Array, Array, Array]:
+        """Return stone (n,), place (n, 2) [m], weight (n,) [N] and lean of every column of fill.
 
         A body on the fill has the moment of its forces about the fill's surface in any case: no
-        shear carries it away.
+        shear carries it away. On one base it acts column by column; on several feet it leans on
+        those in front. The lean (n,) is that vertical force under a horizontal one of its weight.
 
         Args:
             lever: where the place is, from 0 for the foot of a column to 1 for its centroid [-].
@@ -145,10 +158,20 @@ class FillProfile:
         carrier, x = below[carried], cut.middle[carried]
         foot = _interpolate_edge(cut.side[carrier], cut.top[carrier], x)
         ends = (_interpolate_edge(cut.side[carried], y[carried], x) for y in (cut.bottom, cut.top))
-        height, base = 0.5 * sum(ends), surface[carried]
+        height, base = np.asarray(0.5 * sum(ends)), surface[carried]
+        lean = np.zeros_like(weight)
+        for number in self._bodies:
+            own = np.flatnonzero((cut.block[carried] == number) & (weight > 0.0))
+            if len(own) == np.sum(cut.block[carried] == number):
+                continue
+            # as a rigid body on feet that are equally stiff along their length
+            height[own] = road = self.structure.blocks[number].points[:, 1].min()
+            arm = x[own] - np.average(x[own], weights=weight[own])
+            moment = weight[own].sum() * (self.structure.centroids[number, 1] - road)
+            lean[own] = -moment * weight[own] * arm / (weight[own] @ arm**2)
         level = np.where(soft[carried], height, _interpolate_edge(cut.side[base], cut.top[base], x))
         height -= (1.0 - lever) * (level - foot)
-        return cut.block[carrier], np.stack([x, height], axis=1), weight
+        return cut.block[carrier], np.stack([x, height], axis=1), weight, lean
 
     def overburden(self, point: Array, side: float) -> float:
         """Return the vertical stress of all fill above a point, just beside it [Pa]."""
@@ -438,8 +461,9 @@ class BlocksWithFill:
         for action in actions:
             # a body force acts on the fill too, and so on the stone below each column
             if self.fill is not None and isinstance(action, BodyForce):
-                block, place, weight = self._profile.columns(self.fill.lever)
+                block, place, weight, lean = self._profile.columns(self.fill.lever)
                 pull = weight[:, None] * np.array([action.horizontal, action.vertical])
+                pull[:, 1] += action.horizontal * lean
                 total += self._sum_forces(self.rigid_regions.place[block], place, pull)
             if self.fill is not None and isinstance(action, PointLoad):
                 number, point = action.place(self.whole)
@@ -462,18 +486,28 @@ class BlocksWithFill:
         forces = part[:, None] * np.array(load.force)
         return self._sum_forces(self.rigid_regions.place[block], points, forces)
 
-    def warn_of_sliding_fill(
+    def warn_of_lost_loads(
         self, live: Sequence[Action], dead: Sequence[Action], factor: float
     ) -> None:
-        """Warn where a fill without cohesion would slide before the stones become a mechanism."""
-        if self.fill is None or self.fill.cohesion > 0.0:
+        """Warn where a fill without cohesion slides, or an axle lifts, before stones move."""
+        if self.fill is None:
             return
         grown = np.array(sum_body_forces(dead)) + factor * np.array(sum_body_forces(live))
+        sideways, down = abs(float(grown[0])), 1.0 - grown[1]
+        *_, weight, lean = self._profile.columns()
+        loads = weight > 0.0
+        # what is taken off an axle, as a share of its load and of the horizontal pull
+        share = np.max(np.sign(grown[0]) * lean[loads] / weight[loads], initial=0.0)
+        if sideways * share > down:
+            logger.warning(
+                "at a factor of %.4g, %.3g g sideways, an axle has lifted, at %.3g g: the factor "
+                "is that of a vehicle which the road holds down; cut the fill into pieces",
+                *(factor, sideways, down / share),
+            )
         # A column rests on the next layer by friction alone: it slides where the horizontal pull
         # exceeds tan φ times the vertical force.
         slope = tan(radians(self.fill.friction_angle))
-        sideways = abs(float(grown[0]))
-        if sideways > slope * (1.0 - grown[1]):
+        if sideways > slope * down and self.fill.cohesion <= 0.0:
             logger.warning(
                 "at a factor of %.4g the fill itself slides, at %.3g g sideways and tan φ = %.3g: "
                 "the factor is that of the stones alone, and no fill would stay to load them so",

@@ -370,7 +370,7 @@ def _solve_loads(
             )
         result = _solve_collapse(stones, programme, loads, friction)
         if result.outcome is Outcome.COLLAPSES and not isinstance(loads, Settlement):
-            stones.warn_of_sliding_fill(loads, stays, result.factor)
+            stones.warn_of_lost_loads(loads, stays, result.factor)
     if np.isinf(result.factor):
         warn_locking(structure, friction)
     if friction is None:

@@ -126,8 +126,9 @@ def _name_free_end(structure: Structure, falling: Sequence[int]) -> str:
         }
         if (beside - held) & {*falling}:
             return (
-                f"pieces of the fill fall out of its free end at x = {end:.2f} m, which a wall as "
-                "high as the fill would hold (`above` of the sidewalls of a bridge), or cohesion"
+                f"pieces of the fill fall out of its free end at x = {end:.2f} m, which more "
+                "cohesion would hold, or a wall as high as the fill (`above` of the sidewalls of a "
+                "bridge)"
             )
     return ""
 

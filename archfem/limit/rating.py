@@ -38,11 +38,11 @@ from archfem.limit.vehicles import (
     lay_parapets,
     moving_load,
     name_missing,
-    parse_axles,
     places_at_ends,
     vehicle_positions,
 )
 from archfem.masonry.loads import PointLoad
+from archfem.masonry.standing import parse_axles
 from archfem.masonry.structure import (
     HasStructure,
     Structure,

@@ -3,7 +3,6 @@
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from numbers import Real
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +20,7 @@ from archfem.limit.fill_strength import Fill, PlasticFill, as_pressure
 from archfem.limit.linear_programme import Optimum, Programme
 from archfem.limit.nonassociated import find_weakest, starting_forces
 from archfem.masonry.loads import Action, PointLoad
-from archfem.masonry.standing import find_bodies
+from archfem.masonry.standing import find_bodies, parse_axles
 from archfem.masonry.structure import (
     CONTACT_TOLERANCE,
     HasStructure,
@@ -368,24 +367,6 @@ def moving_load(  # noqa: PLR0913  (loads, their places, and the strength of the
 def check_factor(value: float, name: str) -> float:
     """Return a partial factor, which must be a plausible one."""
     return check_number(value, f"{name} [-]", minimum=0.1, maximum=10.0)
-
-
-def parse_axles(axles: float | Sequence[float], spacings: Sequence[float]) -> Array:
-    """Return the weight of each axle, and its place before the middle (n_axles, 2) [N, m]."""
-    weights = np.array(check_numbers([axles] if isinstance(axles, Real) else axles, "axles [N]"))
-    gaps = np.array(check_numbers(spacings, "spacings [m]"))
-    if not len(weights) or (weights <= 0.0).any() or (gaps <= 0.0).any():
-        raise InvalidInput(
-            f"axles {weights.tolist()} N with spacings {gaps.tolist()} m: give weights and "
-            "spacings above 0, and at least one axle"
-        )
-    if len(gaps) != len(weights) - 1:
-        raise InvalidInput(
-            f"{len(weights)} axles and {len(gaps)} spacings: give one between each two axles, "
-            "as in spacings = [1.3] m"
-        )
-    behind = np.concatenate([[0.0], np.cumsum(gaps)])
-    return np.stack([weights, behind[-1] / 2.0 - behind], axis=1)
 
 
 def vehicle_positions(

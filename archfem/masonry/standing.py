@@ -1,17 +1,21 @@
 """Bodies that stand on a structure, such as a lorry on a bridge: loads whose mass is pushed.
 
-A body is a rigid block on the joint below its base. On an elastic fill, limit analysis and
-assessments take it column by column, as they take the fill: its weight and its horizontal force go
-to the stones straight below, with the moment of that force about the road.
+A body is a rigid block on the joint below its base. A vehicle is one on a foot below each axle. The
+lengths of feet are in proportion to the axle loads: pressed evenly, they bear just these.
+
+On an elastic fill, limit analysis and assessments take it column by column, as they take the fill:
+its weight and its horizontal force go to the stones straight below each foot, with the moment of
+that force about the road.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from numbers import Real
 
 import numpy as np
 
-from archfem._typing import Metres, Newtons
-from archfem._validation import check_between, check_fields, validate_arguments
+from archfem._typing import Array, Metres, Newtons
+from archfem._validation import check_between, check_fields, check_numbers, validate_arguments
 from archfem.errors import InvalidInput
 from archfem.masonry.assembly import name_joints, touching
 from archfem.masonry.block import Block, as_point
@@ -20,28 +24,53 @@ from archfem.masonry.structure import CONTACT_TOLERANCE, Joint, Structure, join_
 from archfem.units import GPa
 
 
+def parse_axles(axles: float | Sequence[float], spacings: Sequence[float]) -> Array:
+    """Return the weight of each axle, and its place before the middle (n_axles, 2) [N, m]."""
+    weights = np.array(check_numbers([axles] if isinstance(axles, Real) else axles, "axles [N]"))
+    gaps = np.array(check_numbers(spacings, "spacings [m]"))
+    if not len(weights) or (weights <= 0.0).any() or (gaps <= 0.0).any():
+        raise InvalidInput(
+            f"axles {weights.tolist()} N with spacings {gaps.tolist()} m: give weights and "
+            "spacings above 0, and at least one axle"
+        )
+    if len(gaps) != len(weights) - 1:
+        raise InvalidInput(
+            f"{len(weights)} axles and {len(gaps)} spacings: give one between each two axles, "
+            "as in spacings = [1.3] m"
+        )
+    behind = np.concatenate([[0.0], np.cumsum(gaps)])
+    return np.stack([weights, behind[-1] / 2.0 - behind], axis=1)
+
+
 @dataclass(frozen=True, kw_only=True)
 class StandingBody:
     """A rigid body on a level top, such as a lorry on a road.
 
     Attributes:
-        x: middle of its base, below its centre of gravity [m].
-        length: length of its base along the structure [m].
-        weight: weight, which is accelerated as a mass [N].
+        x: middle of its base, below its centre of gravity; or between first and last axle [m].
+        length: length of its base along the structure, or of the wheels of its heaviest axle, those
+            of others being in proportion to their loads [m].
+        weight: weight, which is accelerated as a mass [N]; None with axles, whose sum it is.
         centre_of_gravity: height of its centre of gravity above the base [m].
+        axles: load of each axle, from left to right, below whose sum its centre of gravity is; none
+            for a body that rests on all its length [N].
+        spacings: distances between the axles, one fewer [m].
         width: width of the structure, out of plane, that carries it [m]; None for all of it. On
             less its weight counts more, by the whole width over this one.
         contact: contact of its base.
         name: name of the block, and of its part.
 
     Raises:
-        InvalidInput: a value is no number, not above zero, or too large to be metres and newtons.
+        InvalidInput: a value is no number, not above zero, or too large to be metres and newtons;
+            neither weight nor axles are given, or both; or wheels overlap.
     """
 
     x: Metres
     length: Metres
-    weight: Newtons
+    weight: Newtons | None = None
     centre_of_gravity: Metres
+    axles: Sequence[Newtons] = ()
+    spacings: Sequence[Metres] = ()
     width: Metres | None = None
     contact: Contact = SOIL_TO_STONE
     name: str = "body"
@@ -49,22 +78,45 @@ class StandingBody:
     def __post_init__(self) -> None:
         """Check that the values are possible."""
         check_fields(self)
-        check_between(self.weight, f"'{self.name}': weight [N]", 0.0, 1e9, remedy="give newtons")
+        if (self.weight is None) != bool(self.axles):
+            raise InvalidInput(f"'{self.name}': give either its weight, or axles, whose sum it is")
+        for key in ("axles", "spacings"):
+            object.__setattr__(self, key, tuple(getattr(self, key)))  # lists of a case
+        check_between(self.total, f"'{self.name}': weight [N]", 0.0, 1e9, remedy="give newtons")
         for key in ("length", "centre_of_gravity", "width"):
             if (value := getattr(self, key)) is not None:
                 check_between(value, f"'{self.name}': {key} [m]", 0.0, 100.0, remedy="give metres")
+        if (overlap := float(np.max(self.feet[:-1, 1] - self.feet[1:, 0], initial=-1.0))) >= 0.0:
+            raise InvalidInput(
+                f"'{self.name}': its wheels overlap by {overlap:.3g} m: give less length, that of "
+                "the wheels of the heaviest axle"
+            )
+
+    @property
+    def total(self) -> float:
+        """Weight, or the sum of the axles [N]."""
+        return float(sum(self.axles)) if self.weight is None else self.weight
+
+    @property
+    def feet(self) -> Array:
+        """Ends of the base, or of the wheels of each axle, from left to right (n, 2) [m]."""
+        rows = parse_axles(self.axles or (self.total,), self.spacings)
+        half = 0.5 * self.length * rows[:, 0] / rows[:, 0].max()
+        return (self.x - rows[:, 1] + [-half, half]).T
 
     def place(self, structure: Structure) -> Block:
         """Return the block of this body on the top of a structure.
 
         Args:
-            structure: whose highest point at x is the level of the base.
+            structure: whose highest point below the middles of its feet is the level of the base.
 
         Raises:
             InvalidInput: it stands beside the structure, or on less width than there is.
         """
-        tops = [top for block in structure.blocks if (top := block.top(self.x)) is not None]
-        if not tops:
+        feet, mass = self.feet, self.centre_of_gravity
+        places, lengths = feet.mean(axis=1), np.ptp(feet, axis=1)
+        tops = [block.top(x) for block in structure.blocks for x in places]
+        if not (tops := [top for top in tops if top is not None]):
             raise InvalidInput(
                 f"'{self.name}' stands at x = {self.x:.4g} m beside the structure: move it onto a "
                 "block"
@@ -75,10 +127,18 @@ class StandingBody:
                 f"'{self.name}': width {width:.4g} m, and the structure has {structure.width:.4g} "
                 "m: leave it out"
             )
-        bottom, height = max(tops), 2.0 * self.centre_of_gravity
-        left, right, top = self.x - 0.5 * self.length, self.x + 0.5 * self.length, bottom + height
-        corners = (left, bottom), (right, bottom), (right, top), (left, top)
-        unit_weight = self.weight / (self.length * height * width)
+        # the outline is as long on both sides of the centre of gravity, but for round-off
+        middle = np.average(places, weights=lengths)
+        lean = round(float(feet[0, 0] + feet[-1, 1] - 2.0 * middle), 9)
+        left, right = feet[0, 0] - max(lean, 0.0), feet[-1, 1] - min(lean, 0.0)
+        leg = 0.1 * mass if len(feet) > 1 else 0.0
+        # height above the legs, with the centroid of both at the centre of gravity
+        legs, above = leg * lengths.sum(), mass - leg
+        height = above + np.sqrt(above**2 + 2.0 * legs * (mass - 0.5 * leg) / (right - left))
+        base = [(x, y) for a, b in feet for x, y in ((a, leg), (a, 0.0), (b, 0.0), (b, leg))]
+        base = [(left, leg), *base, (right, leg), (right, leg + height), (left, leg + height)]
+        corners = tuple((float(x), float(max(tops) + y)) for x, y in dict.fromkeys(base))
+        unit_weight = self.total / ((legs + height * (right - left)) * width)
         # it stands for itself, at any weight
         material = Material(30.0 * GPa, 0.2, unit_weight, None, self.name, stands_for=self.name)
         return Block(corners, material, self.name, part=self.name, role="other")
@@ -130,13 +190,13 @@ def carrying(structure: Structure, bodies: Sequence[StandingBody]) -> Structure:
 def _stand(structure: Structure, body: StandingBody) -> Structure:
     """Return a structure with one body on it."""
     number, block = len(structure.blocks), body.place(structure)
-    blocks = (*structure.blocks, block)
+    blocks, base = (*structure.blocks, block), float(np.ptp(body.feet, axis=1).sum())
     touches = [touch for touch in touching(blocks) if number in touch[:2]]
-    level = block.points[0][1] + CONTACT_TOLERANCE * structure.size
+    level = block.points[:, 1].min() + CONTACT_TOLERANCE * structure.size
     stands = sum(float(np.ptp(ends[:, 0])) for *_, ends in touches if ends[:, 1].max() < level)
-    if stands < body.length - 4.0 * len(touches) * CONTACT_TOLERANCE * structure.size:
+    if stands < base - 4.0 * len(touches) * CONTACT_TOLERANCE * structure.size:
         raise InvalidInput(
-            f"'{body.name}' stands on {stands:.4g} m of its {body.length:.4g} m, as the top of the "
+            f"'{body.name}' stands on {stands:.4g} m of its {base:.4g} m, as the top of the "
             f"structure beside x = {body.x:.4g} m is not level: make it shorter, move it, or give "
             "the structure a fill or a paving"
         )

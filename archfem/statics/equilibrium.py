@@ -276,6 +276,8 @@ def _describe_failure(model: Model, error: DidNotConverge, newton: Newton | None
         return str(error)
     if cause is not None:
         return f"'{model.structure.name}' does not stand under its own weight: {cause}"
+    if model.structure.cohesion.any() and (cause := _explain_without_cohesion(model.structure)):
+        return f"{cause}; {error}"
     soft = "joints are" if model.fidelity == "rigid" else "joints and blocks are"
     text = f"as rigid blocks it stands, but its {soft} too soft for its depth"
     part = _find_carried_part(model, newton)
@@ -286,6 +288,20 @@ def _describe_failure(model: Model, error: DidNotConverge, newton: Newton | None
     least = factor * min(joint.contact.normal_stiffness for joint in model.structure.joints)
     stiff = f"it stands if they are {factor:g} times as stiff, k_n from {least:.2g} Pa/m on"
     return f"{text}: {stiff}; {error}"
+
+
+def _explain_without_cohesion(structure: Structure) -> str:
+    """Return what falls where cohesion is lost with contact, and the remedy; "" for nothing."""
+    most = max(structure.joints, key=lambda joint: joint.contact.cohesion).contact
+    joints = [
+        replace(joint, contact=replace(joint.contact, cohesion=0.0)) for joint in structure.joints
+    ]
+    if (cause := explain_instability(replace(structure, joints=tuple(joints)))) is None:
+        return ""
+    return (
+        f"as rigid blocks it stands by its cohesion alone, {most.cohesion / kPa:.3g} kPa of "
+        f"'{most.name}', of which joints lose the part that opens; without it {cause}"
+    )
 
 
 def _find_carried_part(model: Model, newton: Newton | None, rounds: int = 20) -> float | None:

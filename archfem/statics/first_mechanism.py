@@ -36,7 +36,13 @@ def take_fill_as_loads(
         return structure, ()
     regions = find_rigid_regions(structure)
     stones = np.isin(np.arange(len(structure.blocks)), regions.blocks)
-    stone, place, weight = FillProfile(structure, stones).columns(lever)
+    stone, place, weight, lean = FillProfile(structure, stones).columns(lever)
+    if lean.any():
+        raise InvalidInput(
+            "an assessment takes no axles on an elastic fill, on which a vehicle leans: give its "
+            "weight and length without axles, cut the fill into pieces, or push it by `archfem "
+            "limit`"
+        )
     loads = []
     for number in np.unique(stone):
         own = stone == number

@@ -346,7 +346,7 @@ def kinematic_assessment(  # noqa: PLR0913  (the factors of the codes are argume
     if fill is not None and found.path is not None:
         filled = attach_fill(structure, fill)
         push = [BodyForce(search.direction)]
-        filled.warn_of_sliding_fill(push, (), found.path.mechanisms[0].factor)
+        filled.warn_of_lost_loads(push, (), found.path.mechanisms[0].factor)
     return add_fill_ranges(found, search.vary(lever, fill, found))
 
 

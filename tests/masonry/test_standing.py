@@ -41,6 +41,63 @@ def test_a_body_has_its_weight_at_its_centre_of_gravity_on_a_joint_to_the_road()
     assert not loaded.judged[-1]
 
 
+TRUCK = StandingBody(
+    x=0.0,
+    length=0.4,
+    axles=[60e3, 115e3, 90e3],
+    spacings=[1.5, 1.2],
+    centre_of_gravity=1.3,
+    width=0.5,
+    name="truck",
+)
+
+
+def test_a_vehicle_presses_with_its_axles_and_tips_over_the_last_one_at_its_centre_of_gravity():
+    """On a stiff wall the joints below its wheels bear the axle loads, twice on half the width."""
+    wall = af.column(breadth=8.0, heights=[0.5, 0.5])
+    loaded = carrying(wall, [TRUCK])
+    axles, places = np.array(TRUCK.axles), np.array([-1.35, 0.15, 1.35])
+    middle = axles @ places / axles.sum()
+    assert loaded.blocks[-1].centroid == pytest.approx([middle, 1.0 + 1.3])
+    joints = af.dead_load(af.build(loaded, fidelity="rigid")).joints
+    assert joints["N"].values[-3:] == pytest.approx(2.0 * axles, rel=1e-6)
+    wheels = np.array([joint.depth for joint in loaded.joints[-3:]])
+    assert wheels == pytest.approx(0.4 * axles / 115e3)
+    for sense, tip in ((1.0, 1.35 + 0.5 * wheels[2]), (-1.0, -1.35 - 0.5 * wheels[0])):
+        found = af.collapse_factor(loaded, live=af.BodyForce(sense), friction=None)
+        assert found.factor == pytest.approx(sense * (tip - middle) / 1.3)
+
+
+@pytest.mark.parametrize("lever", [0.0, 1.0])
+def test_a_vehicle_on_two_piers_leans_on_the_one_in_front(lever, verified, caplog):
+    """The pier behind loses λ W h / L of its axle; moments about its toe, of stone, soil, axle."""
+    span, blocks = 5.0, []
+    for k in (0, 1):
+        for block in pier_under_soil().blocks:
+            points = tuple((float(x) + k * span, float(y)) for x, y in block.points)
+            given = {"fixed": block.fixed, "part": block.part, "role": block.role}
+            blocks.append(af.Block(points, block.material, f"{block.name} {k}", **given))
+    piers = af.masonry.assembled(blocks, af.masonry.STONE_TO_STONE)
+    axles = 20e3, 30e3
+    truck = replace(TRUCK, x=2.5, axles=axles, spacings=[span], width=None)
+    given = {"live": af.BodyForce(1.0), "friction": None}
+    loaded, fill = carrying(piers, [truck]), replace(NO_PRESSURE, lever=lever)
+    found = af.collapse_factor(loaded, fill=fill, **given).factor
+    weights = np.array([20e3 * 2.0, 18e3 * 0.5, axles[0]])
+    heights = np.array([1.0, 2.0 + 0.25 * lever, 2.0 + 0.5 * lever])
+    exact = weights.sum() * 0.5 / (weights @ heights + sum(axles) * 1.3 / span * 0.5)
+    assert found == pytest.approx(exact, rel=1e-6)
+    assert "has lifted" not in caplog.text
+    source = "moments about the toe, with the load that leaves its axle"
+    verified("vehicle on two piers, the one behind pushed over", exact, source, found)
+    # of a light one λ W h / L is all its load at 0.125 g
+    light = replace(truck, axles=(5e3, 45e3), centre_of_gravity=4.0)
+    assert af.collapse_factor(carrying(piers, [light]), fill=fill, **given).factor > 0.2
+    assert "an axle has lifted, at 0.125 g" in caplog.text
+    with pytest.raises(af.errors.InvalidInput, match="takes no axles on an elastic fill"):
+        af.kinematic_assessment(loaded, af.motion.Ntc2018(ag=0.25, f0=2.4, tc_star=0.32, site="B"))
+
+
 @pytest.mark.parametrize("offset", [0.0, 0.1])
 @pytest.mark.parametrize("lever", [0.0, 1.0])
 def test_a_body_on_the_fill_of_a_pier_is_pushed_at_its_centre_of_gravity(lever, offset, verified):
@@ -94,6 +151,10 @@ def test_a_body_stands_on_all_that_is_level_below_it_and_on_other_bodies():
         ({"length": 1.5}, "not level"),
         ({"weight": 1e12}, "give newtons"),
         ({"length": 0.0}, "length"),
+        ({"axles": [1e4]}, "either its weight, or axles"),
+        ({"weight": None}, "either its weight, or axles"),
+        ({"weight": None, "axles": [1e4, 1e4]}, "2 axles and 0 spacings"),
+        ({"weight": None, "axles": [1e4, 1e4], "spacings": [1.2]}, "wheels overlap by 0.3 m"),
     ],
 )
 def test_a_body_that_cannot_stand_is_refused(changes, words):
