@@ -4,7 +4,7 @@ Limit analysis of the weight is repeated with one property relaxed at a time. Th
 lets the structure stand is the cause, and the least change of it the remedy.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -55,7 +55,7 @@ def explain_instability(structure: Structure) -> str | None:
     if _stands(dead, friction=unlimited):
         least = _least_value(dead, "friction", float(dead.blocks.structure.friction.min()), 10.0)
         text = f"joints slide ({sliding}): it stands from a coefficient of friction of {least:.2g}"
-        if end := _name_free_end(rigid, falling):
+        if end := name_free_end(rigid, falling):
             return f"{text}; {end}"
         return text + ", and no thickness helps" * (not _stands(dead, depth=unlimited))
     if _stands(dead, depth=unlimited):
@@ -109,7 +109,7 @@ def describe_friction(structure: Structure) -> str:
     return f"it stands from a coefficient of friction of {least:.2g}{less}"
 
 
-def _name_free_end(structure: Structure, falling: Sequence[int]) -> str:
+def name_free_end(structure: Structure, falling: Collection[int]) -> str:
     """Return where pieces of a fill fall out of an end of it that nothing holds; "" for nowhere."""
     points = {k: block.points for k, block in enumerate(structure.blocks) if block.grain}
     if not points:

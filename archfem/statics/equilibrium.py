@@ -29,7 +29,7 @@ from archfem.joints.contact_law import LARGEST_CLOSING, ContactLaw
 from archfem.joints.criteria import assessed_joints
 from archfem.joints.resultants import joint_dataset, select_joint
 from archfem.limit.collapse import stands
-from archfem.limit.instability import explain_instability
+from archfem.limit.instability import explain_instability, name_free_end
 from archfem.limit.linear_programme import NoEquilibrium
 from archfem.masonry.backfill import jointed_fill
 from archfem.masonry.block import Block, as_point, say_place
@@ -49,9 +49,11 @@ from archfem.models.linear_blocks import LinearBlockModel
 from archfem.models.model import Doubt, Model, check_model
 from archfem.statics.newton import EquilibriumSolver, Newton
 from archfem.statics.relaxation import (
+    MovesOn,
     Search,
     SearchSequence,
     linear_predictor,
+    relax,
     solve_irreversible,
     solve_local,
     solve_or_relax,
@@ -276,8 +278,8 @@ def _describe_failure(model: Model, error: DidNotConverge, newton: Newton | None
         return str(error)
     if cause is not None:
         return f"'{model.structure.name}' does not stand under its own weight: {cause}"
-    if model.structure.cohesion.any() and (cause := _explain_without_cohesion(model.structure)):
-        return f"{cause}; {error}"
+    if pieces := _describe_moving_pieces(model, newton):
+        return f"as rigid blocks it stands, but not with joints that open: {pieces}; {error}"
     soft = "joints are" if model.fidelity == "rigid" else "joints and blocks are"
     text = f"as rigid blocks it stands, but its {soft} too soft for its depth"
     part = _find_carried_part(model, newton)
@@ -290,18 +292,26 @@ def _describe_failure(model: Model, error: DidNotConverge, newton: Newton | None
     return f"{text}: {stiff}; {error}"
 
 
-def _explain_without_cohesion(structure: Structure) -> str:
-    """Return what falls where cohesion is lost with contact, and the remedy; "" for nothing."""
-    most = max(structure.joints, key=lambda joint: joint.contact.cohesion).contact
-    joints = [
-        replace(joint, contact=replace(joint.contact, cohesion=0.0)) for joint in structure.joints
-    ]
-    if (cause := explain_instability(replace(structure, joints=tuple(joints)))) is None:
+def _describe_moving_pieces(model: Model, newton: Newton | None) -> str:
+    """Return which pieces of a fill move on, and what would hold them; "" where none do."""
+    structure = model.structure
+    if not any(block.grain for block in structure.blocks):
         return ""
-    return (
-        f"as rigid blocks it stands by its cohesion alone, {most.cohesion / kPa:.3g} kPa of "
-        f"'{most.name}', of which joints lose the part that opens; without it {cause}"
-    )
+    try:
+        relax(_create_solver(model, newton), model, self_weight(model), np.zeros(model.size))
+    except MovesOn as moves_on:
+        observer = model.observer()
+        before, after = (observer.faces(observer.read(q)) for q in moves_on.steps)
+        motion = [new - old for new, old in zip(after, before, strict=True)]
+        speed = abs(motion[0]) + 0.5 * abs(motion[1]) * structure.depths + abs(motion[2])
+        # those of joints beside a wedge that moves as one
+        fast = np.flatnonzero(speed > 0.3 * speed.max())
+        names = join_joint_names([structure.joints[k].name for k in fast])
+        end = name_free_end(structure, {*structure.pairs[fast].ravel().tolist()})
+        return (
+            f"pieces of the fill move on ({names}): {end or 'more of its cohesion may hold them'}"
+        )
+    return ""
 
 
 def _find_carried_part(model: Model, newton: Newton | None, rounds: int = 20) -> float | None:

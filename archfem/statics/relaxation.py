@@ -86,34 +86,43 @@ class TrescaJoints(JointOperator):
         return np.concatenate([across, along, *([np.zeros_like(across)] if self.slides else [])])
 
 
+class MovesOn(DidNotConverge):
+    """Structure that moves on in steps of creep: coordinates before and after the last one."""
+
+    steps: tuple[Array, Array]
+
+
 def relax(
     solver: EquilibriumSolver, model: Model, load: Array, start: Array
 ) -> tuple[Model, Solution]:
     """Find an equilibrium by steps of creep against a fading drag."""
     drag, max_drag, max_steps = 1.0, 256.0, 100  # drag relative to the closed stiffness [-]
-    easy_iterations, drag_factor, patience = 8, 4.0, 12
+    easy_iterations, drag_factor, patience = 8, 4.0, 24
     iterations, residuals = 0, [np.inf]
-    q, closed, scale = start, model.closed_tangent(), load_magnitude(load)
+    q, before, closed, scale = start, start, model.closed_tangent(), load_magnitude(load)
     while drag <= max_drag and len(residuals) <= max_steps:
         try:
             step = _solve_creep_step(solver, model, load, q, drag * closed)
         except DidNotConverge:
             drag *= drag_factor
             continue
-        q, iterations = step.q, iterations + step.iterations
+        before, q, iterations = q, step.q, iterations + step.iterations
         model = model.with_memory(model.updated_memory(q))
         residual = float(np.linalg.norm(model.force(q) - load))
         if residual <= _relaxation_tolerance(solver, model, q, scale):
             return model, Solution(q, iterations, residual)
         residuals.append(residual)
-        # a residual that does not halve in a dozen steps belongs to a structure that flows
+        # a residual that does not halve in two dozen steps belongs to a structure that flows: that
+        # of wheels on pieces of fill may rest for a dozen
         if len(residuals) > patience and residual > 0.5 * residuals[-patience]:
             break
         drag /= drag_factor if step.iterations <= easy_iterations else 1.0
-    raise DidNotConverge(
+    moves_on = MovesOn(
         f"it does not come to rest in {len(residuals) - 1} steps of creep: {residuals[-1]:.2e} of "
         f"{scale:.2e} stays out of balance"
     )
+    moves_on.steps = before, q
+    raise moves_on
 
 
 def _solve_creep_step(

@@ -33,6 +33,19 @@ def test_every_deciding_value_that_is_left_out_is_named():
     ]
 
 
+def test_a_default_of_many_contacts_is_named_once():
+    """Pieces of a fill have a contact with stone for each depth of soil."""
+    structure = {
+        "shape": "bridge",
+        "arches": {"arch": {"span": 2.0, "rise": 0.5, "thickness": 0.3, "voussoirs": 5}},
+        "sidewalls": {"length": 1.5, "height": 1.0, "left wall": {}, "right wall": {}},
+        "backfill": {"cover": 0.4},
+        "fill": {"law": "jointed", "piece_size": 0.45, "friction_angle": "20 degree"},
+    }
+    text = describe_defaults(af.Case.of({"structure": structure}))
+    assert "'soil to stone' μ 0.6;" in text
+
+
 def test_values_that_are_given_are_not():
     contact = {"normal_stiffness": 1.48e9, "friction": 0.6}  # also where they equal the default
     given = {

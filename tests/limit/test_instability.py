@@ -188,6 +188,33 @@ def test_fill_that_falls_out_of_a_free_end_is_held_by_higher_walls(above, named)
     assert "thickness" not in text
 
 
+@pytest.mark.parametrize("above", [(0.1, 1.3), (1.3, 0.1), (1.3, 1.3)])
+def test_fill_that_opens_and_falls_out_of_a_free_end_is_named_by_the_dead_load(above):
+    """Rigid, it stands by cohesion that joints lose as they open; higher walls let it rest."""
+    walls = [
+        af.shapes.Sidewall(length=1.5, height=1.0, above=high, state="fixed", name=name)
+        for high, name in zip(above, ("left wall", "right wall"), strict=True)
+    ]
+    arch = af.shapes.Arch(span=4.0, rise=1.2, thickness=0.35, voussoirs=9)
+    fill = af.shapes.Backfill(cover=0.6)
+    bridge = af.bridge(arches=[arch], sidewalls=walls, backfill=fill)
+    cut = af.masonry.jointed_fill(bridge, 0.5, friction_angle=30.0, cohesion=3e3)
+    assert af.stands(cut)
+    model = af.build(cut, fidelity="rigid")
+    if min(above) > 1.0:
+        assert af.dead_load(model).steps == 1
+        return
+    with pytest.raises(af.DidNotConverge) as caught:
+        af.dead_load(model)
+    end = 0.0 if above[0] < 1.0 else max(block.points[:, 0].max() for block in cut.blocks)
+    assert re.search(
+        r"^as rigid blocks it stands, but not with joints that open: pieces of the fill move on "
+        rf"\(backfill \d+ .*\): pieces of the fill fall out of its free end at x = {end:.2f} m, "
+        r"which more cohesion would hold, or a wall as high as the fill \(`above`",
+        str(caught.value),
+    )
+
+
 def test_where_a_search_for_equilibrium_stalls_the_least_residual_decides(monkeypatch):
     """A block on a slope of 1 in 4 stands from a coefficient of friction of 0.25."""
     square = [[0.0, 0.0], [1.0, 0.0], [1.0, 0.5], [0.0, 0.5]]

@@ -68,6 +68,32 @@ def test_a_vehicle_presses_with_its_axles_and_tips_over_the_last_one_at_its_cent
         assert found.factor == pytest.approx(sense * (tip - middle) / 1.3)
 
 
+def test_a_vehicle_on_pieces_of_fill_comes_to_rest_on_all_its_wheels():
+    """Two spans; the joints below its wheels bear its weight, below its centre of gravity."""
+    arches = [
+        af.shapes.Arch(span=5.0, rise=1.4, thickness=0.45, voussoirs=17, name=name)
+        for name in ("west", "east")
+    ]
+    walls = [
+        af.shapes.Sidewall(length=1.5, height=1.0, above=0.9, state="fixed", name=name)
+        for name in ("left wall", "right wall")
+    ]
+    parts = {"piers": [af.shapes.Pier(breadth=1.1, height=2.0)], "sidewalls": walls, "width": 4.0}
+    bridge = af.bridge(arches=arches, backfill=af.shapes.Backfill(cover=0.5), **parts)
+    cut = af.masonry.jointed_fill(bridge, 0.6, friction_angle=35.0, cohesion=5e3)
+    axles, spacings = np.array([93.2e3, 93.2e3, 68.7e3]), [1.35, 3.6]
+    lorry = replace(TRUCK, x=4.0, length=0.3, axles=axles.tolist(), spacings=spacings, width=2.1)
+    loaded = carrying(cut, [lorry])
+    found = af.dead_load(af.build(loaded, fidelity="rigid", displacements="large")).joints
+    own = [k for k, joint in enumerate(loaded.joints) if joint.part == "truck"]
+    force, arm = found["N"].values[own], found["M"].values[own]
+    places = np.array([loaded.joints[k].middle[0] for k in own])
+    assert force.sum() == pytest.approx(4.0 / 2.1 * axles.sum(), rel=1e-3)
+    middle = np.average(4.0 + np.array([-2.475, -1.125, 2.475]), weights=axles)
+    assert (force @ places - arm.sum()) / force.sum() == pytest.approx(middle, abs=0.03)
+    assert all(force[abs(places - x) < 0.2].sum() > 0.0 for x in (1.525, 2.875, 6.475))
+
+
 @pytest.mark.parametrize("lever", [0.0, 1.0])
 def test_a_vehicle_on_two_piers_leans_on_the_one_in_front(lever, verified, caplog):
     """The pier behind loses λ W h / L of its axle; moments about its toe, of stone, soil, axle."""

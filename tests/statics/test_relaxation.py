@@ -55,7 +55,7 @@ def test_where_nothing_slides_creep_ends_where_newton_does(stack):
 def test_a_block_that_flows_down_a_plane_is_given_up_soon():
     """On 0.3 rad with μ = 0.2: W (sin φ - μ cos φ) = 1.04 kN drives it on, whatever the step.
 
-    Twelve steps after the first, which took up what friction can hold, nothing is nearer to rest.
+    Two dozen steps after the first, which took up what friction holds, nothing is nearer to rest.
     """
     turn = np.array([[np.cos(0.3), np.sin(0.3)], [-np.sin(0.3), np.cos(0.3)]])
 
@@ -66,7 +66,7 @@ def test_a_block_that_flows_down_a_plane_is_given_up_soon():
     plane, block = box(-0.2, 0.0, name="plane", fixed=True), box(0.0, 0.5, name="block")
     bed = af.Joint((0, 1), *block.outline[:2], af.Contact(1e10, 4e9, 0.2), "bed", role="pier")
     model = af.build(af.Structure((plane, block), (bed,)), fidelity="rigid")
-    with pytest.raises(af.DidNotConverge, match=r"in 13 steps of creep: 1\.08e\+03 of 1\.00e\+04"):
+    with pytest.raises(af.DidNotConverge, match=r"in 25 steps of creep: 1\.08e\+03 of 1\.00e\+04"):
         relax(EquilibriumSolver(model.size), model, self_weight(model), np.zeros(model.size))
 
 
@@ -247,9 +247,9 @@ def test_drag_falls_after_easy_steps_and_grows_after_failed_ones(drags):
     assert drag_history == [1.0, 4.0, 16.0, 64.0, 256.0]
 
 
-@pytest.mark.parametrize(("part", "steps"), [(0.058, 12), (0.064, 100)])
-def test_creep_continues_while_the_residual_halves_in_twelve_steps(drags, part, steps):
-    """0.942¹¹ is 0.52, 0.936¹¹ is 0.48; a hundred steps are made at most."""
+@pytest.mark.parametrize(("part", "steps"), [(0.029, 24), (0.032, 100)])
+def test_creep_continues_while_the_residual_halves_in_two_dozen_steps(drags, part, steps):
+    """0.971²³ is 0.51, 0.968²³ is 0.47; a hundred steps are made at most."""
     drag_history, iterations = drags
     iterations += [9]
     with pytest.raises(af.DidNotConverge, match=f"in {steps} steps of creep") as caught:
