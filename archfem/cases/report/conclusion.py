@@ -37,7 +37,7 @@ from archfem.dynamics.collapse_state import (
     CollapseState,
 )
 from archfem.dynamics.history import History
-from archfem.dynamics.rocking_body import describe_first_fall
+from archfem.dynamics.rigid_body.rocking_body import describe_first_fall
 from archfem.dynamics.verdict_range import HALF_STEP, UNVARIED, VerdictRange
 from archfem.masonry.structure import Structure, join_names, join_words
 from archfem.models.model import Doubt, Ends

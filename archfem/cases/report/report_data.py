@@ -17,7 +17,7 @@ from archfem.cases.case import Case
 from archfem.cases.run import CASE_FILE, MOTION_VARIABLE, RATING_FILE
 from archfem.cases.toml_file import Table, parse_tables
 from archfem.dynamics.history import History
-from archfem.dynamics.rocking_body import FirstFall, find_first_fall
+from archfem.dynamics.rigid_body.rocking_body import FirstFall, find_first_fall
 from archfem.dynamics.verdict_range import VerdictRange
 from archfem.errors import ArchfemError
 from archfem.masonry.shapes.rings import columns_across
