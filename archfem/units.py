@@ -23,7 +23,7 @@ G = 9.81
 STANDARD_GRAVITY = 9.80665
 
 
-# SI unit and factor of common units
+# SI unit and factor of common units, read without the registry of units, which loads for a second
 COMMON_UNITS = {
     "m": ("m", 1.0),
     "mm": ("m", 1e-3),
@@ -35,7 +35,7 @@ COMMON_UNITS = {
     "GPa": ("Pa", 1e9),
     "MPa/mm": ("Pa/m", 1e9),
     "GPa/m": ("Pa/m", 1e9),
-    "degree": ("degree", 1.0),
+    **dict.fromkeys(("degree", "degrees", "deg", "°"), ("degree", 1.0)),
 }
 
 
@@ -69,7 +69,7 @@ def in_unit(value: Any, unit: str, key: str) -> float:
         1480000000.0
     """
     plain_pattern = re.compile(
-        r"([-+]?\d{1,20}(?:\.\d{0,20})?)\s*([a-zA-Z]+(?:/[a-z]+(?:\*\*[23])?)?)"
+        r"([-+]?\d{1,20}(?:\.\d{0,20})?)\s*([a-zA-Z°]+(?:/[a-z]+(?:\*\*[23])?)?)"
     )
     if isinstance(value, str):
         plain = plain_pattern.fullmatch(value.strip())
@@ -101,10 +101,6 @@ def in_degrees(value: Any, key: str) -> float:
     Raises:
         InvalidInput: it is no angle, text without a unit, or a bare number up to 2π.
     """
-    # degrees and common units are read without the registry of units, which takes a second to load
-    degrees_pattern = re.compile(r"(\d+(?:\.\d*)?)\s*(?:deg|degrees?|°)")
-    if isinstance(value, str) and (plain := degrees_pattern.fullmatch(value.strip())):
-        return float(plain[1])
     if isinstance(value, str) and not re.search(r"[^\W\d_]|[°'\"]", value):
         raise InvalidInput(f'{key} = {value!r} has no unit: write a number, or "{value} degree"')
     number = in_unit(value, "degree", key)
@@ -126,7 +122,7 @@ def in_si_unit(values: Sequence[Any]) -> tuple[list[Any], str]:
     texts = [value for value in values if isinstance(value, str)]
     if not texts or not all(re.match(r"\s*[-+]?\.?\d", text) for text in texts):
         return list(values), ""
-    # a common unit is found without the registry of units, which takes a second to load
+    # a common unit needs no registry
     common = COMMON_UNITS.get(texts[0].strip().lstrip("-+.0123456789 "), ("m", 1.0))[0]
     for unit in (common, *units):
         with suppress(InvalidInput):

@@ -84,9 +84,8 @@ def hash_inputs(settings: Table, folder: Path = Path()) -> str:
     # Names without folders: a case that is moved with its files stays the same.
     # Keys are sorted, but the order of arches and piers is their order in the bridge.
     order = _tables_within(settings.get("structure"))
-    counted = {key: value for key, value in settings.items() if key != "report"}
-    given = [describe_version(), _in_si_units(counted), files, order]
-    text = json.dumps(given, sort_keys=True, default=str)
+    counted = _in_si({key: value for key, value in settings.items() if key != "report"})
+    text = json.dumps([describe_version(), counted, files, order], sort_keys=True, default=str)
     return hashlib.sha256(text.encode()).hexdigest()
 
 
@@ -104,16 +103,15 @@ def hash_sections(
     files = [(str(path), hash_file(path)) for path in list_input_files(named, folder)]
     files += _package_versions(named)
     # keys are not sorted: the order of arches and piers is that in the bridge
-    given = [_in_si_units(tables), files]
-    return hashlib.sha256(json.dumps(given, default=str).encode()).hexdigest()
+    return hashlib.sha256(json.dumps([_in_si(tables), files], default=str).encode()).hexdigest()
 
 
-def _in_si_units(value: Any) -> Any:
+def _in_si(value: Any) -> Any:
     """Return values of a case as numbers in SI units, in which equal quantities are equal."""
     if isinstance(value, Mapping):
-        return {key: _in_si_units(own) for key, own in value.items()}
+        return {key: _in_si(own) for key, own in value.items()}
     if isinstance(value, list | tuple):
-        return [_in_si_units(own) for own in value]
+        return [_in_si(own) for own in value]
     if isinstance(value, str):
         return _read_quantity(value)
     return float(value) if type(value) is int else value

@@ -395,14 +395,12 @@ class _PresetNames:
         sections: dict[str, Any] = {}
         for (section, name), item in self.objects.items():
             if PRESETS[section].get(name) != item:
-                table = _list_fields(item)
-                del table["name"]
+                table = {key: x for key, x in _list_fields(item).items() if key != "name"}
                 if isinstance(item, Material) and item.strength == STONE.strength:
                     # a changed copy of the preset, whose own values remain defaults
                     table = {key: x for key, x in table.items() if x != getattr(STONE, key)}
                     table |= {"preset": STONE.name} if name != STONE.name else {}
-                if item.name != name:
-                    table["name"] = item.name
+                table |= {"name": item.name} if item.name != name else {}
                 sections.setdefault(section, {})[name] = table
         return sections
 

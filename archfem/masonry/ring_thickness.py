@@ -113,8 +113,7 @@ def find_ring(structure: Structure, part: str | None = None) -> Ring:
             )
     if len(stones) < 3:
         raise InvalidInput(
-            f"ring '{part}' is drawn in {len(stones)} of the three stones or more between four "
-            "joints at which it could hinge: draw the outline of each voussoir"
+            f"ring '{part}' in {len(stones)} pieces cannot hinge: draw each voussoir"
         )
     return Ring(structure, *_follow_ring(structure, stones, touching))
 
@@ -158,7 +157,7 @@ def _scale_stone(
     # faces of a stone deeper than its neighbours end beyond the joints
     spans = [block.face_span(joint.ends, near) for joint in joints]
     faces = [j.intrados + np.outer(s, j.tangent) for j, s in zip(joints, spans, strict=True)]
-    corners = [[_nearest(points, end) for end in ends] for ends in faces]
+    corners = [[int(np.linalg.norm(points - x, axis=1).argmin()) for x in face] for face in faces]
     (first_in, first_out), (last_in, last_out) = corners
     if len({*corners[0], *corners[1]}) < 4:
         raise InvalidInput(
@@ -181,11 +180,6 @@ def _scale_stone(
         new[between] = middle + factor * (points[between] - middle)
     scaled = replace(block, outline=tuple(map(as_point, new)))
     return scaled, (new[corners[0]], new[corners[1]])
-
-
-def _nearest(points: Array, place: Array) -> int:
-    """Return the number of the point nearest to a place."""
-    return int(np.linalg.norm(points - place, axis=1).argmin())
 
 
 def _walk(count: int, start: int, end: int, forbidden: set[int]) -> Numbers:

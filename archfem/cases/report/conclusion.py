@@ -179,8 +179,7 @@ def _say_checks(data: ReportData) -> Iterator[str]:
             by = f"{check.moved:.3g} by displacements"
         kind = "check" if check.linear else "displacement check"
         yield f"the {kind} of {check.name} {met} ({by})"
-    for least, text in sorted(_describe_across(data))[:1]:
-        yield from [f"it first falls at {text}"] * (least <= 1.0)
+    yield from (f"it first falls at {text}" for x, text in sorted(_say_across(data))[:1] if x <= 1)
 
 
 def _describe_peaks(runs: Iterable[History]) -> str:
@@ -252,14 +251,14 @@ def _build_transverse(data: ReportData) -> list[TextBlock]:
     if not data.runs and not data.statements.keys() - {"rating", "thickness"}:
         return []
     text, (push, _) = data.case.structure.transverse_remark, data.case.structure.transverse_push
-    peaks = [*map(peak_of_ground, data.runs.values()), site_acceleration(data.case)]
-    demand, manner = max((peak for peak in peaks if np.isfinite(peak)), default=0.0), "plain"
-    if push < demand:
-        text += f"; the demand of {demand:.3g} g is {demand / push:.2g} times that"
-        manner = "doubt"
+    peaks = [0.0, *map(peak_of_ground, data.runs.values()), site_acceleration(data.case)]
+    demand = float(np.nanmax(peaks))
+    text += f"; the demand of {demand:.3g} g is {demand / push:.2g} times that" * (push < demand)
     if data.falls_across:
         text = text.removeprefix("nothing is checked across the plane of the drawing: ")
-    return [TextBlock(sentence(text), manner, lead="Across its plane?")]
+    return [
+        TextBlock(sentence(text), "doubt" if push < demand else "plain", "", "Across its plane?")
+    ]
 
 
 def _list_outdated(data: ReportData) -> Iterator[str]:
@@ -358,7 +357,7 @@ def _describe_margin(data: ReportData) -> Iterator[str]:
     """Yield the least factor on the demand of an earthquake, maybe as a range, and the others."""
     checks = read_numbers(Ratios, data.statements.get("assessment"))
     margins = [*sorted(_describe_check(data, each) for each in checks)[:1], *describe_scales(data)]
-    margins += [(least, [f"below {text}"]) for least, text in sorted(_describe_across(data))[:1]]
+    margins += [(least, [f"below {text}"]) for least, text in sorted(_say_across(data))[:1]]
     for k, (_, (first, *others)) in enumerate(sorted(margins)):
         rank = ("the least margin is", "the next is", "then follows")[min(k, 2)]
         yield from [f"{rank} {first}", *others]
@@ -370,7 +369,7 @@ def _describe_margin(data: ReportData) -> Iterator[str]:
                 yield f"{row.result}, {_say_uncompared(data)}: {row.outcome}"
 
 
-def _describe_across(data: ReportData) -> Iterator[tuple[float, str]]:
+def _say_across(data: ReportData) -> Iterator[tuple[float, str]]:
     """Yield the scale at which each body across the plane first falls, if any, and in words."""
     for key, (first, name) in data.falls_across.items():
         if first.scale < np.inf:

@@ -68,9 +68,8 @@ class ReportData:
 
         Each is one rigid body, held by nothing else.
         """
-        structure = self.case.structure
+        structure, found = self.case.structure, dict[str, tuple[FirstFall, str]]()
         columns = columns_across(structure) if self.runs and structure.heads.any() else {}
-        found = dict[str, tuple[FirstFall, str]]()
         for key, column in columns.items():
             for name, motion in self.motions.items():
                 first = find_first_fall(column, motion, SCALES_ACROSS)
