@@ -256,9 +256,8 @@ def _build_transverse(data: ReportData) -> list[TextBlock]:
     text += f"; the demand of {demand:.3g} g is {demand / push:.2g} times that" * (push < demand)
     if data.falls_across:
         text = text.removeprefix("nothing is checked across the plane of the drawing: ")
-    return [
-        TextBlock(sentence(text), "doubt" if push < demand else "plain", "", "Across its plane?")
-    ]
+    manner = "doubt" if push < demand else "plain"
+    return [TextBlock(sentence(text), manner, lead="Across its plane?")]
 
 
 def _list_outdated(data: ReportData) -> Iterator[str]:
