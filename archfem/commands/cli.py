@@ -199,7 +199,7 @@ def _add_case_commands(commands: Any) -> None:
     of_margin = partial(add, required=False, module="margin")
     add_to = of_margin("verdict", about, "folder that keeps all runs (none)")
     add_to("--workers", type=int, default=1, help="processes for the runs (1)")
-    about = "runs beside those of one changed property each (236)"
+    about = "sampled runs; up to 14 more change one property each, or none (236)"
     add_to("--samples", type=int, default=236, help=about)
     add_to("--pair", metavar="NAME", help="one motion of a [suite] alone (each in turn)")
     about = "at which factor on its motion does it fall, or form a mechanism?"

@@ -38,7 +38,8 @@ from archfem.dynamics.schemes import StiffnessDamping, Viscous
 from archfem.dynamics.separation import is_overturning, is_resting, swings_little
 from archfem.dynamics.state import State
 from archfem.errors import DidNotConverge, logger
-from archfem.masonry.stiffness_ratio import find_yielding_blocks, mark_stone_joints
+from archfem.masonry.block import rotate
+from archfem.masonry.stiffness_ratio import find_yielding_blocks, list_stones, mark_stone_joints
 from archfem.masonry.structure import Structure, join_names
 from archfem.models.model import Doubt, Model
 from archfem.motion.motion import Motion
@@ -286,6 +287,22 @@ def _doubt_joints(structure: Structure, motion: Motion, start: float) -> Iterato
             )
 
 
+def _list_slid_off(structure: Structure, poses: Array) -> list[str]:
+    """List the stones whose foot was beyond the ends of all fixed blocks when they were lost."""
+    blocks, stones, places = structure.blocks, list_stones(structure), structure.centroids
+    ground = np.concatenate([block.points[:, 0] for block in blocks if block.fixed])
+    lost, names = np.array([*map(mark_lost(structure), poses)]), []
+    for joint in structure.joints:
+        a, b = sorted(joint.blocks, key=lambda k: blocks[k].fixed)
+        if not blocks[b].fixed or a not in stones or not (gone := lost[:, stones.index(a)]).any():
+            continue
+        pose = poses[gone.argmax(), a]
+        foot = places[a] + pose[:2] + rotate(joint.middle - places[a], pose[2])
+        if not ground.min() < foot[0] < ground.max():
+            names.append(blocks[a].name)
+    return names
+
+
 def with_sliding_joints(structure: Structure) -> Structure:
     """Return the structure with friction, and no cohesion, in joints that never slide."""
     joints = list(structure.joints)
@@ -302,6 +319,9 @@ def _doubt_fall(structure: Structure, dataset: xr.Dataset) -> Iterator[Doubt]:
     Loose blocks may keep more at impacts, and slide otherwise, than the joints of the model.
     """
     yield from doubt_soft_blocks(structure)
+    if off := _list_slid_off(structure, dataset["fall_pose"].values):
+        words = "{} slid beyond the end of the drawn ground, and fell there"
+        yield Doubt(words, "draw the ground farther: it may not fall then", (join_names(off),))
     share, early = (dataset.attrs[f"fall_{key}"] for key in ("unsettled", "unsettled_early"))
     unsettled = "impulses of loose blocks did not settle in"
     if early > MAX_UNSETTLED:

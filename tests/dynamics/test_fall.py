@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from loose_blocks import G
+from portals import box
 
 import archfem as af
 from archfem.dynamics import RigidBlockSimulation, State, fall, release_blocks
@@ -201,6 +202,27 @@ def test_a_fall_that_is_interrupted_keeps_what_was_computed(
         assert 0.67 + followed - 0.021 < last <= 0.67 + followed
 
 
+@pytest.mark.parametrize(
+    ("end", "friction", "outcome", "doubted"),
+    [(1.0, 0.15, "fallen", True), (10.0, 0.15, "dislocated", False), (0.6, 0.9, "fallen", False)],
+)
+def test_stones_that_slide_off_the_drawn_ground_are_a_doubt(end, friction, outcome, doubted):
+    """After 1 s of 3 m/s² of 1.53 m/s, they stop after v² (1 / 1.53 + 1 / 1.47) / 2 = 1.56 m."""
+    dry = af.Contact(1e9, 4e8, friction=friction)
+    blocks = [
+        box(-1.0, -2.0, end, 0.0, "rock", fixed=True, part="rock", role="other"),
+        *(box(0.0, y, 0.6, y + 0.6, f"{y}", part="pier", role="pier") for y in (0.0, 0.6)),
+    ]
+    push = np.concatenate([np.full(100, -3.0 if friction < 0.5 else -8.0), np.zeros(10)])
+    analysis = af.Analysis(af.masonry.assembled(blocks, dry), fidelity="rigid")
+    run = replace(analysis, displacements="large").run(af.Motion(push, 0.01).with_rest(4.0))
+    assert run.verdict.outcome == outcome
+    said = [each.cause for each in run.doubts if "drawn ground" in each.cause]
+    assert said == ["0.0 slid beyond the end of the drawn ground, and fell there"] * doubted
+    if outcome == "dislocated":
+        assert run.verdict.residual == pytest.approx(1.56, rel=0.01)
+
+
 def test_motions_and_falls_show_their_progress(monkeypatch, tmp_path):
     """Every line has the name of the motion, which distinguishes those of a suite."""
     monkeypatch.setattr("archfem._display.MOTION_INTERVAL", 0.0)
@@ -267,7 +289,8 @@ def test_friction_that_loose_stones_are_given_is_doubted(contact, words):
 def test_impulses_that_did_not_settle_doubt_the_fall_or_the_heap(share, early, doubted):
     attrs = BALANCED | {"fall_unsettled": share, "fall_unsettled_early": early}
     column = af.column(breadth=0.5, heights=[0.5], contact=af.Contact(1e9, 4e8, 0.6))
-    doubts = [doubt.cause for doubt in fall._doubt_fall(column, xr.Dataset(attrs=attrs))]
+    poses = {"fall_pose": (("fall_frame", "block", "pose"), np.zeros((1, 2, 3)))}
+    doubts = [doubt.cause for doubt in fall._doubt_fall(column, xr.Dataset(poses, attrs=attrs))]
     assert len(doubts) == (doubted is not None)
     assert all(re.search(doubted, doubt) for doubt in doubts)
 
