@@ -276,7 +276,7 @@ def _describe_inputs(
     doubts += [doubt for each in structures for doubt in fill_doubts(each)]
     doubts += doubt_soft_blocks(*structures)
     return {
-        "hazard": json.dumps(_write_hazard(hazard)),
+        "hazard": json.dumps(asdict(hazard), default=np.ndarray.tolist),
         "inputs": json.dumps([*(each.fingerprint for _, each, _ in tree.values()), *options]),
         "doubts": write_doubts(doubts),
     }
@@ -404,12 +404,6 @@ def _store_row(table: xr.Dataset, number: int, row: Mapping[str, Any]) -> None:
         if name in row["found"]:
             table[name].values[number] = row["found"][name]
     table["error"].values[number] = str(row["error"])
-
-
-def _write_hazard(hazard: Hazard) -> dict[str, Any]:
-    """Return a hazard curve as values of JSON."""
-    values = asdict(hazard)
-    return values | {name: values[name].tolist() for name in ("intensity", "rate")}
 
 
 @validate_methods

@@ -307,21 +307,13 @@ def draw_samples(
     # that of samples added later has a seed of its own, and leaves those before as they are
     own = int(np.random.SeedSequence([seed, begin]).generate_state(1)[0]) if begin else seed
     random = np.random.default_rng(own)
-    labels = _draw_labels(weights, size, random)
-    return sample_changes(ranges, size, own), labels, _deal_records(records, size, random)
-
-
-def _draw_labels(weights: Mapping[str, float], count: int, random: np.random.Generator) -> Any:
-    """Return alternatives in proportion to their weights, in random order (count,)."""
-    shares = (random.permutation(count) + random.random(count)) / count
+    # alternatives in proportion to their weights, in random order (size,)
+    shares = (random.permutation(size) + random.random(size)) / size
     places = np.searchsorted(np.cumsum([*weights.values()])[:-1], shares, side="right")
-    return np.array([*weights])[places]
-
-
-def _deal_records(records: int, count: int, random: np.random.Generator) -> Any:
-    """Return the record of each sample, all of them in random order before any again (count,)."""
-    rounds = -(-count // records)
-    return np.concatenate([random.permutation(records) for _ in range(rounds)])[:count]
+    # all records in random order before any again (size,)
+    dealt = [random.permutation(records) for _ in range(-(-size // records))]
+    labels = np.array([*weights])[places]
+    return sample_changes(ranges, size, own), labels, np.concatenate(dealt)[:size]
 
 
 def _resolve_labels(

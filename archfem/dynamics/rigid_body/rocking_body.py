@@ -31,7 +31,7 @@ from archfem.dynamics.collapse_state import (
 from archfem.dynamics.rigid_body.bodies import masses_of
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import Structure
-from archfem.models.model import Doubt
+from archfem.models.model import Doubt, Ends
 from archfem.motion.motion import Motion
 
 # Step of the integration, and time after a motion in which a body falls or comes to rest [s]: the
@@ -189,8 +189,7 @@ def describe_first_fall(first: FirstFall | None) -> str:
         return ""
     falls = f"first falls at {first.scale:#.3g} ×" if first.scale < inf else "falls at none"
     if first.again:
-        ends = " to ".join(dict.fromkeys(f"{scale:#.3g}" for scale in first.again))
-        falls += f", and stands again at {ends} ×"
+        falls += f", and stands again at {Ends(first.again):#.3g} ×"
     return f"; as one rigid body it {falls}"
 
 
