@@ -2,6 +2,7 @@
 
 import argparse
 import json
+from contextlib import suppress
 from dataclasses import asdict
 from functools import wraps
 from pathlib import Path
@@ -131,12 +132,10 @@ def _read_kept(case: Case, options: argparse.Namespace, name: str) -> str | None
         return None
     group = intact_file_list(Path(options.out)).get(name_group("scale", options.pair))
     place = (Path(options.pair or "") / name).as_posix()
-    if group is None or group.inputs != case.hash_inputs() or place not in group.files:
-        return None
-    try:
-        return read_listed(Path(options.out), place).decode("utf-8").strip()
-    except InvalidInput:  # deleted, or changed
-        return None
+    if group is not None and group.inputs == case.hash_inputs() and place in group.files:
+        with suppress(InvalidInput):  # deleted, or changed
+            return read_listed(Path(options.out), place).decode("utf-8").strip()
+    return None
 
 
 def _unpack_runs(text: str) -> KeptRuns:

@@ -334,15 +334,13 @@ def is_on_back(a: Block, b: Block, line: Array, directions: Mapping[str, Directi
 
     The other stone, of a spandrel or a pier, is beyond it. A flat bed below a springing is not.
     """
-    for ring, other in ((a, b), (b, a)):
-        direction = directions.get(ring.part)
-        if direction is None or ring.role != "ring" or other.role == "ring" or other.fixed:
-            continue
-        if direction.centre is not None or not direction.upright:  # an upright one has none
-            away = other.centroid - line.mean(axis=0)
-            beyond = direction.outward(line.mean(axis=0)) @ away > 0.0
-            return bool(beyond) and not direction.separates(line)
-    return False
+    ring, other = (a, b) if a.role == "ring" else (b, a)
+    direction, middle = directions.get(ring.part), line.mean(axis=0)
+    if ring.role != "ring" or other.role == "ring" or other.fixed or direction is None:
+        return False
+    has_back = direction.centre is not None or not direction.upright  # an upright one has none
+    beyond = direction.outward(middle) @ (other.centroid - middle) > 0.0
+    return bool(has_back and beyond) and not direction.separates(line)
 
 
 def _fit_direction(places: Array, role: str) -> Direction:

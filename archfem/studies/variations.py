@@ -155,7 +155,9 @@ def verdict_range(  # noqa: PLR0913  (one call, one argument for each thing that
         defaults = {name: defaults[name] for name in defaults if not name.startswith("damping")}
     ranges = check_ranges({**defaults, **(vary or {})})
     neutral = {**NEUTRAL, "damping_kind": damping_kind(viscous)}
-    changes = [*_single_changes(ranges, neutral), *sample_changes(ranges, samples, seed)]
+    # the run as given, and each property at each other value alone
+    changes = [{}, *({k: x} for k, row in ranges.items() for x in row if x != neutral.get(k))]
+    changes += sample_changes(ranges, samples, seed)
     variations = [Variation(analysis, motion, _resolve_labels(ranges, each)) for each in changes]
     points = list(enumerate(variations))
     name = f"range of {motion.name or 'the motion'}"
@@ -276,14 +278,6 @@ def check_ranges(ranges: Mapping[str, Any]) -> dict[str, Any]:
                 raise InvalidInput(f"{name} = {values!r}: give the ends of a range above 0")
         checked[name] = values
     return checked
-
-
-def _single_changes(ranges: Mapping[str, Any], neutral: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Return the run as given, and each property at each other value alone."""
-    changes: list[dict[str, Any]] = [{}]
-    for name, values in ranges.items():
-        changes += [{name: value} for value in values if value != neutral.get(name)]
-    return changes
 
 
 def sample_changes(ranges: Mapping[str, Any], samples: int, seed: int) -> list[dict[str, Any]]:
