@@ -190,6 +190,11 @@ class Case:
         return self.motion is not None or self.suite is not None
 
     @property
+    def parapets(self) -> float:
+        """Weight of parapets along a bridge, which ratings alone have [N/m]."""
+        return float(self.rating.get("parapets", 0.0))
+
+    @property
     def joints(self) -> tuple[int, ...]:
         """Numbers of the joints to draw over time; empty if the case names none."""
         return tuple(map(self.structure.joint_number, self.output.get("joints", ())))

@@ -201,7 +201,7 @@ def limit_files(case: Case, collapse: Collapse, text: str, doubts: Sequence[str]
     demand = NO_DEMAND if collapse.push else "the given load"
     if not collapse.push and collapse.outcome is Outcome.COLLAPSES:
         site = PushFactors(*collapse.range)
-    lines = [*doubts, *note_masses(case.structure, collapse.live, collapse.dead)]
+    lines = [*doubts, *note_masses(case.structure, collapse.live, collapse.dead, case.parapets)]
     given = collapse.sentence, lines, demand, site
     stated = state_outcome("limit analysis", *given).as_file("limit")
     return {"limit.txt": text, "limit.csv": joints, "collapse.png": collapse.plot(), **stated}

@@ -226,7 +226,10 @@ def describe_dead_load(result: DeadLoadResult, *, explain: bool = False) -> str:
     if structure.heads.any():
         heads = result.dead.joints.isel(joint=structure.heads)
         lines[-1] += f"; of head joints, which do not count, {_describe_largest(heads)}"
-    lines += [*describe_friction_margin(result.case, structure), *note_masses(structure)]
+    lines += [
+        *describe_friction_margin(result.case, structure),
+        *note_masses(structure, parapets=result.case.parapets),
+    ]
     lines += filter(None, [structure.assessment, structure.transverse_remark])
     lines += filter(None, [defaults(result.case)])
     if result.strength_use is not None:
@@ -274,7 +277,9 @@ def describe_depths(structure: Structure) -> str:
     )
 
 
-def describe_collapse(structure: Structure, collapse: Collapse, limit: LimitAnalysis) -> str:
+def describe_collapse(
+    structure: Structure, collapse: Collapse, limit: LimitAnalysis, parapets: float = 0.0
+) -> str:
     """Describe the result of limit analysis: load, hinges, sliding, crushing, and the fill."""
     joints = structure.joints
     hinges = [f"{joints[number].name} at the {side}" for number, side in collapse.hinges]
@@ -292,7 +297,7 @@ def describe_collapse(structure: Structure, collapse: Collapse, limit: LimitAnal
     crushing = limit.describe_crushing(structure)
     lines += filter(None, [crushing, describe_fill(limit.fill, structure)])
     lines += note_lower_crowns(structure, limit.fill)
-    lines += note_masses(structure, collapse.live, collapse.dead)
+    lines += note_masses(structure, collapse.live, collapse.dead, parapets)
     if structure.heads.any() and collapse.outcome is Outcome.COLLAPSES:
         lines.append(
             "blocks are rigid, and elastic joints may bear less: hold a motion a tenth below"
@@ -304,9 +309,18 @@ def note_masses(
     structure: Structure,
     live: Settlement | Sequence[Action | Settlement] = (),
     dead: Sequence[Action] = (),
+    parapets: float = 0.0,
 ) -> list[str]:
     """Return notes on loads that are not pushed as weights are, and on masses at other heights."""
-    words = describe_massless(live, dead), describe_carried(structure)
+    words = [describe_massless(live, dead), describe_carried(structure)]
+    if parapets:
+        points = np.concatenate([structure.blocks[number].points for number in structure.free])
+        weight = parapets * float(np.ptp(points[:, 0]))
+        words.append(
+            f"parapets of [rating], {parapets / kN:g} kN/m, are left out here: {weight / kN:.3g} "
+            f"kN, {weight / structure.weight:.1%} of the weight; as bodies of [structure.standing] "
+            "they weigh and are pushed"
+        )
     return [f"{NOTE_MARK}{each}" for each in words if each]
 
 
@@ -410,7 +424,8 @@ def describe_limit(case: Case, found: Collapse, opposite: Collapse | None) -> tu
     others += filter(None, [describe_fill_defaults(case)])
     site = compare_with_site(case, found)
     others += [f"it begins to move at {site} times {site.site}"] if site else []
-    return found, "\n".join([describe_collapse(case.structure, found, case.limit), *others])
+    text = describe_collapse(case.structure, found, case.limit, case.parapets)
+    return found, "\n".join([text, *others])
 
 
 def _order_senses(found: Collapse) -> tuple[int, float]:

@@ -255,7 +255,7 @@ def assess(options: argparse.Namespace) -> int:
     with keep_warnings():
         doubts += _compare_crushing(case, found.values())
     doubts += answers.note_band(case, found.values())
-    doubts += result_text.note_masses(case.structure)
+    doubts += result_text.note_masses(case.structure, parapets=case.parapets)
     listed = [f"{DOUBT_MARK}{doubt}" for result in found.values() for doubt in result.doubts]
     every = [*dict.fromkeys([*doubts, *listed])]
     texts = [answers.describe_margin(found.values())]
@@ -486,8 +486,8 @@ def print_results(case: Case, found: Iterable[Result], folder: Path) -> tuple[st
                     _print_first_modes(at_rest, folder)
             elif isinstance(result, Pushover):
                 given = case.pushover
-                loads = (given.live, given.dead) if given else ()
-                notes = result_text.note_masses(case.structure, *loads)
+                loads = (given.live, given.dead) if given else ((), ())
+                notes = result_text.note_masses(case.structure, *loads, case.parapets)
                 print(result_text.describe_pushover(result, notes))
                 write(results.pushover_files(case, result, notes), folder)
             elif isinstance(result, Suite):

@@ -193,7 +193,10 @@ def evaluate_limit(case: Case) -> Findings:
     }
     if collapse.push:
         push, site = float(collapse.factor) * abs(collapse.push), site_acceleration(case)
-        findings |= {"push": push} | ({"push_over_site": push / site} if site > 0.0 else {})
+        findings["push"] = push
+        if collapse.over_fill is not None:
+            findings["least_push"] = abs(collapse.push) * float(collapse.range[0])
+        findings |= {"push_over_site": push / site} if site > 0.0 else {}
     return findings
 
 
@@ -275,7 +278,7 @@ NAMED_EVALUATORS: Mapping[str, Callable[..., Findings]] = {
 
 # SI units of findings by function; findings without one are ratios, counts or words
 FINDING_UNITS: Mapping[Callable[..., Mapping[str, Any]], Mapping[str, str]] = {
-    evaluate_limit: {"push": "g"},
+    evaluate_limit: {"push": "g", "least_push": "g"},
     evaluate_rating: {"position": "m"},
     evaluate_history: {
         "rotation": "rad",
