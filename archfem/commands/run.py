@@ -311,6 +311,9 @@ def rate(options: argparse.Namespace) -> int:
         found, lines, own = min(rated, key=lambda each: abs(np.log(max(each[0].factor, 1e-9))))
         varied, sentences, doubts = _vary(case, own, found, options.out)
         interrupted = len(doubts) > 0
+        if sentences and len(rated) > 1:
+            words = f"only {found.vehicle.name} was varied, whose factor is nearest to 1: "
+            sentences.append(f"{words}others by --vehicle, each alone")
         lines[:0] = [*sentences, *doubts]
         stated = stated._replace(sentences=[*stated.sentences, *sentences]).with_lines(doubts)
     text, files = result_text.describe_ratings(case, ratings, varied)

@@ -132,7 +132,7 @@ def test_limit_analysis_in_words(ring):
     # the lesser of both senses is concluded with
     site = af.Eurocode8(ag=0.1, ground="C")
     given = {"limit": {"fill": {"friction_angle": 35, "mobilisation": 1.0 / 3.0}}}
-    case = SimpleNamespace(structure=ring, limit=limit, target=None, settings=given)
+    case = SimpleNamespace(structure=ring, limit=limit, target=None, settings=given, parapets=0.0)
     case.assessment = SimpleNamespace(spectrum=None, options={})
     for factor, rank in ((0.9, "higher"), (1.1, "higher"), (0.99999, "the same")):
         other = replace(mirrored, factor=factor * pushed.factor, upper=factor * pushed.factor)
@@ -261,3 +261,26 @@ def test_dead_loads_that_a_push_leaves_at_rest_are_noted(tmp_path, capsys):
         case.structure, live=af.PointLoad(0.0, (1e3, 0.0), y=2.4), dead=case.limit.dead
     )
     assert "no mass" not in str(point) + str(moved)
+
+
+def test_parapets_of_a_rating_that_a_push_leaves_out_are_noted(tmp_path, capsys):
+    """2 kN/m along 0.6 m are 1.2 kN, 4.2 % of 28.8 kN: runs, limits, assessments say so."""
+    tables = {
+        "structure": {"shape": "column", "breadth": 0.6, "heights": [2.4]},
+        "limit": {"horizontal": 1.0, "friction": "none"},
+        "model": {"fidelity": "rigid"},
+        "assessment": {"spectrum": {"code": "NTC-2018", "ag": 0.2, "f0": 2.4, "tc_star": 0.3}},
+        "rating": {"vehicle": "LM1", "parapets": "2 kN/m"},
+    }
+    tables["assessment"]["spectrum"]["site"] = "B"
+    path, out = tmp_path / "case.toml", tmp_path / "out"
+    path.write_text(format_tables(tables))
+    note = "note: parapets of [rating], 2 kN/m, are left out here: 1.2 kN, 4.2% of the weight; as "
+    for command, count in (("run", 2), ("limit", 1), ("assess", 1)):
+        main([command, str(path), "--out", str(out / command)])
+        assert capsys.readouterr().out.count(note) == count
+    assert note in (out / "limit" / "limit.txt").read_text()
+    assert note.removeprefix("note: ") in (out / "limit" / "limit.json").read_text()
+    path.write_text(format_tables(tables | {"rating": {"vehicle": "LM1"}}))
+    main(["limit", str(path), "--out", str(out / "limit")])
+    assert "note: parapets" not in capsys.readouterr().out

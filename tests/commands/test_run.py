@@ -894,6 +894,14 @@ def test_the_vehicle_that_decides_is_varied(tmp_path, unplotted, monkeypatch):
     texts = (out / "rating.txt").read_text().split("\n\n")
     (varied,) = (text for text in texts if "measure first" in text)
     assert varied.startswith("Rating of 'a ring pushed over' for light: ")
+    only = "only light was varied, whose factor is nearest to 1: others by --vehicle, each alone"
+    assert only in varied.splitlines()
+    assert only in json.loads((out / "rating.json").read_text())["sentences"]
+    assert af.commands.main(["report", str(out)]) == 0
+    title = (
+        "Factor with one property changed at a time, of light alone, whose factor is nearest to 1"
+    )
+    assert title in (out / "report.html").read_text()
 
 
 def test_a_bridge_that_does_not_stand_is_rated_for_no_vehicle(tmp_path, unplotted, capsys):

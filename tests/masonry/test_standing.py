@@ -1,6 +1,7 @@
 """Bodies that stand on a structure: closed forms of walls and piers, joints, files, refusals."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -192,6 +193,76 @@ def test_a_body_on_a_bare_ring_is_refused_with_a_remedy():
     ring = af.circular_arch(radius=3.0, thickness=0.5, embrace=160.0, voussoirs=15)
     with pytest.raises(af.errors.InvalidInput, match="give the structure a fill or a paving"):
         carrying(ring, [replace(LORRY, x=0.0)])
+
+
+@cache
+def mill_bridge():
+    """A bridge of which another linear programme gave the pushes that tests compare with.
+
+    It has the ring by its arcs, the fill in 40 columns a stone without pressure, N, V and M at
+    joints as unknowns, and crushing at 10 MPa by tangents to its parabola.
+    """
+    walls = [
+        af.shapes.Sidewall(length=1.5, height=1.0, above=0.9, state="fixed", name=name)
+        for name in ("left wall", "right wall")
+    ]
+    return af.bridge(
+        arches=[af.shapes.Arch(span=7.4, rise=2.0, thickness=0.48, voussoirs=25)],
+        sidewalls=walls,
+        backfill=af.shapes.Backfill(cover=0.6),
+        width=4.2,
+        material=replace(af.STONE, unit_weight=23e3),
+    )
+
+
+def push(structure, lever, sense=1.0):
+    """The push of a structure on which no fill presses [g]."""
+    fill = replace(NO_PRESSURE, lever=lever)
+    given = {"live": af.BodyForce(sense), "fill": fill, "strength": 10e6}
+    return af.collapse_factor(structure, **given).factor
+
+
+def test_parapets_as_a_body_along_the_bridge_weigh_and_are_pushed():
+    """13.8 kN/m, their centre 0.5 m above the road; answers of the programme of `mill_bridge`."""
+    bridge = mill_bridge()
+    (soil,) = (block for block in bridge.blocks if block.name == "backfill")
+    left, right = soil.points[:, 0].min(), soil.points[:, 0].max()
+    length = float(right - left)
+    parapets = StandingBody(
+        x=0.5 * (left + right), length=length, weight=13.8e3 * length, centre_of_gravity=0.5
+    )
+    for structure, lever, known in (
+        (bridge, 0.0, 0.6055),
+        (carrying(bridge, [parapets]), 0.0, 0.6123),
+        (bridge, 1.0, 0.4574),
+        (carrying(bridge, [parapets]), 1.0, 0.4593),
+    ):
+        assert push(structure, lever) == pytest.approx(known, rel=2e-3)
+
+
+LONG = {
+    "x": 5.2,
+    "centre_of_gravity": 1.5,
+    "axles": (93.2e3, 93.2e3, 68.7e3),
+    "spacings": (1.35, 3.6),
+}
+SHORT = {"x": 6.6, "axles": (60e3, 115e3), "spacings": (4.0,), "centre_of_gravity": 1.3}
+
+
+@pytest.mark.parametrize(
+    ("lorry", "lever", "right", "left"),
+    [
+        (LONG, 0.0, 0.5482, 0.8152),
+        (LONG, 1.0, 0.3918, 0.5537),
+        (SHORT, 0.0, 0.6568, 0.6065),
+        (SHORT, 1.0, 0.4357, 0.3924),
+    ],
+)
+def test_a_vehicle_on_an_arch_leans_as_in_another_linear_programme(lorry, lever, right, left):
+    """Answers of the programme of `mill_bridge`, with axle loads in proportion along its wheels."""
+    loaded = carrying(mill_bridge(), [replace(TRUCK, **{"length": 0.3, "width": 2.1} | lorry)])
+    assert push(loaded, lever) == pytest.approx(right, rel=2e-3)
+    assert push(loaded, lever, -1.0) == pytest.approx(left, rel=2e-3)
 
 
 def test_axles_do_not_drive_over_a_body_nor_is_it_plastic_fill():

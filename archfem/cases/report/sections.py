@@ -295,6 +295,9 @@ def _build_rating(data: ReportData) -> list[Any]:
     if (varied := data.read_text("rating_variations.csv")) is not None:
         head, *rows = reader(varied.splitlines())
         title = "Factor with one property changed at a time"
+        title += f", of {head[0].removesuffix(' with')} alone, whose factor is nearest to 1" * bool(
+            grids
+        )
         figures.insert(0, Grid(head, rows, title, "words"))
     return [*grids, *(TextBlock(each, "lines") for each in texts), *figures]
 
