@@ -121,11 +121,10 @@ class FillProfile:
     @cached_property
     def _unit_weights(self) -> Array:
         """Unit weights of the slices (n,) [N/m³]."""
-        cut = self.slices
-        weights = np.array([block.material.unit_weight for block in self.structure.blocks])
-        weights = weights[cut.block]
+        cut, area = self.slices, self.slices.area
+        weights = np.array([x.material.unit_weight for x in self.structure.blocks])[cut.block]
         for number in self._bodies:  # which rest on their feet alone
-            own, area = cut.block == number, cut.area
+            own = cut.block == number
             feet = own & (cut.bottom.max(axis=1) < cut.bottom[own].min() + self.near)
             weights[own] *= feet[own] * area[own].sum() / area[feet].sum()
         return np.asarray(weights)
@@ -140,7 +139,7 @@ class FillProfile:
 
         A body on the fill has the moment of its forces about the fill's surface in any case: no
         shear carries it away. On one base it acts column by column; on several feet it leans on
-        those in front. The lean (n,) is that vertical force under a horizontal one of its weight.
+        those in front. The lean (n,) is that vertical force over the horizontal one [-].
 
         Args:
             lever: where the place is, from 0 for the foot of a column to 1 for its centroid [-].
@@ -158,17 +157,17 @@ class FillProfile:
         carrier, x = below[carried], cut.middle[carried]
         foot = _interpolate_edge(cut.side[carrier], cut.top[carrier], x)
         ends = (_interpolate_edge(cut.side[carried], y[carried], x) for y in (cut.bottom, cut.top))
-        height, base = np.asarray(0.5 * sum(ends)), surface[carried]
-        lean = np.zeros_like(weight)
+        height, base, lean = np.asarray(0.5 * sum(ends)), surface[carried], 0.0 * weight
         for number in self._bodies:
-            own = np.flatnonzero((cut.block[carried] == number) & (weight > 0.0))
-            if len(own) == np.sum(cut.block[carried] == number):
+            own = cut.block[carried] == number
+            load = weight[feet := own & (weight > 0.0)]
+            if len(load) == own.sum():
                 continue
             # as a rigid body on feet that are equally stiff along their length
-            height[own] = road = self.structure.blocks[number].points[:, 1].min()
-            arm = x[own] - np.average(x[own], weights=weight[own])
-            moment = weight[own].sum() * (self.structure.centroids[number, 1] - road)
-            lean[own] = -moment * weight[own] * arm / (weight[own] @ arm**2)
+            height[feet] = self.structure.blocks[number].points[:, 1].min()
+            arm = x[feet] - np.average(x[feet], weights=load)
+            above = self.structure.centroids[number, 1] - height[feet]
+            lean[feet] = -above * load.sum() * arm / (load @ arm**2)
         level = np.where(soft[carried], height, _interpolate_edge(cut.side[base], cut.top[base], x))
         height -= (1.0 - lever) * (level - foot)
         return cut.block[carrier], np.stack([x, height], axis=1), weight, lean
@@ -463,7 +462,7 @@ class BlocksWithFill:
             if self.fill is not None and isinstance(action, BodyForce):
                 block, place, weight, lean = self._profile.columns(self.fill.lever)
                 pull = weight[:, None] * np.array([action.horizontal, action.vertical])
-                pull[:, 1] += action.horizontal * lean
+                pull[:, 1] += action.horizontal * lean * weight
                 total += self._sum_forces(self.rigid_regions.place[block], place, pull)
             if self.fill is not None and isinstance(action, PointLoad):
                 number, point = action.place(self.whole)
@@ -494,10 +493,8 @@ class BlocksWithFill:
             return
         grown = np.array(sum_body_forces(dead)) + factor * np.array(sum_body_forces(live))
         sideways, down = abs(float(grown[0])), 1.0 - grown[1]
-        *_, weight, lean = self._profile.columns()
-        loads = weight > 0.0
         # what is taken off an axle, as a share of its load and of the horizontal pull
-        share = np.max(np.sign(grown[0]) * lean[loads] / weight[loads], initial=0.0)
+        share = np.max(np.sign(grown[0]) * self._profile.columns()[-1], initial=0.0)
         if sideways * share > down:
             logger.warning(
                 "at a factor of %.4g, %.3g g sideways, an axle has lifted, at %.3g g: the factor "
