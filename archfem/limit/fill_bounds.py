@@ -217,11 +217,16 @@ class FilledBlocks:
         """Add the power balance of each quadratic velocity, of corners and middles of sides."""
         edge_points, edge = self.mesh.edges
         middles = len(self.points) + edge.reshape(-1, 3)
-        load = self.weight * self.mesh.areas / (3.0 * self.blocks.length_unit**2)
+        area = self.mesh.areas / (3.0 * self.blocks.length_unit**2)
+        load = self.weight * area
         right = np.zeros((len(self.points) + len(edge_points), 2))
         entries = Rows()
+        start = 9 * np.arange(len(middles))
         for corner, node, slope in self._shape_gradients():
-            self._add_stress(entries, corner, node, slope)
+            for axis, pair in enumerate(((0, 2), (2, 1))):
+                for direction, component in enumerate(pair):
+                    stress = start + 3 * corner + component
+                    entries.put(2 * node + axis, stress, area * slope[:, direction])
         # the weight acts on the middles alone: the shapes of corners have no mean
         for middle in middles.T:
             for axis in range(2):
@@ -251,14 +256,6 @@ class FilledBlocks:
                 )
             yield a, middles[:, a], 4.0 * gradient[:, b]
             yield b, middles[:, a], 4.0 * gradient[:, a]
-
-    def _add_stress(self, entries: Rows, corner: int, node: Numbers, slope: Array) -> None:
-        """Add the power of the stress at a corner of each triangle on a node's velocity."""
-        start = 9 * np.arange(len(node)) + 3 * corner
-        area = self.mesh.areas / (3.0 * self.blocks.length_unit**2)
-        for axis, pair in enumerate(((0, 2), (2, 1))):
-            for direction, component in enumerate(pair):
-                entries.put(2 * node + axis, start + component, area * slope[:, direction])
 
     def _add_contacts(self, entries: Rows, stones: Rows) -> None:
         """Add forces of blocks on the fill, by the Bernstein coefficients of the jump."""

@@ -6,7 +6,7 @@ passive pressure needs movement to develop. Both are assumed, so a result must h
 values.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from itertools import product
 from typing import NamedTuple
@@ -126,11 +126,8 @@ class FillRange:
         good = [key for key, value in self.values.items() if value >= 1.0]
         if len(good) in (0, len(self.values)):
             return ""
-        enough = self._find_sufficient(good)
+        words = dict.fromkeys(word for key in good for word in key if word)
+        # words, on inertia or pressure alone, with which it passes in any case
+        enough = [x for x in words if all(key in good for key in self.values if x in key)]
         rest = [" and ".join(filter(None, key)) for key in good if not {*key} & {*enough}]
         return " or ".join([*enough, *rest])
-
-    def _find_sufficient(self, good: Sequence[FillAssumption]) -> list[str]:
-        """Return the words, on inertia or pressure alone, with which it passes in any case."""
-        words = dict.fromkeys(word for key in good for word in key if word)
-        return [word for word in words if all(key in good for key in self.values if word in key)]

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from itertools import chain, product
 from math import isfinite, log2
 from pathlib import Path
-from typing import Any, Protocol, Self
+from typing import Any
 
 import numpy as np
 from scipy import stats
@@ -231,27 +231,13 @@ class Point:
         return hash_sections(self.settings, self.folder, MODEL_SECTIONS)
 
 
-class StudyPoint(Protocol):
-    """A point that workers evaluate, and the changes by which it differs from others."""
-
-    @property
-    def changes(self) -> tuple[tuple[str, Any], ...]:
-        """Changed settings by name."""
-
-    @property
-    def case(self) -> Any:
-        """The argument of the evaluator."""
-
-    @property
-    def model_key(self) -> str:
-        """Text that points of one model have in common, whichever case they are of."""
-
-
 class WholePoint:
     """Base of points that are evaluated as they are, and share no model with others."""
 
+    changes: tuple[tuple[str, Any], ...]
+
     @property
-    def case(self) -> Self:
+    def case(self) -> Any:
         """The point itself."""
         return self
 
@@ -259,6 +245,10 @@ class WholePoint:
     def model_key(self) -> str:
         """Empty: the order of points saves nothing."""
         return ""
+
+
+# What workers evaluate, and the changes by which it differs from others
+StudyPoint = Point | WholePoint
 
 
 def describe_changes(point: StudyPoint) -> str:

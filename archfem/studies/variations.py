@@ -301,13 +301,12 @@ def draw_samples(
     # that of samples added later has a seed of its own, and leaves those before as they are
     own = int(np.random.SeedSequence([seed, begin]).generate_state(1)[0]) if begin else seed
     random = np.random.default_rng(own)
-    # alternatives in proportion to their weights, in random order (size,)
+    # alternatives in proportion to their weights, in random order
     shares = (random.permutation(size) + random.random(size)) / size
     places = np.searchsorted(np.cumsum([*weights.values()])[:-1], shares, side="right")
-    # all records in random order before any again (size,)
-    dealt = [random.permutation(records) for _ in range(-(-size // records))]
-    labels = np.array([*weights])[places]
-    return sample_changes(ranges, size, own), labels, np.concatenate(dealt)[:size]
+    # all records in random order before any again
+    dealt = np.concatenate([random.permutation(records) for _ in range(-(-size // records))])
+    return sample_changes(ranges, size, own), np.array([*weights])[places], dealt[:size]
 
 
 def _resolve_labels(
