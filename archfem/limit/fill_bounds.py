@@ -22,7 +22,7 @@ Int. J. Numer. Anal. Meth. Geomech. 31 (2007) 835-865.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import cos, sin
 from typing import Any
@@ -71,7 +71,6 @@ class FilledBlocks:
     blocks: RigidBlocks
     mesh: FillMesh
     fill: PlasticFill
-    unit_weight: Array  # of each triangle (t,) [N/m³]
     regions: RigidRegions  # the stones in the whole structure
     live: Array  # generalised forces on the free stones that grow (3 n_free,) [mean block weights]
     pull: Array  # multiple of the fill's weight that grows, along x and y (2,) [-]
@@ -93,7 +92,9 @@ class FilledBlocks:
     @cached_property
     def weight(self) -> Array:
         """Weight of the fill per area (t,) [programme's units]."""
-        return self.unit_weight * self.blocks.length_unit / self.stress_unit
+        blocks = self.mesh.structure.blocks
+        unit_weights = np.array([block.material.unit_weight for block in blocks])
+        return unit_weights[self.mesh.owner] * self.blocks.length_unit / self.stress_unit
 
     @property
     def stress_count(self) -> int:
@@ -217,8 +218,8 @@ class FilledBlocks:
         """Add the power balance of each quadratic velocity, of corners and middles of sides."""
         edge_points, edge = self.mesh.edges
         middles = len(self.points) + edge.reshape(-1, 3)
-        area = self.mesh.areas / (3.0 * self.blocks.length_unit**2)
-        load = self.weight * area
+        unit = 3.0 * self.blocks.length_unit**2
+        area, load = self.mesh.areas / unit, self.weight * self.mesh.areas / unit
         right = np.zeros((len(self.points) + len(edge_points), 2))
         entries = Rows()
         start = 9 * np.arange(len(middles))
@@ -523,10 +524,9 @@ def refine_bounds(
     # equilateral triangles of side s have the area √3 s² / 4
     size = float(np.sqrt(4.0 / np.sqrt(3.0) * area / first))
     mesh = mesh_fill(structure, soil, size, fill.holds_ends)
-    best = None
+    loads, best = (live, [SELF_WEIGHT, *dead]), None
+    filled = _load_blocks(structure, regions, loads, friction, strength, fill, mesh)
     while best is None or len(best.filled.mesh.triangles) <= most:
-        loads = live, [SELF_WEIGHT, *dead]
-        filled = _load_blocks(structure, regions, loads, friction, strength, fill, mesh)
         try:
             best = FillBounds(filled, filled.bound_below(), filled.bound_above())
         except DidNotConverge:
@@ -537,7 +537,7 @@ def refine_bounds(
         # no equilibrium with all velocities of this mesh is none with those of a finer one
         if best.gap <= fill.gap or np.isnan(best.above.factor):
             return
-        mesh = mesh.refined(best.widest())
+        filled = replace(filled, mesh=filled.mesh.refined(best.widest()))
     _doubt_bounds(best, fill.gap)
 
 
@@ -612,15 +612,7 @@ def _load_blocks(
         return load, np.array(sum_body_forces(pulls))
 
     (live, pull), (dead, dead_pull) = map(forces, loads)
-    weights = np.array([block.material.unit_weight for block in structure.blocks])
-    count = len(regions.structure.joints)
-    return FilledBlocks(
-        blocks,
-        mesh,
-        fill,
-        weights[mesh.owner],
-        regions,
-        *(live, pull, dead, dead_pull),
-        regions.structure.friction if friction is not None else np.full(count, np.inf),
-        strength,
-    )
+    rough = np.full(len(regions.structure.joints), np.inf)
+    coefficients = rough if friction is None else regions.structure.friction
+    given = blocks, mesh, fill, regions, live, pull, dead, dead_pull, coefficients
+    return FilledBlocks(*given, strength)
