@@ -222,18 +222,15 @@ def tangent(normal: Array) -> Array:
     return np.array([normal[1], -normal[0]])
 
 
-def merge_blocks(structure: Structure, welded: Sequence[int] | Numbers) -> Numbers:
+def merge_blocks(structure: Structure, welded: Sequence[int] | Numbers | Flags) -> Numbers:
     """Return the number of the body of each block, -1 for those welded to fixed ones."""
-    count = len(structure.blocks)
-    fixed = [number for number, block in enumerate(structure.blocks) if block.fixed]
-    # supports are one body, the ground
-    pairs = [*structure.pairs[list(welded)], *((fixed[0], number) for number in fixed)]
-    rows, columns = np.array(pairs).T
-    graph = csr_matrix((np.ones(len(pairs)), (rows, columns)), (count, count))
+    vertices = structure.first_coordinates // 3 + 1  # number of each block, 0 for the ground
+    one, other = vertices[structure.pairs[welded]].T
+    size = len(structure.free) + 1
+    graph = csr_matrix((np.ones(len(one)), (one, other)), (size, size))
+    # numbered by their first vertex, hence 0 with the ground
     labels = csgraph.connected_components(graph, directed=False)[1]
-    ground = labels[fixed[0]]
-    numbers = {label: k for k, label in enumerate(dict.fromkeys(labels[labels != ground]))}
-    return np.array([numbers.get(label, -1) for label in labels], dtype=np.intp)
+    return np.asarray(labels[vertices] - 1, dtype=np.intp)
 
 
 @dataclass(frozen=True, eq=False)
@@ -439,7 +436,7 @@ def classify_motion(
     keeps = (np.abs(normal) <= STILL) | (np.abs(normal - dilation) <= STILL)
     opens = _find_opening_joints(blocks, motion)
     opens &= np.isin(np.arange(len(opens)), joints)
-    body = merge_blocks(blocks.structure, np.flatnonzero(~opens).tolist())
+    body = merge_blocks(blocks.structure, ~opens)
     kept = tuple(
         _sliding_contact(blocks, contact, int(sense))
         for contact, keep, sense in zip(contacts, keeps, slip, strict=True)

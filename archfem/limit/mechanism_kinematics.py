@@ -22,7 +22,7 @@ import xarray as xr
 from numpy.typing import NDArray
 from scipy import sparse
 from scipy.optimize import nnls
-from scipy.sparse.csgraph import connected_components, dijkstra
+from scipy.sparse.csgraph import dijkstra
 
 from archfem._display import ProgressReport
 from archfem._recent import RecentResults
@@ -31,6 +31,7 @@ from archfem._validation import check_type, validate_arguments
 from archfem.joints.criteria import Criteria, find_lasting, with_failure_flags
 from archfem.joints.resultants import check_instant
 from archfem.joints.rigid_kinematics import jump_entries
+from archfem.limit.displaced_blocks import merge_blocks
 from archfem.limit.linear_programme import RigidBlocks, solve_linear
 from archfem.limit.mechanism_count import (
     Mechanism,
@@ -380,13 +381,7 @@ class LoopCheck:
 
     def find_bodies(self, failed: Flags) -> Numbers:
         """Return the body of each block, -1 for the ground, where some joints have failed."""
-        structure = self.blocks.structure
-        vertices = structure.first_coordinates // 3 + 1  # number of each block, 0 for the ground
-        joined = vertices[structure.pairs[~failed]].T
-        shape = len(structure.free) + 1, len(structure.free) + 1
-        graph = sparse.csr_matrix((np.ones(joined.shape[1]), (joined[0], joined[1])), shape)
-        # numbered by their first vertex, hence 0 with the ground
-        return np.asarray(connected_components(graph, directed=False)[1][vertices] - 1)
+        return merge_blocks(self.blocks.structure, ~failed)
 
     def self_stresses(self, joints: Numbers, bodies: Numbers) -> Array:
         """Return an orthonormal basis R of the self-stresses of joints (3 n_joints, r) [-]."""
