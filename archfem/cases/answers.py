@@ -6,9 +6,9 @@ from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from archfem._display import DOUBT_MARK, NOTE_MARK
+from archfem._display import NOTE_MARK
 from archfem.cases.case import Case
-from archfem.cases.result_text import PushFactors, ResultTable
+from archfem.cases.result_text import PushFactors, Remark, ResultTable
 from archfem.dynamics.motion_scaling import CollapseScale, MechanismScales
 from archfem.limit.fill_range import FillRange
 from archfem.limit.rating import Rating
@@ -120,11 +120,10 @@ class Statement(NamedTuple):
         plain = self._replace(doubts=doubts, notes=list(dict.fromkeys(self.notes)))
         return {f"{name}.json": json.dumps(plain._asdict(), indent=1)}
 
-    def with_lines(self, lines: Sequence[str]) -> "Statement":
-        """Return this with the doubts and notes of some lines, of which each has its mark."""
-        marked = [x for x in lines if x.startswith(DOUBT_MARK)]
-        doubts = [Doubt(cut_remedy(x.removeprefix(DOUBT_MARK))) for x in marked]
-        notes = [x.removeprefix(NOTE_MARK) for x in lines if x.startswith(NOTE_MARK)]
+    def with_remarks(self, remarks: Sequence[Remark]) -> "Statement":
+        """Return this with the causes of some doubts, and with notes."""
+        doubts = [Doubt(x.cause) for x in remarks if isinstance(x, Doubt)]
+        notes = [x.removeprefix(NOTE_MARK) for x in remarks if isinstance(x, str)]
         return self._replace(doubts=[*doubts, *self.doubts], notes=[*self.notes, *notes])
 
     @classmethod
@@ -154,20 +153,20 @@ def cut_remedy(doubt: str) -> str:
 def state_outcome(
     result: str,
     words: str,
-    lines: Sequence[str] = (),
+    remarks: Sequence[Remark] = (),
     demand: str = "-",
     factors: PushFactors | None = None,
 ) -> Statement:
-    """State one outcome, which is the capacity too, with lines of doubts and notes."""
+    """State one outcome, which is the capacity too, with doubts and notes."""
     row = Row(result, demand, words, "-", {})
     if factors:
         demand = factors.site or demand
         row = Row(result, demand, words, str(factors), factors._asdict())
-    return Statement([f"{result}: {words}"], [row]).with_lines(lines)
+    return Statement([f"{result}: {words}"], [row]).with_remarks(remarks)
 
 
 def state_scale(
-    found: CollapseScale | MechanismScales, motion: Motion, lines: Sequence[str]
+    found: CollapseScale | MechanismScales, motion: Motion, doubts: Sequence[Doubt]
 ) -> dict[str, str]:
     """Return the files with what is stated of a search of scales, and with its runs."""
     result, pga, words = RESULTS["scale"], motion.pga / STANDARD_GRAVITY, found.sentence
@@ -184,11 +183,11 @@ def state_scale(
         words += "; a fall was not computed"
     factor = f"{held:#.3g}" if held else "-"
     row = Row(result, f"'{motion.name}', PGA {pga:.2f} g", words, factor, scales._asdict())
-    stated = Statement([f"{result}: {words}"], [row], found.doubts).with_lines(lines)
+    stated = Statement([f"{result}: {words}"], [row], found.doubts).with_remarks(doubts)
     return {**stated.as_file("scale"), **files}
 
 
-def state_ratings(rated: Sequence[tuple[Rating, Sequence[str]]]) -> Statement:
+def state_ratings(rated: Sequence[tuple[Rating, Sequence[Remark]]]) -> Statement:
     """State the factor of each vehicle, by codes too, least first; sentences are of the first."""
     rows, first = list[tuple[float, Row]](), rated[0][0]
     for found, _ in rated:
@@ -208,10 +207,12 @@ def state_ratings(rated: Sequence[tuple[Rating, Sequence[str]]]) -> Statement:
     sentences += [*first.describe_codes(), *first.describe_pressure(), *first.describe_backing()]
     least_first = [row for _, row in sorted(rows, key=lambda each: each[0])]
     stated = Statement(sentences, least_first)
-    return stated.with_lines([line for _, own in rated for line in own])
+    return stated.with_remarks([each for _, own in rated for each in own])
 
 
-def state_assessments(found: Mapping[str, KinematicAssessment], lines: Sequence[str]) -> Statement:
+def state_assessments(
+    found: Mapping[str, KinematicAssessment], remarks: Sequence[Remark]
+) -> Statement:
     """State each check of an assessment with the directions in which it holds; the last decides."""
     checks: dict[tuple[str, str], tuple[AssessmentCheck, Ratios, list[str]]] = {}
     for direction, result in found.items():
@@ -231,7 +232,7 @@ def state_assessments(found: Mapping[str, KinematicAssessment], lines: Sequence[
     sentences.append(describe_margin(found.values()))
     doubts = [doubt for result in found.values() for doubt in result.doubts]
     notes = [note for result in found.values() for note in result.notes]
-    return Statement(sentences, rows, doubts, notes).with_lines(lines)
+    return Statement(sentences, rows, doubts, notes).with_remarks(remarks)
 
 
 def list_ratios(found: KinematicAssessment) -> list[tuple[AssessmentCheck, Ratios]]:

@@ -16,6 +16,7 @@ from archfem.cases.case import Case
 from archfem.cases.provenance import list_input_files
 from archfem.cases.result_text import (
     PushFactors,
+    Remark,
     compare_push,
     compare_with_site,
     describe_pushover,
@@ -36,6 +37,7 @@ from archfem.dynamics.history import History
 from archfem.errors import ArchfemError, InvalidInput, logger
 from archfem.limit.collapse import Collapse, Outcome
 from archfem.masonry.loads import find_push
+from archfem.models.model import Doubt
 from archfem.statics.pushover import Pushover
 from archfem.statics.stress import strength_use_table
 from archfem.view.collapse import draw_fall
@@ -192,7 +194,7 @@ def _read_case(place: Path, inputs: Path | None) -> Case:
         raise type(error)(f"{path}: {error}") from error
 
 
-def limit_files(case: Case, collapse: Collapse, text: str, doubts: Sequence[str]) -> Files:
+def limit_files(case: Case, collapse: Collapse, text: str, doubts: Sequence[Doubt]) -> Files:
     """Return text, joints at collapse and mechanism of a limit analysis."""
     columns = ["name", "N", "V", "M", "eccentricity"]
     joints = collapse.joints.to_dataframe()[columns].to_csv(index=False).rstrip()
@@ -201,8 +203,9 @@ def limit_files(case: Case, collapse: Collapse, text: str, doubts: Sequence[str]
     demand = NO_DEMAND if collapse.push else "the given load"
     if not collapse.push and collapse.outcome is Outcome.COLLAPSES:
         site = PushFactors(*collapse.range)
-    lines = [*doubts, *note_masses(case.structure, collapse.live, collapse.dead, case.parapets)]
-    given = collapse.sentence, lines, demand, site
+    remarks: list[Remark] = list(doubts)
+    remarks += note_masses(case.structure, collapse.live, collapse.dead, case.parapets)
+    given = collapse.sentence, remarks, demand, site
     stated = state_outcome("limit analysis", *given).as_file("limit")
     return {"limit.txt": text, "limit.csv": joints, "collapse.png": collapse.plot(), **stated}
 

@@ -51,13 +51,22 @@ from archfem.masonry.structure import (
     join_words,
     list_or_count,
 )
-from archfem.models.model import Ends
+from archfem.models.model import Doubt, Ends
 from archfem.motion.matching import Match
 from archfem.motion.motion import Motion
 from archfem.motion.response_spectra import measure_intensity
 from archfem.statics.pushover import Pushover
 from archfem.statics.stress import strength_use_text, utilisation_text
 from archfem.units import STANDARD_GRAVITY, format_mm, kN
+
+# A doubt, or a line with a note
+Remark = Doubt | str
+
+
+def mark_remarks(remarks: Iterable[Remark]) -> list[str]:
+    """Return doubts and notes as lines with their marks, each once."""
+    lines = (f"{DOUBT_MARK}{x}" if isinstance(x, Doubt) else x for x in remarks)
+    return [*dict.fromkeys(lines)]
 
 
 class ResultTable(NamedTuple):
@@ -234,7 +243,7 @@ def describe_dead_load(result: DeadLoadResult, *, explain: bool = False) -> str:
     lines += filter(None, [defaults(result.case)])
     if result.strength_use is not None:
         lines.append(f"dead load: {strength_use_text(result.strength_use)}")
-    return "\n".join([*lines, *(f"{DOUBT_MARK}{doubt}" for doubt in result.doubts)])
+    return "\n".join([*lines, *mark_remarks(result.doubts)])
 
 
 def _describe_largest(joints: xr.Dataset) -> str:
@@ -345,10 +354,10 @@ def tabulate_ratings(ratings: Iterable[Rating]) -> ResultTable:
 
 
 def describe_ratings(
-    case: Case, rated: Sequence[tuple[Rating, Sequence[str]]], varied: ResultTable | None = None
+    case: Case, rated: Sequence[tuple[Rating, Sequence[Remark]]], varied: ResultTable | None = None
 ) -> tuple[str, dict[str, str]]:
     """Return the text of ratings and their doubts, and this and its tables as files."""
-    lines = [[*str(found).splitlines(), *doubts] for found, doubts in rated]
+    lines = [[*str(found).splitlines(), *mark_remarks(own)] for found, own in rated]
     files, tables = {"rating.csv": rated[0][0].table()}, list[str]()
     if len(rated) > 1:
         summary = tabulate_ratings([found for found, _ in rated])
@@ -382,16 +391,16 @@ def note_lower_crowns(structure: Structure, fill: Fill | PlasticFill | None) -> 
     return [f"{NOTE_MARK}{by} bears none of the passive pressure of a higher ring"]
 
 
-def doubt_rating(found: Rating, limit: LimitAnalysis) -> list[str]:
+def doubt_rating(found: Rating, limit: LimitAnalysis) -> list[Remark]:
     """Return doubts about a rating, equilibrium and a strength left out, and notes."""
     if np.isnan(found.factor):
-        words = "limit analysis finds no equilibrium of the bridge under its own weight; check the "
-        return [f"{DOUBT_MARK}{words}thickness of its rings and piers, and the fill"]
-    lines = []
+        words = "limit analysis finds no equilibrium of the bridge under its own weight"
+        return [Doubt(words, "check the thickness of its rings and piers, and the fill")]
+    lines = list[Remark]()
     if limit.strength is None and found.crushing_text:
-        words = "joints do not crush, as the case gives no strength of the stones"
+        words = "joints do not crush, as the case gives no strength of the stones: "
         remedy = "give strength in [materials] or [limit]"
-        lines.append(f"{DOUBT_MARK}{words}: {found.crushing_text}; {remedy}")
+        lines.append(Doubt(f"{words}{found.crushing_text}", remedy))
     if "from memory" in str(found):
         words = "values from memory were not compared with the text of their code"
         lines.append(f"{NOTE_MARK}{words}: look them up before you sign")

@@ -12,6 +12,7 @@ from archfem._display import DOUBT_MARK, write_progress_line
 from archfem._files import create_result_folder, intact_file_list, path_inside, read_listed
 from archfem.cases import answers
 from archfem.cases.case import Case
+from archfem.cases.result_text import mark_remarks
 from archfem.commands.cli import ExitCode
 from archfem.commands.run import (
     Command,
@@ -99,7 +100,7 @@ def scale(options: argparse.Namespace) -> int:
     kept, begun = (_read_kept(case, options, name) for name in ("scale.txt", KEPT_RUNS))
     if kept and options.pair and begun is None and not kept.startswith("no answer"):
         print(f"{case.title}\n{kept}")
-        return doubt_code(kept.splitlines())
+        return ExitCode.DOUBTFUL if f"\n{DOUBT_MARK}" in kept else 0
     motion = _choose_motion(case, options)
     found: CollapseScale | MechanismScales
     search = collapse_scale if case.analysis.displacements == "large" else mechanism_scales
@@ -109,8 +110,8 @@ def scale(options: argparse.Namespace) -> int:
     with record_doubts(case.structure) as doubts:
         found = search(case.analysis, motion, made=made)
     files: Files = {**answers.state_scale(found, motion, doubts)}
-    doubts += [f"{DOUBT_MARK}{doubt}" for doubt in found.doubts]
-    text = "\n".join([f"{motion.name}: {found}", *dict.fromkeys(doubts), "", found.table()])
+    doubts += found.doubts
+    text = "\n".join([f"{motion.name}: {found}", *mark_remarks(doubts), "", found.table()])
     files["scale.txt"] = text
     if isinstance(found, CollapseScale):
         from archfem.view.studies import draw_scale
@@ -139,16 +140,14 @@ def _read_kept(case: Case, options: argparse.Namespace, name: str) -> str | None
 
 
 def _unpack_runs(text: str) -> KeptRuns:
-    """Return the runs of an interrupted search from their file."""
+    """Return the runs of an interrupted search from their file, which this very program wrote."""
     made = {}
     for dt, run in json.loads(text):
         met = run["mechanisms"].items()
         run["mechanisms"] = {name: x and Mechanism(**_with_tuples(x)) for name, x in met}
         run["fall"] = run["fall"] and CollapseState(**_with_tuples(run["fall"]))
         run["ending"] = Ending(run["ending"])
-        # those of earlier versions are texts
-        doubts = ({"words": x} if isinstance(x, str) else _with_tuples(x) for x in run["doubts"])
-        run["doubts"] = [Doubt(**doubt) for doubt in doubts]
+        run["doubts"] = [Doubt(**_with_tuples(doubt)) for doubt in run["doubts"]]
         made[dt, run["scale"]] = ScaledRun(**_with_tuples(run))
     return made
 

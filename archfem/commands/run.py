@@ -155,11 +155,11 @@ def _name_published_files(text: str, folder: Path, command: str) -> str:
 
 
 @contextmanager
-def record_doubts(structure: Structure) -> Iterator[list[str]]:
-    """Yield doubts about a structure, and the warnings of a block but those of runs, as lines."""
-    doubts = [f"{DOUBT_MARK}{doubt}" for doubt in structure_doubts(structure)]
-    handler = logging.Handler(logging.WARNING)
-    handler.emit = lambda record: doubts.append(f"{DOUBT_MARK}{record.getMessage()}")  # type: ignore[method-assign]
+def record_doubts(structure: Structure) -> Iterator[list[Doubt]]:
+    """Yield doubts about a structure, and the warnings of a block but those of runs."""
+    doubts, handler = structure_doubts(structure), logging.Handler(logging.WARNING)
+    # the remedy of a warning is behind its last semicolon
+    handler.emit = lambda record: doubts.append(Doubt(*record.getMessage().rsplit("; ", 1)))  # type: ignore[arg-type,method-assign]
     # doubts of runs are kept by the runs; interruptions and the pace are no doubts of an answer
     handler.addFilter(lambda record: not any(isinstance(x, Doubt) for x in record.args or ()))
     handler.addFilter(lambda record: not hasattr(record, "of_run"))
@@ -192,9 +192,9 @@ def keep_attempt(name: str) -> Callable[[Command], Command]:
     return decorate
 
 
-def doubt_code(lines: Iterable[str]) -> int:
+def doubt_code(remarks: Iterable[result_text.Remark]) -> int:
     """Return the exit code of printed doubts and notes."""
-    return ExitCode.DOUBTFUL if any(line.startswith(DOUBT_MARK) for line in lines) else 0
+    return ExitCode.DOUBTFUL if any(isinstance(each, Doubt) for each in remarks) else 0
 
 
 def modes(options: argparse.Namespace) -> int:
@@ -219,8 +219,8 @@ def limit(options: argparse.Namespace) -> int:
     """Find the collapse factor of the loads in [limit], and the mechanism."""
     case = Case.read(options.case, options.changes)
 
-    def show(found: Collapse, text: str, lines: Sequence[str]) -> None:
-        files = partial(results.limit_files, case, found, text, lines)
+    def show(found: Collapse, text: str, doubts: Sequence[Doubt]) -> None:
+        files = partial(results.limit_files, case, found, text, doubts)
         write_results("limit", case, options.out, f"{case.title}\n{text}", files)
 
     with record_doubts(case.structure) as doubts:
@@ -234,9 +234,9 @@ def thickness(options: argparse.Namespace) -> int:
     ring = find_ring(case.structure, options.part)
     with record_doubts(case.structure) as doubts:
         words, factor, lines = result_text.describe_thickness(case, ring)
-    text = "\n".join([*lines, *doubts])
-    notes = [line for line in lines if line.startswith(NOTE_MARK)]
-    given = words, [*doubts, *notes], "at rest", result_text.PushFactors(factor, factor)
+    text = "\n".join([*lines, *result_text.mark_remarks(doubts)])
+    remarks: list[result_text.Remark] = [*doubts, *(x for x in lines if x.startswith(NOTE_MARK))]
+    given = words, remarks, "at rest", result_text.PushFactors(factor, factor)
     stated = answers.state_outcome(RESULTS["thickness"], *given)
     files: Files = {"thickness.txt": text, **stated.as_file("thickness")}
     write_results("thickness", case, options.out, f"{case.title}\n{text}", lambda: files)
@@ -253,11 +253,10 @@ def assess(options: argparse.Namespace) -> int:
         found = case.assessment.solve(case.structure, demand, options.parts)
     # warnings of the comparison are those of the assessment, or of a sliding that it leaves out
     with keep_warnings():
-        doubts += _compare_crushing(case, found.values())
-    doubts += answers.note_band(case, found.values())
-    doubts += result_text.note_masses(case.structure, parapets=case.parapets)
-    listed = [f"{DOUBT_MARK}{doubt}" for result in found.values() for doubt in result.doubts]
-    every = [*dict.fromkeys([*doubts, *listed])]
+        remarks = [*doubts, *_compare_crushing(case, found.values())]
+    remarks += answers.note_band(case, found.values())
+    remarks += result_text.note_masses(case.structure, parapets=case.parapets)
+    every = [*remarks, *(doubt for result in found.values() for doubt in result.doubts)]
     texts = [answers.describe_margin(found.values())]
     for name, result in found.items():
         # doubts follow at the end, once
@@ -265,20 +264,20 @@ def assess(options: argparse.Namespace) -> int:
         texts.append("\n".join([f"{name}: {lines[0]}", *lines[1:]]))
     of_fill = describe_fill(case.assessment.options.get("fill"), case.structure)
     texts.append("\n".join(filter(None, [of_fill, describe_fill_defaults(case)])))
-    text = "\n\n".join(filter(None, [*texts, "\n".join(every)]))
+    text = "\n\n".join(filter(None, [*texts, "\n".join(result_text.mark_remarks(every))]))
 
     def draw() -> Files:
         numbered = {f"assessment_{k}.png": result for k, result in enumerate(found.values())}
         figures = {name: each.plot() for name, each in numbered.items() if each.path is not None}
-        stated = answers.state_assessments(found, doubts).as_file("assessment")
+        stated = answers.state_assessments(found, remarks).as_file("assessment")
         return {"assessment.txt": text, **stated, **figures}
 
     write_results("assess", case, options.out, f"{case.title}\n{text}", draw)
     return doubt_code(every)
 
 
-def _compare_crushing(case: Case, found: Iterable[KinematicAssessment]) -> list[str]:
-    """Return a line on stones that crush, which an assessment leaves out: a doubt from 2 % on."""
+def _compare_crushing(case: Case, found: Iterable[KinematicAssessment]) -> list[result_text.Remark]:
+    """Return a remark on stones that crush, which an assessment leaves out: a doubt from 2 % on."""
     if case.limit.strength in (None, np.inf):
         return []
     least = min(found, key=lambda result: result.checks[-1].least)
@@ -287,9 +286,7 @@ def _compare_crushing(case: Case, found: Iterable[KinematicAssessment]) -> list[
         f"joints hinge about their edges: crushing at {case.limit.strength / MPa:.3g} MPa lowers "
         f"the push at which the whole begins to move by {100.0 * (1.0 - share):.2g} %"
     )
-    return [
-        f"{NOTE_MARK}{text}" if share > 0.98 else f"{DOUBT_MARK}{text}; reduce margins by as much"
-    ]
+    return [f"{NOTE_MARK}{text}" if share > 0.98 else Doubt(text, "reduce margins by as much")]
 
 
 @keep_attempt("rating")
@@ -315,7 +312,7 @@ def rate(options: argparse.Namespace) -> int:
             words = f"only {found.vehicle.name} was varied, whose factor is nearest to 1: "
             sentences.append(f"{words}others by --vehicle, each alone")
         lines[:0] = [*sentences, *doubts]
-        stated = stated._replace(sentences=[*stated.sentences, *sentences]).with_lines(doubts)
+        stated = stated._replace(sentences=[*stated.sentences, *sentences]).with_remarks(doubts)
     text, files = result_text.describe_ratings(case, ratings, varied)
     # the case of the folder, that of a run, may be rated for another vehicle
     files |= {RATING_FILE: format_tables({"rating": table}).rstrip(), **stated.as_file("rating")}
@@ -334,7 +331,7 @@ def rate(options: argparse.Namespace) -> int:
 
 def _vary(
     case: Case, table: Mapping[str, Any], found: Rating, out: str | None
-) -> tuple[result_text.ResultTable, list[str], list[str]]:
+) -> tuple[result_text.ResultTable, list[str], list[Doubt]]:
     """Return table and sentences of the variations of a rating, and those that Ctrl-C left out."""
     from archfem.studies.variations import vary_rating
 
@@ -343,18 +340,18 @@ def _vary(
     remedy = "give --out, which keeps the others"
     if folder is not None:
         remedy = f"run the same command again, which continues from {folder}"
-    words = f"interrupted: {left} variations of the rating were not computed; {remedy}"
-    return varied, sentences, [f"{DOUBT_MARK}{words}"] if left else []
+    words = f"interrupted: {left} variations of the rating were not computed"
+    return varied, sentences, [Doubt(words, remedy)] if left else []
 
 
 def _rate_each(
     case: Case, tables: Sequence[Mapping[str, Any]]
-) -> list[tuple[Rating, list[str], Mapping[str, Any]]]:
+) -> list[tuple[Rating, list[result_text.Remark], Mapping[str, Any]]]:
     """Return ratings with their doubts and tables, that of the least factor first.
 
     Those before Ctrl-C are returned, if there are any.
     """
-    rated, count = list[tuple[Rating, list[str], Mapping[str, Any]]](), len(tables)
+    rated, count = list[tuple[Rating, list[result_text.Remark], Mapping[str, Any]]](), len(tables)
     with ProgressReport("rating", count) as progress:
         for number, table in enumerate(tables):
             progress.show(f"vehicle {number + 1} of {count}")
@@ -366,10 +363,9 @@ def _rate_each(
                     write_progress_line("rating", "no vehicle was rated, and nothing is kept")
                     raise
                 left = f"interrupted: {count - number} of {count} vehicles were not rated"
-                rated[-1][1].append(f"{DOUBT_MARK}{left}; a new command rates all of its own")
+                rated[-1][1].append(Doubt(left, "a new command rates all of its own"))
                 break
-            doubts += result_text.doubt_rating(found, case.limit)
-            rated.append((found, doubts, table))
+            rated.append((found, [*doubts, *result_text.doubt_rating(found, case.limit)], table))
             progress.show(f"{found.vehicle.name}: {found.headline.partition(',')[0]}", 1)
             if np.isnan(found.factor):  # whatever the vehicle
                 break
@@ -509,7 +505,7 @@ def print_results(case: Case, found: Iterable[Result], folder: Path) -> tuple[st
 
 
 def _print_limit(
-    case: Case, folder: Path, found: Collapse, text: str, doubts: Sequence[str]
+    case: Case, folder: Path, found: Collapse, text: str, doubts: Sequence[Doubt]
 ) -> None:
     """Print limit analysis, and write its files."""
     print(text)

@@ -28,6 +28,7 @@ from archfem.commands.cli import ExitCode
 from archfem.dynamics.history import History
 from archfem.errors import ArchfemError, InvalidInput, NotInstalled
 from archfem.limit.collapse import Collapse, Outcome
+from archfem.models.model import Doubt
 from archfem.motion.suite import Suite
 
 PIP_INSTALL = f"{sys.executable} -m pip install"
@@ -167,12 +168,12 @@ def example(options: argparse.Namespace) -> None:
 def show_both_senses(
     case: Case,
     first: Collapse,
-    show: Callable[[Collapse, str, Sequence[str]], None],
-    doubts: Sequence[str] = (),
+    show: Callable[[Collapse, str, Sequence[Doubt]], None],
+    doubts: Sequence[Doubt] = (),
 ) -> None:
     """Show a result of limit analysis beside that of the other sense, each at its least end.
 
-    Doubts are lines that both may add to. Where the rest is cut short, the result is shown.
+    Both may add to the doubts. Where the rest is cut short, the result is shown.
     """
     # where a structure does not stand, the load plays no part
     other = None if first.outcome is Outcome.INFEASIBLE else case.limit.opposite
@@ -186,8 +187,8 @@ def show_both_senses(
             left = ""
     finally:
         found, text = result_text.describe_limit(case, first, opposite)
-        lines = [*dict.fromkeys(doubts)]  # both senses may have the same
-        show(found, "\n".join([f"{text}{left}", *lines]), lines)
+        once = [*dict.fromkeys(doubts)]  # both senses may have the same
+        show(found, "\n".join([f"{text}{left}", *result_text.mark_remarks(once)]), once)
 
 
 def print_motions(suite: Suite) -> None:

@@ -127,7 +127,7 @@ def state_each(hazard):
     found.rate = lambda: Rate(0.002, 0.001, 0.003)
     found.fragility = lambda: SimpleNamespace(median=6.0)
     vehicle = answers.Row("rating", "LM1", place, "1.25", {"outcome": "passes without all"})
-    doubts = ["in doubt: a made one; mend it"]
+    doubts = [Doubt("a made one", "mend it")]
     factors = result_text.PushFactors(4.8, 4.8)
     turns = "it turns, at 4.8 times the load", doubts, "the given load", factors
     return {
@@ -388,8 +388,8 @@ def test_a_case_without_motion_has_a_report_too(small, unplotted, tmp_path):
     with replace_run(case, folder) as draft:
         files = {"limit.txt": "it stands", "assessment.txt": "right: it moves"}
         files |= answers.Statement(["it stands"], []).as_file("limit")
-        lines = ["note: faces slide; flat", "in doubt: it is so; run"]
-        noted = answers.Statement([], []).with_lines(lines)
+        remarks = ["note: faces slide; flat", Doubt("it is so", "run")]
+        noted = answers.Statement([], []).with_remarks(remarks)
         write_files(files | noted.as_file("assessment"), draft)
     words = " ".join(read_page(af.cases.open_results(folder).report().read_text()).words)
     assert "It stands." in words  # the conclusion

@@ -1029,4 +1029,4 @@ def test_warnings_of_runs_are_no_lines_of_an_answer():
         logger.warning("%s", Doubt("energy drifts by {:.2g}", "", (0.1,)))
         time_history._announce_long_run(6.0, 0.01, 5.0)
         logger.warning("joints slide")
-    assert doubts == ["in doubt: joints slide"]
+    assert doubts == [Doubt("joints slide")]
