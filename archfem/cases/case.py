@@ -4,7 +4,7 @@ Numbers are SI (angles in degrees), or quantities with a unit such as "1.48 MPa/
 a wrong unit or an impossible geometry is an error that names the key and the remedy.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from copy import deepcopy
 from dataclasses import dataclass, field, replace
@@ -14,7 +14,7 @@ from typing import Any
 
 from archfem._files import atomic_write
 from archfem._validation import check_words, declared_keys, validate_arguments
-from archfem.cases import analysis_keys, motion_keys, provenance
+from archfem.cases import analysis_keys, analysis_tables, motion_keys, provenance
 from archfem.cases.analysis_keys import AssessmentSettings, LimitAnalysis, PushoverSettings
 from archfem.cases.analysis_tables import (
     DEAD_LOAD_KEYS,
@@ -45,11 +45,6 @@ from archfem.motion.design_spectra import DesignSpectrum
 from archfem.motion.motion import Motion
 from archfem.motion.suite import Suite
 
-SECTIONS = (
-    *("structure", "materials", "contacts", "model", "motion", "suite", "analysis", "criteria"),
-    *("record", "limit", "pushover", "rating", "assessment", "risk", "dead_load"),
-    *("output", "report"),
-)
 OUTPUT_KEYS: Table = {"joints": [(int, str)], "animation": bool, "free_body": str}
 
 # Who signs what, against which demand: head and conclusion of a report
@@ -142,7 +137,6 @@ class Case:
         if "structure" not in settings and {"case", "cases"} & set(settings):
             raise InvalidInput("this is a study of cases: compute it by `archfem study`")
         _check_sections(settings)
-        refuse_unknown(settings, ("title", "extensions", *SECTIONS))
         provenance.load_extensions_of(settings, folder)
         check_words(settings.get("title", ""), "title", 'write words in quotes: title = "…"')
         output = check_table(settings.get("output", {}), OUTPUT_KEYS, "output")
@@ -343,10 +337,11 @@ def read_settings(path: Path, changes: Sequence[str] = ()) -> dict[str, Any]:
 
 
 @cache
-def _section_keys() -> Mapping[str, frozenset[str]]:
-    """Return the keys of each section whose keys do not depend on others in it."""
-    keys: dict[str, Iterable[str]] = {
-        **SECTION_FIELDS,
+def section_keys() -> Mapping[str, Table]:
+    """Return the keys and kinds of each section whose keys do not depend on others in it."""
+    analysis = analysis_tables.analysis_keys()
+    return {
+        **{name: {key: analysis[key] for key in own} for name, own in SECTION_FIELDS.items()},
         "motion": motion_keys.motion_keys(),
         "suite": motion_keys.suite_keys(),
         "criteria": declared_keys(Criteria),
@@ -360,22 +355,23 @@ def _section_keys() -> Mapping[str, frozenset[str]]:
         "output": OUTPUT_KEYS,
         "report": REPORT_KEYS,
     }
-    return {section: frozenset(own) for section, own in keys.items()}
 
 
 def _check_sections(settings: Table) -> None:
-    """Refuse sections that are no tables, and keys that only other sections have."""
-    for key in SECTIONS:
+    """Refuse sections that are no tables, unknown ones, and keys that only other sections have."""
+    known = section_keys()
+    sections = ("structure", "materials", "contacts", *known)
+    for key in sections:
         if not isinstance(settings.get(key, {}), dict):
             raise InvalidInput(f"{key} = {settings[key]!r} is not a table: write [{key}]")
-    known = _section_keys()
     tables = {"": settings, **{name: settings.get(name, {}) for name in known}}
     for section, table in tables.items():
-        own = known[section] if section else {"title", "extensions", "base", "remove", *SECTIONS}
+        own = known[section] if section else {"title", "extensions", "base", "remove", *sections}
         for key in set(table).difference(own):
             if homes := [f"{name}.{key}" for name, keys in known.items() if key in keys]:
                 place = f"{section}.{key}" if section else key
                 raise InvalidInput(f"unknown key '{place}': it is {' or '.join(homes)}")
+    refuse_unknown(settings, ("title", "extensions", *sections))
 
 
 def _read_report(settings: Table) -> dict[str, str]:

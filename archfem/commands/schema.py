@@ -70,6 +70,8 @@ def build_schema() -> Schema:
     top = {key: _value(kind) for key, kind in STUDY_KEYS.items()} | study
     top |= {"title": {"type": "string", "description": "title of the case, or of the study"}}
     words = _list({"type": "string"})
+    # but those that a module of the user has registered
+    spectra = [each for each in registered_spectra.items() if "archfem" in each[1].__module__]
     top |= {"extensions": words, "base": {"type": "string"}, "remove": words}
     return {
         "$schema": "http://json-schema.org/draft-07/schema#",
@@ -79,7 +81,7 @@ def build_schema() -> Schema:
         "additionalProperties": False,
         "definitions": {
             "motion": _motion(),
-            "spectrum": _any(_spectrum(code) for code in _list_own_spectra()),
+            "spectrum": _any(_spectrum(*each) for each in spectra),
             "criteria": _table_of(Criteria),
             "standing": _parts_by_name(StandingBody),
             "fill": _table(structure_keys.fill_keys(), law=_choice("elastic", "jointed")),
@@ -87,28 +89,32 @@ def build_schema() -> Schema:
     }
 
 
+# Classes and functions with the descriptions and defaults of the keys of a section
+_DECLARATIONS: Mapping[str, Any] = {
+    **dict.fromkeys(analysis_tables.SECTION_FIELDS, Analysis),
+    "suite": Suite,
+    "record": Record,
+    "limit": (analysis_keys.LimitAnalysis, collapse_factor, BodyForce),
+    "pushover": (pushover, BodyForce),
+    "rating": rate,
+    "assessment": kinematic_assessment,
+}
+
+
 def _case_sections() -> dict[str, Schema]:
     """Return the schema of each section of a case."""
-    analysis = _analysis_sections()
-    return analysis | {
+    own = _analysis_values() | _other_values()
+    contact = _table(structure_keys.CONTACT_KEYS, Contact, finish=_choice(*CONDITIONS))
+    tables = {
+        section: _table(keys, _DECLARATIONS.get(section, ()), **own)
+        for section, keys in case.section_keys().items()
+    }
+    described = {
         "structure": _any([*map(_shape, structure_keys.list_shapes()), _partial_structure()]),
         "materials": _by_name(_table(structure_keys.MATERIAL_KEYS, Material)),
-        "contacts": _by_name(
-            _table(structure_keys.CONTACT_KEYS, Contact, finish=_choice(*CONDITIONS))
-        ),
-        "motion": _MOTION,
-        "suite": _table(motion_keys.suite_keys(), Suite, pairs=_by_name(_MOTION), target=_SPECTRUM),
-        "criteria": _CRITERIA,
-        "record": _table_of(Record),
-        "limit": _limit(),
-        "pushover": _pushover(),
-        "rating": _rating(),
-        "assessment": _assessment(),
-        "risk": _risk(),
-        "dead_load": _dead_load(),
-        "output": _table(case.OUTPUT_KEYS),
-        "report": _table(case.REPORT_KEYS),
+        "contacts": _by_name(contact),
     }
+    return described | tables | {"motion": _MOTION, "criteria": _CRITERIA}
 
 
 def _shape(name: str) -> Schema:
@@ -155,12 +161,11 @@ def _partial_structure() -> Schema:
     return {"title": "changes of a base", **_object(merged)}
 
 
-def _analysis_sections() -> dict[str, Schema]:
-    """Return the schemas of [model] and [analysis]."""
-    keys = analysis_tables.analysis_keys()
+def _analysis_values() -> dict[str, Schema]:
+    """Return the schemas of values in [model] and [analysis]."""
     kinds = (schemes.EffectiveDamping, schemes.StiffnessDamping, schemes.Rayleigh)
     damping = _merge_tables(kinds, modes=_choice("effective"))
-    own: dict[str, Schema] = {
+    return {
         "fidelity": _any([_choice(*MODEL_FIDELITIES, "auto"), {"type": "object"}]),
         "displacements": _choice("small", "large"),
         "damping": _any([_choice("effective"), damping]),
@@ -168,9 +173,29 @@ def _analysis_sections() -> dict[str, Schema]:
         "until": _object_by_name(EVENTS, criteria=_CRITERIA),
         "newton": _table_of(Newton),
     }
+
+
+def _other_values() -> dict[str, Schema]:
+    """Return the schemas of words and tables in other sections; a key has one meaning in all."""
+    # names of vehicles are read in any case of letters
+    vehicle = _any([{"type": "string", "examples": [*VEHICLES]}, _table_of(Vehicle)])
+    laws = analysis_keys.FILL_LAWS
     return {
-        section: _table({name: keys[name] for name in names}, Analysis, **own)
-        for section, names in analysis_tables.SECTION_FIELDS.items()
+        "pairs": _by_name(_MOTION),
+        "target": _SPECTRUM,
+        "spectrum": _SPECTRUM,
+        "point": _one_or_several(_table_of(PointLoad)),
+        "friction": _choice(*analysis_keys.FRICTION_LAWS),
+        "fill": _merge_tables(laws.values(), law=_choice(*laws)),
+        "control": _choice("displacement", "arc length", "path", "force"),
+        "stop": _table_of(Stop),
+        "settlement": _table_of(Settlement),
+        "vehicle": _one_or_several(vehicle),
+        "loads": _list(_table_of(AttachedLoad)),
+        "limit_state": _any([{"type": "string"}, _table_of(LimitState)]),
+        "hazard": _table(risk_keys.HAZARD_KEYS, measure=_choice(*MEASURES)),
+        "alternatives": _by_name(_table(risk_keys.ALTERNATIVE_KEYS)),
+        "stages": _any([_choice("none", "usual"), _list(_table_of(Stage))]),
     }
 
 
@@ -188,77 +213,11 @@ def _motion() -> Schema:
     return _table(motion_keys.motion_keys(), Motion.read, **own)
 
 
-def _list_own_spectra() -> list[str]:
-    """Return the codes of the spectra that no module of the user has registered."""
-    return [code for code, cls in registered_spectra.items() if "archfem" in cls.__module__]
-
-
-def _spectrum(code: str) -> Schema:
+def _spectrum(code: str, spectrum: Any) -> Schema:
     """Return the schema of the design spectrum of a code."""
-    spectrum: Any = registered_spectra[code]
     schema = _table(declared_keys(spectrum), spectrum)
     schema["properties"]["code"] = {"const": code}
     return {"title": code, **schema, "required": ["code"]}
-
-
-def _limit() -> Schema:
-    """Return the schema of [limit]."""
-    return _table(
-        analysis_keys.limit_keys(),
-        (analysis_keys.LimitAnalysis, collapse_factor, BodyForce),
-        point=_one_or_several(_table_of(PointLoad)),
-        friction=_choice(*analysis_keys.FRICTION_LAWS),
-        fill=_fill(),
-    )
-
-
-def _fill() -> Schema:
-    """Return the schema of the strength of a fill."""
-    return _merge_tables(analysis_keys.FILL_LAWS.values(), law=_choice(*analysis_keys.FILL_LAWS))
-
-
-def _pushover() -> Schema:
-    """Return the schema of [pushover]."""
-    return _table(
-        analysis_keys.pushover_keys(),
-        (pushover, BodyForce),
-        point=_one_or_several(_table_of(PointLoad)),
-        control=_choice("displacement", "arc length", "path", "force"),
-        stop=_table_of(Stop),
-        settlement=_table_of(Settlement),
-    )
-
-
-def _rating() -> Schema:
-    """Return the schema of [rating]; names of vehicles are read in any case of letters."""
-    vehicle = _any([{"type": "string", "examples": [*VEHICLES]}, _table_of(Vehicle)])
-    return _table(analysis_keys.rating_keys(), rate, vehicle=_one_or_several(vehicle))
-
-
-def _assessment() -> Schema:
-    """Return the schema of [assessment]."""
-    return _table(
-        analysis_keys.assessment_keys(),
-        kinematic_assessment,
-        spectrum=_SPECTRUM,
-        friction=_choice(*analysis_keys.FRICTION_LAWS),
-        fill=_fill(),
-        loads=_list(_table_of(AttachedLoad)),
-        limit_state=_any([{"type": "string"}, _table_of(LimitState)]),
-    )
-
-
-def _risk() -> Schema:
-    """Return the schema of [risk]."""
-    hazard = _table(risk_keys.HAZARD_KEYS, measure=_choice(*MEASURES))
-    alternatives = _by_name(_table(risk_keys.ALTERNATIVE_KEYS))
-    return _table(risk_keys.RISK_KEYS, hazard=hazard, alternatives=alternatives)
-
-
-def _dead_load() -> Schema:
-    """Return the schema of [dead_load]."""
-    stages = _any([_choice("none", "usual"), _list(_table_of(Stage))])
-    return _table(analysis_tables.DEAD_LOAD_KEYS, stages=stages)
 
 
 def _table_of(declaration: Callable[..., Any]) -> Schema:
