@@ -16,7 +16,7 @@ from archfem.models.model import Doubt, Ends, read_doubts, write_doubts
 from archfem.motion.hazard import DESIGN_PERIOD, MEASURES
 from archfem.motion.matching import DEFAULT_BAND
 from archfem.motion.motion import Motion
-from archfem.statics.assessment_checks import AssessmentCheck
+from archfem.statics.assessment_checks import UPPER_BOUND, AssessmentCheck
 from archfem.statics.mechanism_assessment import KinematicAssessment
 from archfem.units import STANDARD_GRAVITY
 
@@ -36,7 +36,7 @@ RESULTS = {
 
 
 # Demand of a push that is compared with none
-NO_DEMAND = "no demand given"
+NO_DEMAND = "compared with no demand in numbers"
 
 
 class Row(NamedTuple):
@@ -60,6 +60,7 @@ class Ratios(NamedTuple):
     linear: bool = False  # whether accelerations are checked, rather than displacements
     moved: float | None = None  # by displacements, of what passes at rest
     bodies: float | None = None  # with one weight a body, where it is less
+    bounded: bool = False  # whether they are upper bounds, by which it fails and does not pass
 
     @property
     def name(self) -> str:
@@ -223,6 +224,7 @@ def state_assessments(
     rows, sentences = [], []
     for (text, _), (check, ratios, directions) in checks.items():
         ways, outcome = " and ".join(directions), check.outcome
+        outcome += f" by {UPPER_BOUND} alone" * (check.passes and check.bounded)
         if check.passes and check.at_rest:
             outcome += ", for the mechanism does not begin to move"
         demand, capacity = (f"{x:.4g} {check.unit}" for x in (check.demand, check.capacity))
@@ -244,7 +246,8 @@ def list_ratios(found: KinematicAssessment) -> list[tuple[AssessmentCheck, Ratio
         moved = check.moved if check.at_rest and not over else None
         bodies = check.bodies if (check.bodies or np.inf) < 0.999 * check.least else None
         needed, linear = over.needed if over else "", check.unit != "m"
-        listed.append((check, Ratios(check.name, (), *ends, needed, linear, moved, bodies)))
+        ratios = Ratios(check.name, (), *ends, needed, linear, moved, bodies, check.bounded)
+        listed.append((check, ratios))
     return listed
 
 

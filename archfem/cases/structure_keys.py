@@ -12,6 +12,7 @@ import json
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass, replace
+from itertools import product
 from math import inf
 from pathlib import Path
 from typing import Any, TypeVar
@@ -27,7 +28,13 @@ from archfem.joints.own_law import JointLaw, build_registered_law, registered_la
 from archfem.masonry.assembly import assembled
 from archfem.masonry.backfill import jointed_fill
 from archfem.masonry.block import Block
-from archfem.masonry.joint_closing import CONDITIONS, FINISHED_KEYS, usual_law, with_finish
+from archfem.masonry.joint_closing import (
+    CONDITIONS,
+    FINISHED_KEYS,
+    find_finish,
+    usual_law,
+    with_finish,
+)
 from archfem.masonry.materials import CONTACT_PRESETS, MATERIAL_PRESETS, STONE, Contact, Material
 from archfem.masonry.shapes import bridges, rings
 from archfem.masonry.shapes.bridge_parts import Arch, Backfill, Paving, Pier, Sidewall
@@ -355,17 +362,21 @@ def _joint_law(table: Table, section: str) -> JointLaw:
 
 def write_structure(structure: Structure) -> dict[str, Any]:
     """Return the sections of a case file that describe a structure to the last bit."""
-    for write in (_write_shape, _write_blocks):
-        names = _PresetNames()
+    found = {joint.contact: find_finish(structure, joint) for joint in structure.joints}
+    finishes = {contact: finish for contact, finish in found.items() if finish}
+    for write, written in product((_write_shape, _write_blocks), [finishes, {}]):
+        names = _PresetNames(written)
         section = write(structure, names)
         if section is None:
             continue
+        for contact in written:  # also one that the shape takes by default
+            names.name_of(contact)
         tables = {"title": structure.name, "structure": section, **names.sections}
         try:
             if cached_structure(tables) == structure:  # which reading the file takes again
                 return tables
         except ArchfemError:  # lengths of one's own shape, or changed after it was made
-            if write is _write_blocks:
+            if write is _write_blocks and not written:
                 raise
     raise InvalidInput(f"structure '{structure.name}' has values that no case file describes")
 
@@ -374,6 +385,7 @@ def write_structure(structure: Structure) -> dict[str, Any]:
 class _PresetNames:
     """Materials and contacts of a structure by the names of their tables."""
 
+    finishes: dict[Contact, str]  # of contacts whose stiffnesses follow from it
     objects: dict[tuple[str, str], Material | Contact] = field(default_factory=dict)
 
     def name_of(self, item: Material | Contact) -> str:
@@ -401,6 +413,9 @@ class _PresetNames:
                     table = {key: x for key, x in table.items() if x != getattr(STONE, key)}
                     table |= {"preset": STONE.name} if name != STONE.name else {}
                 table |= {"name": item.name} if item.name != name else {}
+                if isinstance(item, Contact) and (finish := self.finishes.get(item)):
+                    table = {k: v for k, v in table.items() if k not in FINISHED_KEYS}
+                    table["finish"] = finish
                 sections.setdefault(section, {})[name] = table
         return sections
 

@@ -39,6 +39,9 @@ MAX_RATIO_OF_DISPLACEMENTS = 1.5
 # Names of single changes: the run as given, and that of other time steps
 UNVARIED, HALF_STEP = "unvaried", "half the time step"
 
+# Properties that vary by a factor, in words
+_FACTORS = {"k_n": "normal stiffness", "k_s": "shear stiffness", "damping_ratio": "damping"}
+
 
 @validate_methods
 @dataclass(frozen=True, eq=False, repr=False)
@@ -315,6 +318,12 @@ class VerdictRange(ResultDisplay):
         return conditions
 
     @property
+    def deciding(self) -> tuple[str, ...]:
+        """Properties in words that separate decisive runs from others by more than chance."""
+        names = [each.name for each in self._explained[2]]
+        return tuple(dict.fromkeys(_FACTORS.get(name, property_text(name)) for name in names))
+
+    @property
     def where(self) -> str:
         """The one or two conditions that separate decisive runs from others by more than chance."""
         decisive, conditions = self.decisive[self.answered], self._explained[2]
@@ -428,10 +437,9 @@ def property_text(name: str) -> str:
 
 def _name_change(name: str, value: Any) -> str:
     """Return a property with its changed value in words."""
-    factors = {"k_n": "normal stiffness", "k_s": "shear stiffness", "damping_ratio": "damping"}
-    if name in factors or name == "scale":
+    if name in _FACTORS or name == "scale":
         sign, factor = ("×", value) if value > 1.0 else ("/", 1.0 / value)
-        return f"{factors.get(name, 'motion')} {sign} {factor:.3g}"
+        return f"{_FACTORS.get(name, 'motion')} {sign} {factor:.3g}"
     if name == "friction":
         return f"friction {'+' if value > 0.0 else '-'} {abs(value):.3g}"
     labels = {"sign": f"motion {value}", "dt": HALF_STEP}

@@ -623,11 +623,18 @@ def _list_springer_beds(structure: Structure, springing: Joint) -> list[tuple[fl
 
 def describe_spans(structure: Structure) -> str:
     """Describe the clear span of each ring, and breadth and clear height of piers, in a line."""
-    spans, piers = find_clear_spans(structure), list[str]()
+    spans = find_clear_spans(structure)
     ends = (
         f"from {low:.2f} to {high:.2f} m{f' ({part!r})' if len(spans) > 1 else ''}"
         for part, (low, high) in spans.items()
     )
+    piers = [f"'{part}' {words}" for part, words in describe_piers(structure).items()]
+    return "; ".join([f"clear span {' and '.join(ends)}" if spans else "no ring", *piers])
+
+
+def describe_piers(structure: Structure) -> dict[str, str]:
+    """Describe breadth and clear height of each pier."""
+    piers = dict[str, str]()
     # the beds of a wall in bond are parts of its breadth
     walls = {structure.joints[number].part for number in np.flatnonzero(structure.heads)}
     beds = [j for j in structure.joints if j.role == "pier" and j.part not in walls]
@@ -640,5 +647,5 @@ def describe_spans(structure: Structure) -> str:
             if joint.role == "ring" and part in {parts[number].part for number in joint.blocks}
         ]
         high = f" and {min(clear):.3g} m high to the ring" if clear else ""
-        piers.append(f"'{part}' {min(joint.depth for joint in own):.4g} m broad{high}")
-    return "; ".join([f"clear span {' and '.join(ends)}" if spans else "no ring", *piers])
+        piers[part] = f"{min(joint.depth for joint in own):.4g} m broad{high}"
+    return piers

@@ -115,6 +115,7 @@ class AssessmentCheck:
         over_fill: ratios over all assumptions on a fill; None without one.
         bodies: ratio with one weight for each body that moves as one, at its centroid; None where
             each body has one anyhow.
+        bounded: whether the ratio is an upper bound, by which a check fails and does not pass.
     """
 
     name: str
@@ -126,6 +127,7 @@ class AssessmentCheck:
     source: str
     over_fill: FillRange | None = None
     bodies: float | None = None
+    bounded: bool = False
 
     @property
     def passes(self) -> bool:

@@ -593,6 +593,16 @@ class _Oscillator:
         return found
 
     @property
+    def opens(self) -> bool:
+        """Whether joints that the mechanism keeps closed open or slide on its way."""
+        return self.path is not None and self.holds < len(self.path.factors) - 1
+
+    @property
+    def bounded_at_rest(self) -> bool:
+        """Whether alpha_0 too is an upper bound."""
+        return bool(self.searched or (self.opens and self.holds == 0))
+
+    @property
     def doubts(self) -> list[Doubt]:
         """Why a ratio may be too high: another code's spectrum, a fill left out, other joints."""
         found = self.given.rules.doubt(self.given.spectrum)
@@ -603,7 +613,7 @@ class _Oscillator:
         if self.fill and self.placed.fill is None and self.path is not None:
             words = "the fill counts as weight and mass on the stones, without its pressure on them"
             found.append(Doubt(words, "give fill for it"))
-        if self.path is not None and self.holds < len(self.path.factors) - 1:
+        if self.opens:
             held = abs(float(self.curve["d"][self.holds]))
             late = f"beyond d* = {held:.3g} m", "there the curve"
             place, what = late if self.holds else ("from rest", "the whole curve, and each ratio,")
@@ -632,6 +642,7 @@ class _Oscillator:
         name = f"linear, q = {q:g}, FC = {confidence:g}"
         capacity = q * a_0 / confidence
         source = "Circolare 7/2019, C8.7.1.2.1.5 and C8.7.1.2.1.7, eq. C8.7.1.8"
+        linear = AssessmentCheck(name, capacity, ground, "m/s²", capacity / ground, np.nan, source)
         found = KinematicAssessment(
             structure,
             given.spectrum,
@@ -643,7 +654,7 @@ class _Oscillator:
             d_0,
             secant,
             curve,
-            AssessmentCheck(name, capacity, ground, "m/s²", capacity / ground, np.nan, source),
+            replace(linear, bounded=self.bounded_at_rest),
             displacement,
             given.rules,
             confidence,
@@ -683,5 +694,7 @@ class _Oscillator:
         acceleration = spectral_acceleration(self.given.spectrum, periods, rules.damping)
         demand = float((acceleration * (periods / (2.0 * np.pi)) ** 2).max())
         ratio = max(capacity / demand, starts)
-        period = float(period)
-        return AssessmentCheck(rules.name, capacity, demand, "m", ratio, period, rules.source)
+        found = AssessmentCheck(
+            rules.name, capacity, demand, "m", ratio, float(period), rules.source
+        )
+        return replace(found, bounded=bool(self.bounded_at_rest or (self.opens and ratio > starts)))

@@ -83,6 +83,19 @@ def test_each_rule_can_fail(changes, rule, state):
     assert states(data_of(matched=True, **changes))[rule] == state
 
 
+def test_motions_without_a_target_are_compared_with_the_spectrum_of_the_assessment():
+    """By the same ratios; without a spectrum the table says that there is none."""
+    data = data_of(matched=True, factor=0.5)
+    of_target = motion_rules.check_motions(data)
+    tables = {**data.case.settings, "suite": {**data.case.settings["suite"]}}
+    del tables["suite"]["target"], tables["suite"]["matched"]
+    vars(data)["case"] = af.Case.of({**tables, "assessment": {"spectrum": TARGET}})
+    assert motion_rules.check_motions(data) == of_target
+    vars(data)["case"] = af.Case.of(tables)
+    assert states(data)["mean spectrum over the target"] == "not checked"
+    assert any(check.found == "the case gives none" for check in motion_rules.check_motions(data))
+
+
 def test_other_norms_have_no_rules_here():
     data = data_of(norm="SIA 261")
     assert motion_rules.check_motions(data) == motion_rules.tabulate_checks(data) == []

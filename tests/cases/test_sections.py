@@ -19,6 +19,13 @@ from archfem.dynamics import VerdictRange
 from archfem.models.model import Doubt
 
 
+def made_case(structure, **values):
+    """A made-up case of a report, without demands."""
+    none = {"limit": SimpleNamespace(demand=None), "assessment": SimpleNamespace(spectrum=None)}
+    own = {"title": "piers", "structure": structure, "report": {}, "suite": None, "target": None}
+    return SimpleNamespace(**own | none | values)
+
+
 @pytest.fixture(scope="module")
 def piers():
     """An arch on two piers, 2 m wide."""
@@ -101,7 +108,7 @@ def test_the_doubts_of_several_runs_stand_in_one_table(piers, runs, monkeypatch)
     rows = dict(grid.rows)
     assert rows["steps of 2 to 5 ms are long"] == "first and second"
     assert rows["it slips"] == "second"
-    monkeypatch.setattr(response, "summarise_outcomes", lambda *_: "stands")
+    monkeypatch.setattr(response, "summarise_outcome", lambda *_: "stands")
     (line, *_) = response._build_mechanism(data, made["second"])
     assert "it slips" not in line.text.lower()
     alone = report_data.ReportData(case, {"second": made["second"]})
@@ -180,15 +187,19 @@ def test_the_extremes_of_each_part_are_those_of_its_joints(piers):
 
 
 def test_the_first_lines_of_a_report_have_the_largest_of_all_runs(piers, runs):
-    data = report_data.ReportData(SimpleNamespace(structure=piers, report={}, suite=None), runs)
+    data = report_data.ReportData(made_case(piers), runs)
     facts = dict(conclusion.list_facts(data))
     assert facts["structure"] == f"{len(piers.free)} blocks, {len(piers.joints)} joints"
     assert facts["motions"] == "PGA 0.03 to 0.06 g"
     doubtful = any(run.verdict.doubts for run in runs.values())
     assert facts.get("in doubt") == ("time histories" if doubtful else None)
-    assert facts["verdict"] == "forms no mechanism under 2 of 2 motions"
+    assert facts["verdict"].startswith("It survives: it forms no mechanism under all 2 motions of")
     one = report_data.ReportData(data.case, {"first": runs["first"]})
-    assert dict(conclusion.list_facts(one))["verdict"] == runs["first"].verdict.outcome
+    said = dict(conclusion.list_facts(one))["verdict"]
+    assert said.startswith("It survives: it forms no mechanism under the motion 'first' of PGA")
+    broken = af.History(runs["first"].dataset.assign_attrs(ended="interrupted"), piers)
+    unknown = report_data.ReportData(data.case, {"first": broken})
+    assert dict(conclusion.list_facts(unknown))["verdict"].startswith("It may or may not survive")
     none = report_data.ReportData(data.case, {})
     assert "verdict" not in dict(conclusion.list_facts(none))
 
@@ -208,9 +219,7 @@ def test_the_assumptions_name_the_law_of_the_joints(piers):
 def test_the_pga_of_older_files_is_that_at_their_steps(piers, runs):
     old = af.History(runs["first"].dataset.drop_attrs(), piers)
     old.dataset.attrs |= {k: v for k, v in runs["first"].dataset.attrs.items() if k != "pga"}
-    data = report_data.ReportData(
-        SimpleNamespace(structure=piers, report={}, suite=None), {"only": old}
-    )
+    data = report_data.ReportData(made_case(piers), {"only": old})
     assert dict(conclusion.list_facts(data))["motion"] == "PGA 0.06 g"
 
 
@@ -218,9 +227,7 @@ def test_the_pga_of_a_report_is_that_of_the_motion_and_not_of_the_steps(piers):
     motion = af.Motion(np.array([0.0, 2.0, -1.0, 0.0]), 0.005)
     run = af.time_history(af.build(piers, fidelity="rigid"), motion, dt=0.003)
     assert np.abs(run.dataset["ground"]).max() < 1.9
-    data = report_data.ReportData(
-        SimpleNamespace(structure=piers, report={}, suite=None), {"only": run}
-    )
+    data = report_data.ReportData(made_case(piers), {"only": run})
     assert dict(conclusion.list_facts(data))["motion"] == "PGA 0.20 g"
     del run.dataset.attrs["pga"]  # as in files of older versions
     largest = float(np.abs(run.dataset["ground"][:, 0]).max())
@@ -234,7 +241,7 @@ def test_a_report_of_several_runs_has_a_section_for_each(runs, piers, monkeypatc
     monkeypatch.setattr(response.FigureBlock, "of", lambda figure, caption: caption)
     monkeypatch.setattr(response, "draw_envelopes", lambda *_: [])
     monkeypatch.setattr(response, "build_player", lambda *given: f"one of {given[-1]} players")
-    case = SimpleNamespace(title="piers", structure=piers, suite=None, target=None, report={})
+    case = made_case(piers)
     monkeypatch.setattr(response, "replace", lambda figure, **_: figure)
     one = report_data.ReportData(case, {"first": runs["first"]})
     assert one.dead["N"].values.tolist() == runs["first"].joints["N"].values[0].tolist()
@@ -262,7 +269,7 @@ def test_tables_and_figures_of_all_pairs_say_what_they_show(runs, piers, monkeyp
 
 
 def test_a_mechanism_is_stated_once(runs, piers):
-    """That which moves with its run, those by count in a table at the end; a fall has no size."""
+    """That which moves, or else one by count; a fall has no size."""
     hit = af.limit.Mechanism("local", "arch", (1,), 1.0, names=("joint 1",), duration=0.1)
     found = {}
     for name, mechanisms in (
@@ -275,11 +282,8 @@ def test_a_mechanism_is_stated_once(runs, piers):
     data = report_data.ReportData(SimpleNamespace(structure=piers, suite=None), found)
     (text,) = response._build_mechanism(data, found["first"])
     assert "Mechanism: verified, local mechanism of arch at 2.000 s by joint 1" in text.text
-    (grid,) = response.build_joint_section(data).pieces
-    ((name, needed, said),) = grid.rows
-    assert (name, needed) == ("any joints at once", "of any rings and piers together")
-    assert said.startswith("first: local mechanism of arch at 1.000 s by joint 1;")
-    assert said.endswith("; second: none")
+    other = SimpleNamespace(mechanisms={"verified": None, "any joints at once": hit})
+    assert conclusion.describe_mechanism(other).startswith("by any joints at once, local mech")
     (row, *_) = (row for _, row in conclusion._capacity_rows(data))
     assert row[2] == "fallen in 2 of 2 runs"
 
@@ -425,7 +429,7 @@ def test_motions_of_a_suite_are_shown_before_they_were_scaled_and_reduced(monkey
     monkeypatch.setattr(response.FigureBlock, "of", lambda figure, caption: caption)
     motion = af.Motion(np.array([0.0, 1.0, -0.5]), 0.01)
     for given, factor in (({}, 1.0), ({"scale": 1.5, "reduction": 4.0}, 4.0 / 1.5)):
-        data = SimpleNamespace(case=SimpleNamespace(suite=given, target=None), cut_motions=[])
+        data = SimpleNamespace(case=made_case(None, suite=given), cut_motions=[])
         (caption,) = response._build_spectra(data, [motion])
         assert seen[-1].pairs[0].horizontal == pytest.approx(factor * motion.horizontal)
         assert (seen[-1].scale, seen[-1].reduction) == (
@@ -434,9 +438,12 @@ def test_motions_of_a_suite_are_shown_before_they_were_scaled_and_reduced(monkey
         )
         assert ("R = 4;" in caption) == ("reduction" in given)
     for matched in (True, False):
-        case = SimpleNamespace(suite={"matched": matched}, target="some")
-        data = SimpleNamespace(case=case, cut_motions=[])
-        assert len(response._build_spectra(data, [motion])) == (1 if matched else 2)
+        case = made_case(None, suite={"matched": matched}, target="some")
+        (caption,) = response._build_spectra(SimpleNamespace(case=case, cut_motions=[]), [motion])
+        assert caption.endswith("; they were not matched to the target") != matched
+    case.assessment.spectrum, case.target = "another", None
+    (caption,) = response._build_spectra(SimpleNamespace(case=case, cut_motions=[]), [motion])
+    assert caption.endswith(", which is the spectrum of [assessment]")
 
 
 def test_sentences_begin_with_a_capital_and_end_with_one_stop():

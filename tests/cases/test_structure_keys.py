@@ -12,6 +12,7 @@ from archfem.cases.defaults import list_defaults
 from archfem.cases.report.inputs import tabulate_inputs
 from archfem.cases.report.report_data import ReportData
 from archfem.cases.structure_keys import build_structure, write_structure
+from archfem.masonry import with_finish
 
 RING = Path(__file__).parents[2] / "meshes" / "ring.toml"
 BRIDGES = [
@@ -277,9 +278,17 @@ def test_a_finish_is_read_and_written():
     law = af.joint_stiffness(30e9, 0.5, "dressed", strength=20e6).closing_contact(0.7)
     assert {joint.contact for joint in ring.joints} == {law}
     assert build_structure(RING_OF_20_MPA).joints[0].contact.closure is None
-    tables = write_structure(ring)
-    assert tables["structure"]["shape"] == "circular_arch"
-    assert build_structure(tables) == ring
+    for structure in (ring, with_finish(build_structure(RING_OF_20_MPA), "dressed")):
+        tables = write_structure(structure)
+        assert tables["structure"]["shape"] == "circular_arch"
+        assert tables["contacts"]["stone to stone"]["finish"] == "dressed"
+        assert "normal_stiffness" not in tables["contacts"]["stone to stone"]
+        assert build_structure(tables) == structure
+    # a stiffness of its own is none of a finish
+    own = [replace(j, contact=replace(law, normal_stiffness=1e9)) for j in ring.joints]
+    tables = write_structure(replace(ring, joints=tuple(own)))
+    assert tables["contacts"]["stone to stone"]["normal_stiffness"] == 1e9
+    assert build_structure(tables).joints == tuple(own)
 
 
 @pytest.mark.parametrize(

@@ -377,6 +377,7 @@ def test_a_wedge_of_a_wall_in_bond_has_the_linear_check_alone(wedge, verified):
     assert first.startswith("alpha_0 is an upper bound, the least that a search")
     assert f"its linear ratio is e* = {share:.3g} times that of this one" in second
     assert all(UPPER_BOUND in doubt.values for doubt in found.doubts)
+    assert found.linear.bounded
     assert "nan" not in str(found) + found.table()
     assert "NTC-2018 SLV" not in str(found)
 
@@ -621,10 +622,11 @@ def test_notes_tell_where_the_curve_is_an_upper_bound(ring):
     """From the last place but one on, and of a factor that is less by a thousandth."""
     placed = mechanism_assessment.PlacedBlocks.at_rest(RING, (), 1.0)
     last, factor = len(ring.path.factors) - 1, ring.path.mechanisms[0].factor
-    for holds, share, said in (
-        (last, 0.9995, []),
-        (last - 1, 0.9995, ["beyond d* = "]),
-        (last, 0.99895, ["sliding that dilates"]),
+    for holds, share, said, bounded in (
+        (last, 0.9995, [], (False, False)),
+        (last - 1, 0.9995, ["beyond d* = "], (False, False)),
+        (0, 0.9995, ["from rest joints open"], (True, True)),
+        (last, 0.99895, ["sliding that dilates"], (False, False)),
     ):
         rules = ring.limit_state, ring.confidence_factor, 2.0
         given = mechanism_assessment._Search(
@@ -633,6 +635,15 @@ def test_notes_tell_where_the_curve_is_an_upper_bound(ring):
         oscillator = mechanism_assessment._Oscillator(given, placed, ring.path, holds, False)
         notes = [*oscillator.notes(share * factor), *oscillator.doubts]
         assert all(str(x).startswith(start) for x, start in zip(notes, said, strict=True))
+        checks = oscillator.assess().checks
+        assert tuple(check.bounded for check in checks) == bounded
+    # at rest the start decides, which the curve beyond it does not change
+    longer = replace(ring.limit_state, share=0.99, secant_share=0.2, damping=0.5)
+    for rules, rests in ((ring.limit_state, True), (longer, False)):
+        other = replace(oscillator, holds=last - 1, given=replace(given, rules=rules))
+        check = other.assess().displacement
+        assert check.at_rest == rests
+        assert check.bounded is not rests  # a bool, which files hold
 
 
 @pytest.mark.parametrize(("limit_state", "count"), [("NTC-2018 SLV", 1), (OWN, 0)])

@@ -3,18 +3,17 @@
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from hashlib import sha256
-from importlib import import_module
 from typing import Any
 
 import numpy as np
 
 from archfem._files import group_of, read_file_list
 from archfem.cases import result_text
-from archfem.cases.answers import NO_DEMAND, RESULTS, Ratios, Row, read_numbers
+from archfem.cases.answers import RESULTS, Ratios, Row, read_numbers
 from archfem.cases.case import REPORT_KEYS
 from archfem.cases.report.doubts import (
     HISTORIES,
+    MAX_RATIO_OF_PEAKS,
     VARIATIONS,
     list_checks,
     list_decisive_doubts,
@@ -26,7 +25,7 @@ from archfem.cases.report.doubts import (
     read_spectrum,
 )
 from archfem.cases.report.report_data import SCALES_ACROSS, SHOWN_RESULTS, ReportData
-from archfem.cases.report.scales import describe_scales, say_first_failure, say_fragile
+from archfem.cases.report.scales import describe_scales, find_first_failures, say_fragile
 from archfem.cases.report.study_findings import read_study, say_what_changes
 from archfem.cases.result_text import PushFactors, peak_of_spectrum, site_acceleration
 from archfem.cases.run import CASE_FILE
@@ -44,22 +43,17 @@ from archfem.models.model import Doubt, Ends
 from archfem.units import STANDARD_GRAVITY, format_mm
 from archfem.view.pages.document import Grid, Section, TextBlock
 
-# Outcomes of runs as verbs, the worst first; small displacements end where blocks begin to move
+# Outcomes of runs as verbs and in plain words, the worst first; small displacements end where
+# blocks begin to move
 _VERBS = {
-    "fallen": "falls",
-    "partly fallen": "falls in part",
-    "mechanism": "becomes a mechanism",
-    "dislocated": "is dislocated but stands",
-    "stands": "stands",
-    "no mechanism": "forms no mechanism",
-    "unknown": "has no known outcome",
+    "fallen": ("falls", "does not survive"),
+    "partly fallen": ("falls in part", "does not survive"),
+    "unknown": ("has no known outcome", "may or may not survive"),
+    "mechanism": ("becomes a mechanism", "may or may not survive"),
+    "dislocated": ("is dislocated but stands", "survives with damage"),
+    "stands": ("stands", "survives"),
+    "no mechanism": ("forms no mechanism", "survives"),
 }
-
-
-def describe_origin(data: ReportData) -> str:
-    """Return version of the program and digest of the case, in one line."""
-    digest = sha256(data.case.text().encode()).hexdigest()[:12]
-    return f"report of archfem {import_module('archfem').__version__} · case {digest}"
 
 
 # Doubts of a result that the conclusion states; the others stand in the section of the result
@@ -78,17 +72,14 @@ SECTIONS = {
 # Fidelity of the variations of a verdict
 VARIED_FIDELITY = "rigid"
 
-# Vehicles that the head of a report names one by one
-MAX_VEHICLES = 3
-
 # Results with a margin, which is made of the numbers of their rows
 _NUMBERED = {"limit", "pushover", "assessment", "scale"}
 
 # What commands keep of results that they have not finished
-_BEGUN = {RESULTS["risk"]: "risk_samples.nc", RESULTS["verdict_range"]: "variations"}
+_BEGUN = {RESULTS["risk"]: "risk_samples.nc"}
 
-# Demand of a push beside one that the report states in words
-UNCOMPARED = "not compared with the demand, which [limit] does not give"
+# What is known below the least push that a search has found, if nothing is
+NO_PROOF = "may begin at any less, as no lower bound is known"
 
 # Project in the templates of new cases
 PLACEHOLDER = "Name of the project"
@@ -110,76 +101,87 @@ def list_facts(data: ReportData) -> list[tuple[str, str]]:
     ]
     runs, structure = list(data.runs.values()), data.case.structure
     blocks = [("structure", f"{len(structure.free)} blocks, {len(structure.joints)} joints")]
-    blocks += [("joints", structure.assessment)] if structure.assessment else []
     doubtful = list_decisive_doubts(data, list_doubts(data))
     doubts = [("in doubt", ", ".join(doubtful))] if doubtful else []
-    if not runs:
-        verdict = "; ".join([*_say_checks(data), *_say_factors(data)])
-        verdicts = [("verdict", verdict)] if verdict else []
-        return [*signed, *verdicts, *_list_ratings(data), *doubts, *blocks]
-    peak = [("motions" if len(runs) > 1 else "motion", _describe_peaks(runs))]
-    did, *others = summarise_outcomes(data, runs).split("; ")
-    did = ", ".join([did, *_say_movement(data)])
-    ranges = [x for x in data.verdict_ranges if x.decisive.any()] if len(runs) > 1 else []
-    ranges.sort(key=lambda x: (x.falls.sum(), x.dislocated.sum()))
-    others += [f"{x.count} under '{x.dataset.attrs.get('motion')}'" for x in ranges[-1:]]
-    verdict = "; ".join([did, *others, *say_fragile(data), *_say_checks(data)])
-    return [*signed, ("verdict", verdict), *doubts, *blocks, *peak]
+    verdict = " ".join(map(sentence, _say_plainly(data, doubtful)))
+    verdicts = [("verdict", verdict)] if verdict else []
+    peak = [("motions" if len(runs) > 1 else "motion", _describe_peaks(runs))] if runs else []
+    return [*signed, *verdicts, *doubts, *blocks, *peak]
 
 
-def _say_factors(data: ReportData) -> Iterator[str]:
-    """Yield the factors of results without runs; those of checks and vehicles are said apart."""
-    for result, row in _capacity_rows(data):
-        said = result in (RESULTS["assessment"], RESULTS["rating"])
-        if said or (row.factor == "-" and row.demand != _say_uncompared(data)):
-            continue
-        text = f"{row.demand}: {row.outcome}" + f", factor {row.factor}" * (row.factor != "-")
-        is_push = row.numbers.get("site")
-        yield f"a push begins to move it at {row.factor} times {row.demand}" if is_push else text
-
-
-def _list_ratings(data: ReportData) -> Iterator[tuple[str, str]]:
-    """Yield each vehicle with its outcome, or of many those that have each outcome."""
-    stated = data.statements.get("rating")
-    rows = [row for row in stated.rows if row.factor != "-"] if stated else []
-    outcomes: dict[str, list[Row]] = {}
-    for row in rows:
-        outcomes.setdefault(row.numbers.get("outcome", row.outcome), []).append(row)
-    for outcome, same in outcomes.items():
-        vehicles = [(row.demand, f"{outcome}, factor {row.factor}") for row in same]
-        if len(rows) > MAX_VEHICLES:
-            listed = join_words([f"{row.demand} ({row.factor})" for row in same])
-            vehicles = [(outcome, listed)]
-        yield from vehicles
-
-
-def _say_movement(data: ReportData) -> Iterator[str]:
-    """Yield how far the structure moves where it does not fall, and at which scale it falls."""
-    verdicts = [run.verdict for run in data.runs.values()]
-    sizes = [x.displacement for x in verdicts if x.outcome in COLLAPSE_STATES[:2]]
-    if sizes and np.isfinite(sizes).all():
-        yield f"moves by {Ends.of(sizes):mm}"
-    yield from say_first_failure(data)
-
-
-def _say_checks(data: ReportData) -> Iterator[str]:
-    """Yield whether the checks of an assessment and across the plane are met, and by how much."""
-    for check in list_checks(data):
-        ratios = [x for x in (check.least, check.most, check.moved, check.bodies) if x is not None]
-        met, by = "is met", f"{Ends.of(ratios):.3g} × the spectrum"
-        if check.needed:
-            met = "is not met under some assumptions on the fill"
-        elif check.least < 1.0:
-            met = "is not met"
-        elif check.by_split:
-            met = "is met or not by the split of weights"
-        elif check.moved is not None:
-            moves = _say_motion(data, check.least, peak_of_spectrum(data.case))
-            met = "is met at rest" + " alone, and it moves" * bool(moves)
-            by = f"{check.moved:.3g} by displacements"
-        kind = "check" if check.linear else "displacement check"
-        yield f"the {kind} of {check.name} {met} ({by})"
+def _say_plainly(data: ReportData, doubtful: Sequence[str]) -> Iterator[str]:
+    """Yield the answer for a client: whether it survives, from where on not, and what decides."""
+    if data.runs:
+        yield from _say_survival(data, doubtful)
+        if failures := [f"{does} at {p[0]:.2g} g" for does, p, _ in find_first_failures(data)]:
+            yield f"it {join_words(failures[::-1])}"  # the least first
+        elif "scale" not in data.statements:
+            yield "from which acceleration on it falls was not computed"
+        yield from say_fragile(data)
+        yield _say_what_decides(data.verdict_ranges)
+    for found in dict.fromkeys(_judge_checks(data)):  # of each direction
+        yield f"by the kinematic assessment it {found} {name_spectrum(data)}"
+    for name, stated in data.statements.items():
+        pushes = [x for x in read_numbers(PushFactors, stated) if x.site and not data.runs]
+        yield from (next(_describe_push(data, name, push)) for push in pushes)
+        for row in [] if pushes or name in ("assessment", "scale") else stated.rows[:1]:
+            times = f", at {row.factor} times {row.demand}" * (name != "risk" and row.factor != "-")
+            if not data.runs or name in ("rating", "risk"):
+                yield f"{row.result}: {row.outcome}{times}"
     yield from (f"it first falls at {text}" for x, text in sorted(_say_across(data))[:1] if x <= 1)
+    if not data.falls_across and _build_transverse(data):
+        push, demand = data.case.structure.transverse_push[0], _largest_demand(data)
+        falls = f", where it may overturn from {push:.2g} g on" * (push < demand)
+        yield f"across the plane of the drawing it was not checked{falls}"
+
+
+def _say_survival(data: ReportData, doubtful: Sequence[str]) -> Iterator[str]:
+    """Yield whether it survives the motions, and how often with other properties."""
+    verdicts = [run.verdict for run in data.runs.values()]
+    outcomes = {"unknown" if x.incomplete else x.outcome for x in verdicts}
+    answer = next(words for outcome, (_, words) in _VERBS.items() if outcome in outcomes)
+    in_doubt = " (in doubt, as below)" * (HISTORIES in doubtful)
+    sizes = [x.displacement for x in verdicts if x.outcome in COLLAPSE_STATES[:2]]
+    known = bool(sizes) and np.isfinite(sizes).all()
+    moved = f", and moves by {Ends.of(sizes):mm}" if known else ""
+    yield f"it {answer}{in_doubt}: it {'; it '.join(_describe_outcomes(data))}{moved}"
+    ranges = sorted(data.verdict_ranges, key=lambda x: (x.falls.sum(), x.dislocated.sum()))
+    for found in ranges[-1:]:
+        motion = found.dataset.attrs.get("motion")
+        under = f", under '{motion}'" * (len(data.runs) > 1 and bool(motion))
+        yield f"with other plausible properties it {found.count}{under}"
+
+
+def _say_what_decides(ranges: Sequence[VerdictRange]) -> str:
+    """Say which of the properties that were varied decides, or displaces it most."""
+    names = [name for each in ranges if each.is_mixed for name in each.deciding]
+    if names:
+        return f"of what was varied, {join_words([*dict.fromkeys(names)])} decides"
+    for found in ranges:
+        changes = [each for each in found.single_changes if each.outcome in COLLAPSE_STATES[:2]]
+        given = [each for each in changes if each.name == UNVARIED]
+        if given and changes[0] is not given[0]:
+            most, own = (format_mm(found.measure(each)) for each in (changes[0], given[0]))
+            ends = f"{most} in place of {own}" + " at the end" * found.is_dislocation_worst
+            return f"of what was varied, {changes[0].name} displaces it most: {ends}"
+    return "no property that was varied decides" if ranges else "no property was varied"
+
+
+def _judge_checks(data: ReportData) -> Iterator[str]:
+    """Yield whether the structure withstands the spectrum, by each check of an assessment."""
+    for check in list_checks(data):
+        if check.needed:
+            yield "does not withstand under some assumptions on the fill"
+        elif check.least < 1.0:
+            yield "does not withstand"
+        elif check.by_split:
+            yield "withstands or not, by the split of weights,"
+        elif check.bounded:
+            yield "is not shown to withstand, as the ratio is an upper bound,"
+        elif check.moved and _say_motion(data, check.least, peak_of_spectrum(data.case)):
+            yield "withstands at rest alone, and moves in the runs,"
+        else:
+            yield "withstands"
 
 
 def _describe_peaks(runs: Iterable[History]) -> str:
@@ -187,21 +189,15 @@ def _describe_peaks(runs: Iterable[History]) -> str:
     return f"PGA {Ends.of(map(peak_of_ground, runs)):.2f} g"
 
 
-def summarise_outcomes(data: ReportData, runs: Sequence[History]) -> str:
-    """Return outcome, and doubts or range, of a run, or how many runs have each outcome."""
-    if len(runs) > 1:
-        counts = Counter(run.verdict.outcome for run in runs)
-        words = ", ".join(
-            f"{verb} under {counts[outcome]}" for outcome, verb in _VERBS.items() if counts[outcome]
-        )
-        return f"{words} of {len(runs)} motions"
-    own = runs[0].dataset.attrs.get("motion")
+def summarise_outcome(data: ReportData, run: History) -> str:
+    """Return the outcome of a run, with its doubts or its range."""
+    own = run.dataset.attrs.get("motion")
     ranges = {each.dataset.attrs.get("motion"): each for each in data.verdict_ranges}
     found = ranges.get(own)
     if found is None and len(data.runs) == 1:  # a range over several motions has no name
         found = next(iter(ranges.values()), None)
     # lost blocks have a line of their own, and the conclusion says what was not varied
-    text = runs[0].verdict.brief
+    text = run.verdict.brief
     return text if found is None else f"{text}; {found.count}{found.unanswered}"
 
 
@@ -221,8 +217,7 @@ def build_conclusion(data: ReportData) -> Section:
         fails = row.numbers.get("most", 1.0) < 1.0
         in_doubt = " (in doubt)" * (result in (decisive if fails else doubtful))
         rows.append((*row[:2], f"{row.outcome}{in_doubt}", row.factor))
-    demand = data.case.report.get("demand", "")
-    blocks: list[Any] = [TextBlock(sentence(f"demand, as stated: {demand}"))] if demand else []
+    blocks: list[Any] = _tabulate_demands(data)
     for lead, texts in _build_paragraphs(data, decisive).items():
         sentences = [*map(sentence, texts)]
         if data.statements.keys() != {"rating"}:  # of a result that stands alone each is one
@@ -246,18 +241,55 @@ def build_conclusion(data: ReportData) -> Section:
     return Section("Conclusion", [*blocks, _build_signatures(data.case.report)])
 
 
+def _list_demands(data: ReportData) -> Iterator[tuple[str, Ends, str, list[str]]]:
+    """Yield each demand of an earthquake: name, peaks [g], source in the case, and results."""
+    case, limit = data.case, data.case.limit.demand
+    pushes = [RESULTS[name] for name in ("limit", "pushover") if name in data.statements]
+    if data.runs:
+        vertical = max(np.abs(x.dataset["ground"][:, 1]).max().item() for x in data.runs.values())
+        vertical /= STANDARD_GRAVITY
+        also = f", with vertical ones of up to {vertical:.2g} g" * bool(vertical)
+        peaks, source = map(peak_of_ground, data.runs.values()), "[suite]"
+        used = ["time histories, and what varies or scales them"]
+        yield f"motions{also}", Ends.of(peaks), source if case.suite else "[motion]", used
+    if limit is not None:
+        yield "push", Ends.of([limit / STANDARD_GRAVITY]), "[limit]", pushes
+        pushes = []
+    if np.isfinite(spectrum := peak_of_spectrum(case)):
+        source = "[assessment]" if case.assessment.spectrum else "[suite], its target"
+        used = [*[RESULTS["assessment"]] * ("assessment" in data.statements), *pushes]
+        yield f"{read_spectrum(data)['code']} spectrum", Ends.of([spectrum]), source, used
+
+
+def _tabulate_demands(data: ReportData) -> list[Grid]:
+    """Tabulate the demands with their sources; none where the capacities have a single one."""
+    found, text = [each for each in _list_demands(data) if each[-1]], data.case.report.get("demand")
+    rows = [("as stated", text, "[report]", "none, for words are not compared")] if text else []
+    rows += [(name, f"PGA {p:.3g} g", source, join_words(x)) for name, p, source, x in found]
+    peaks = [peak for _, ends, *_ in found for peak in ends]
+    differ = bool(peaks) and max(peaks) > MAX_RATIO_OF_PEAKS * min(peaks)
+    caption = "Demands of an earthquake" + "; a margin on one is none on another" * differ
+    head = ("demand", "horizontal", "source in the case", "of which results")
+    return [Grid(head, rows, caption, "words")] if rows[1:] or text else []
+
+
 def _build_transverse(data: ReportData) -> list[TextBlock]:
     """Build the paragraph on what is not checked across the plane, for results of earthquakes."""
     if not data.runs and not data.statements.keys() - {"rating", "thickness"}:
         return []
     text, (push, _) = data.case.structure.transverse_remark, data.case.structure.transverse_push
-    peaks = [0.0, *map(peak_of_ground, data.runs.values()), site_acceleration(data.case)]
-    demand = float(np.nanmax(peaks))
-    text += f"; the demand of {demand:.3g} g is {demand / push:.2g} times that" * (push < demand)
+    demand = _largest_demand(data)
+    if push < demand:
+        text += f"; the largest demand, {demand:.3g} g, is {demand / push:.2g} times that"
     if data.falls_across:
         text = text.removeprefix("nothing is checked across the plane of the drawing: ")
     manner = "doubt" if push < demand else "plain"
     return [TextBlock(sentence(text), manner, lead="Across its plane?")]
+
+
+def _largest_demand(data: ReportData) -> float:
+    """Return the largest peak acceleration of all demands [g]; 0 without any."""
+    return max((ends[-1] for _, ends, *_ in _list_demands(data)), default=0.0)
 
 
 def _list_outdated(data: ReportData) -> Iterator[str]:
@@ -292,7 +324,8 @@ def _list_outdated(data: ReportData) -> Iterator[str]:
 
 def _build_paragraphs(data: ReportData, doubtful: Sequence[str]) -> dict[str, list[str]]:
     """Return the sentences of the answer by their leads: outcomes, margin, what may change it."""
-    answer = [*_say_answer(data)]
+    failures = [words for *_, words in find_first_failures(data)]
+    answer = [f"it {join_words(failures)}"] if failures else []
     if not data.runs:
         # an assessment is stated by the margin; a result that stands alone states all of itself
         stated = [each.sentences for name, each in data.statements.items() if name != "assessment"]
@@ -313,20 +346,10 @@ def _build_paragraphs(data: ReportData, doubtful: Sequence[str]) -> dict[str, li
     if given and not data.runs and not {"scale", "risk"} & data.statements.keys():
         changes.append(f"no motion was run, though [{given[0]}] is in the case")
     return {
-        "Does it stand?" if data.runs else "Result:": answer,
-        "By which margin?": [*_describe_margin(data), *_say_vertical(data)],
+        "From where on, and how often?" if data.runs else "Result:": answer,
+        "By which margin?": [*_describe_margin(data)],
         "What would change the answer?": changes,
     }
-
-
-def _say_answer(data: ReportData) -> Iterator[str]:
-    """Yield the answer in one sentence: outcomes, displacements, first fall, and checks."""
-    done = [*_describe_outcomes(data)]
-    moved = ", ".join(_say_movement(data)) if done else ""
-    joint = ", " if len(done) == 1 else "; it "
-    text = "; it ".join(done) + f"{joint}{moved}" * bool(moved)
-    clauses = [*([f"the structure {text}"] if done else []), *say_fragile(data), *_say_checks(data)]
-    yield from ["; ".join(clauses)] if clauses else []
 
 
 def _describe_ranges(ranges: Sequence[VerdictRange]) -> Iterator[str]:
@@ -363,9 +386,6 @@ def _describe_margin(data: ReportData) -> Iterator[str]:
     for name in (x for x in ("limit", "pushover") if x in data.statements):
         for push in read_numbers(PushFactors, data.statements[name]):
             yield from _describe_push(data, name, push) if push.site else ()
-        for row in data.statements[name].rows:
-            if row.factor == "-" and data.runs:  # without runs it is the answer
-                yield f"{row.result}, {_say_uncompared(data)}: {row.outcome}"
 
 
 def _say_across(data: ReportData) -> Iterator[tuple[float, str]]:
@@ -377,14 +397,6 @@ def _say_across(data: ReportData) -> Iterator[tuple[float, str]]:
             yield first.scale, f"{first.scale:#.3g} × '{name}', {peak}: {body}"
 
 
-def _say_uncompared(data: ReportData) -> str:
-    """Say with which demand a push is not compared, and why."""
-    demand = data.case.limit.demand
-    if demand is not None:
-        return f"not compared with the demand of {demand / STANDARD_GRAVITY:.3g} g"
-    return UNCOMPARED if data.case.report.get("demand") else NO_DEMAND
-
-
 def _describe_push(data: ReportData, name: str, push: PushFactors) -> Iterator[str]:
     """Yield at which multiple of the site's acceleration a push begins to move a structure."""
     elastic = name == "pushover"
@@ -392,11 +404,15 @@ def _describe_push(data: ReportData, name: str, push: PushFactors) -> Iterator[s
     bounded = push.proved is not None  # the least found, without proof that none is less
     of = " with elastic joints" if elastic else " as rigid blocks" * bounded
     over = " over what is assumed of the fill" * (push.most > push.least)
-    size = f"a push of {'at most ' * bounded}{push} times {push.site}{over}"
+    size = f"{Ends((push.least, push.most)):.3g} times {push.site}{over}"
+    text = f"pushed sideways{of} it begins to move at {size}"
+    if bounded:
+        text += ", the least that a search found, and "
+        text += f"is proved to stand up to {push.proved:.3g} times" if push.proved else NO_PROOF
     if moves and push.least >= 1.0:  # shaken it moves before
-        yield f"{size}{of} is no margin: {moves}"
+        yield f"{text}; that is no margin: {moves}"
         return
-    yield f"{size} begins to move it{of}, which is no collapse"
+    yield f"{text}; to move is no collapse"
     if then := moves if data.runs else "shaken it may begin to move at less":
         yield then
 
@@ -412,6 +428,8 @@ def _describe_check(data: ReportData, check: Ratios) -> tuple[float, list[str]]:
     fails = f", passed only with {check.needed}" if check.needed else ""
     fails = fails or ", which it fails" * (check.least < 1.0)
     fails = fails or ", which it fails with one weight a body" * check.by_split
+    bound = ", an upper bound: motions of this spectrum under which it stands would show it"
+    fails = fails or bound * check.bounded
     ends = f"{Ends((check.least, check.most)):.3g}"
     texts = [f"{ends}{over}{check.beside}, {by}{fails}"]
     if check.moved is not None:
@@ -433,16 +451,6 @@ def _say_motion(data: ReportData, factor: float, site: float) -> str:
     held = all(verdict.outcome in COLLAPSE_STATES[:2] for verdict in verdicts)
     of = f" of up to {push:.2f} g" * (len(runs) < len(data.runs))
     return f"in the runs{of} it moves{', and falls in none' * held}"
-
-
-def _say_vertical(data: ReportData) -> Iterator[str]:
-    """Say that runs have a vertical motion, where results beside them leave it out."""
-    checks = [RESULTS[x] for x in ("limit", "assessment", "pushover") if x in data.statements]
-    peaks = [np.abs(run.dataset["ground"].values[:, 1]).max() for run in data.runs.values()]
-    if checks and max(peaks, default=0.0) > 0.0:
-        size = f"{max(peaks) / STANDARD_GRAVITY:.2f} g"
-        text = f"the runs have a vertical motion too, of up to {size}; {join_words(checks)} "
-        yield text + ("have none" if checks[1:] else "has none")
 
 
 def name_spectrum(data: ReportData) -> str:
@@ -490,12 +498,7 @@ def _capacity_rows(data: ReportData) -> Iterator[tuple[str, Row]]:
     for result, statement in data.statements.items():
         of = f" of {name_spectrum(data)}" if result == "assessment" else ""
         for row in statement.rows:
-            demand = f"{row.demand}{of}"
-            if row.demand == NO_DEMAND:
-                demand = _say_uncompared(data)
-                peaks = _describe_peaks(data.runs.values()) if data.runs else ""
-                demand += f"; beside it motions of {peaks}" * bool(peaks)
-            yield RESULTS[result], row._replace(demand=demand)
+            yield RESULTS[result], row._replace(demand=f"{row.demand}{of}")
 
 
 def _list_ranges_of_steps(data: ReportData) -> Iterator[str]:
@@ -516,7 +519,7 @@ def _list_ranges_of_steps(data: ReportData) -> Iterator[str]:
 
 def _describe_outcomes(data: ReportData) -> Iterator[str]:
     """Yield each outcome with the motions that lead to it, and the largest displacement."""
-    for outcome, verb in _VERBS.items():
+    for outcome, (verb, _) in _VERBS.items():
         names = [name for name, run in data.runs.items() if run.verdict.outcome == outcome]
         if not names:
             continue
@@ -543,11 +546,10 @@ def _describe_ends(data: ReportData) -> Iterator[str]:
 
 
 def describe_mechanism(verdict: Any) -> str:
-    """Return the first mechanism of a run in a few words."""
+    """Return the first mechanism of a run, verified or by another definition."""
     for definition in ("verified", *verdict.mechanisms):
         if (found := verdict.mechanisms.get(definition)) is not None:
-            words = "verified" if definition == "verified" else f"by {definition}"
-            return f"{found.kind}, {words} at {found.time:.2f} s"
+            return f"{'by ' * (definition != 'verified')}{definition}, {found}"
     return "none by any definition"
 
 

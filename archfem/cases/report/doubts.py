@@ -2,15 +2,16 @@
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from archfem._files import read_sealed_json
 from archfem.cases.answers import RESULTS, Ratios, read_numbers
 from archfem.cases.report.motion_rules import note_checks
 from archfem.cases.report.report_data import ReportData
 from archfem.cases.report.study_findings import list_studied, read_study
-from archfem.cases.result_text import peak_of_spectrum
 from archfem.dynamics.collapse_state import COLLAPSE_STATES, FALLEN_STATES, RANGE_REMEDY
 from archfem.dynamics.history import History
 from archfem.dynamics.verdict_range import MAX_RATIO_OF_DISPLACEMENTS, VerdictRange
@@ -46,9 +47,20 @@ def list_doubts(data: ReportData) -> list[tuple[str, Doubt]]:
     if ranges and (fill := list_elastic_fill(data)):
         text = f"variations take {', '.join(fill)} as rigid: as an elastic body it was not varied"
         doubts.append((VARIATIONS, Doubt(text)))
+    doubts += [(VARIATIONS, Doubt(words)) for words in _list_unfinished(data)]
     for name, stated in data.statements.items():
         doubts += [(RESULTS[name], doubt) for doubt in _merge_motions(stated.doubts)]
     return doubts
+
+
+def _list_unfinished(data: ReportData) -> Iterator[str]:
+    """Yield how many runs of a verdict, and of a study in the folder, were finished, if not all."""
+    for command, place in {"verdict": "variations", "study": ""}.items():
+        path = (data.folder or Path()) / place / "progress.json"
+        if data.folder and path.is_file():
+            progress = read_sealed_json(path, "progress")
+            if (done := progress["done"]) < (total := progress["total"]):
+                yield f"unfinished: {done} of {total} runs; run `archfem {command}` again"
 
 
 def _merge_runs(data: ReportData) -> Iterator[Doubt]:
@@ -104,17 +116,9 @@ def _doubt_displacement(data: ReportData, found: VerdictRange) -> Iterator[Doubt
 
 
 def list_notes(data: ReportData) -> dict[str, list[str]]:
-    """Return the notes of each result, with that on motions of another demand."""
+    """Return the notes of each result, with that on the rules of a norm for motions."""
     notes = {RESULTS[name]: [*each.notes] for name, each in data.statements.items() if each.notes}
     notes |= {HISTORIES: missed} if (missed := note_checks(data)) else {}
-    peaks = [peak_of_ground(run) for run in data.runs.values()]
-    if peaks and "assessment" in data.statements:
-        mean, other = np.mean(peaks), peak_of_spectrum(data.case)
-        if abs(np.log(mean / other)) > np.log(MAX_RATIO_OF_PEAKS):
-            notes.setdefault(RESULTS["assessment"], []).append(
-                f"the spectrum has a PGA of {other:.3g} g, and the motions have {mean:.3g} g: the "
-                "margin is not one on the demand of the time histories"
-            )
     return notes
 
 

@@ -4,6 +4,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from inspect import Parameter, signature
 from typing import Any
 
+import numpy as np
+
 from archfem._validation import declared_keys
 from archfem.cases.defaults import (
     DECIDING_VALUES,
@@ -27,6 +29,8 @@ from archfem.limit.collapse import collapse_factor
 from archfem.masonry.joint_closing import FINISHED_KEYS
 from archfem.masonry.materials import Contact, Material
 from archfem.masonry.shapes.bridge_parts import Backfill
+from archfem.masonry.structure import Structure, describe_piers, find_clear_spans
+from archfem.models.model import Ends
 from archfem.motion.design_spectra import CodeSpectrum
 from archfem.motion.matching import DEFAULT_BAND
 from archfem.motion.motion import Motion
@@ -107,16 +111,35 @@ def _structure_rows(data: ReportData) -> Iterator[Row]:
             continue
         mark = "inferred" if key in drawn else "given"
         text = "outlines" if drawn and key == "shape" else describe_value(value, kinds.get(key))
+        if key in ("blocks", "joints"):
+            text = f"{len(value)}, by their corners"
         yield key.replace("_", " "), text, mark
         if key in parts:
             own = [set(each) for each in value.values() if isinstance(each, Mapping)]
             given = set(value).union(set.intersection(*own) if own else ())
             yield key, _list_left_out(parts[key], given), "default"
+    if table["shape"] in ("blocks", "outlines"):
+        yield from _measure_rows(structure)
     yield "structure", _list_left_out(list_shapes()[table["shape"]], {*table}), "default"
     yield "width", f"{structure.width:g} m", _mark("width" in table)
     yield "gravity", f"{structure.gravity:g} m/s²", _mark("gravity" in table)
     if "joints" not in table and table["shape"] in ("blocks", "outlines"):
         yield "joints", f"{len(structure.joints)}, where outlines touch", "inferred"
+
+
+def _measure_rows(structure: Structure) -> Iterator[Row]:
+    """Yield lengths of rings and piers that are given block by block, and sizes of stones."""
+    for part, (low, high) in find_clear_spans(structure).items():
+        own = [each for each in structure.joints if each.role == "ring" and each.part == part]
+        rise = np.ptp([joint.intrados[1] for joint in own])
+        depths = Ends.of(joint.depth for joint in own)
+        depth = f", rise {rise:.3g} m, thickness" if rise > 1e-6 else ", bearings"
+        text = f"clear span {high - low:.3g} m{depth} {depths:.3g} m"
+        yield part or "ring", text, "inferred"
+    for part, words in describe_piers(structure).items():
+        yield part or "pier", words, "inferred"
+    areas = Ends.of(structure.blocks[number].area for number in structure.free)
+    yield "stones", f"{len(structure.free)} that can move, of {areas:.2g} m²", "inferred"
 
 
 def _list_left_out(declaration: Callable[..., Any], given: set[str]) -> str:

@@ -59,10 +59,16 @@ def check_motions(data: ReportData) -> list[Check]:
     return [number, *_check_spectra(data, rule), *_check_plateaus(data)]
 
 
+def find_target(data: ReportData) -> DesignSpectrum | None:
+    """Return the spectrum that motions are compared with: of their suite, or of an assessment."""
+    return data.case.target or data.case.assessment.spectrum
+
+
 def _check_spectra(data: ReportData, rule: SelectionRule) -> Iterator[Check]:
     """Yield the checks of the mean spectrum, before a reduction, against the target."""
-    target, reduction = data.case.target, (data.case.suite or {}).get("reduction", 1.0)
+    target, reduction = find_target(data), (data.case.suite or {}).get("reduction", 1.0)
     if target is None:
+        yield Check("mean spectrum over the target", "a spectrum", "the case gives none", None)
         return
     required = f"{rule.lower:g} to {rule.upper:g}" if rule.upper < np.inf else f"≥ {rule.lower:g}"
     ratios = f"{rule.shortest_ratio:g} T₁" if rule.shortest_ratio else f"{rule.shortest:g} s"

@@ -1,9 +1,11 @@
 """Reports of cases, result folders and single histories."""
 
+from hashlib import sha256
+from importlib import import_module
 from pathlib import Path
 
 from archfem.cases.case import Case
-from archfem.cases.report.conclusion import describe_origin, list_facts
+from archfem.cases.report.conclusion import list_facts
 from archfem.cases.report.report_data import ReportData, build_live_page, build_player
 from archfem.cases.report.sections import build_sections
 from archfem.cases.result_folder import ResultFolder
@@ -26,7 +28,9 @@ def write_report(data: ReportData, path: str | Path) -> Path:
     footer = "Written by archfem from the results named above; figures and numbers are theirs."
     if data.runs:
         footer += " On paper a player shows the instant and the joint that it showed on the screen."
-    head = case.title, describe_origin(data), list_facts(data)
+    digest = sha256(case.text().encode()).hexdigest()[:12]
+    origin = f"report of archfem {import_module('archfem').__version__} · case {digest}"
+    head = case.title, origin, list_facts(data)
     with limit_width(FIGURE_WIDTH):
         sections = build_sections(data)
     document = Document(*head, sections, footer)

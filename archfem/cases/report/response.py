@@ -14,9 +14,9 @@ from archfem.cases.report.conclusion import (
     describe_mechanism,
     list_lost,
     sentence,
-    summarise_outcomes,
+    summarise_outcome,
 )
-from archfem.cases.report.motion_rules import tabulate_checks
+from archfem.cases.report.motion_rules import find_target, tabulate_checks
 from archfem.cases.report.report_data import ReportData, build_player
 from archfem.dynamics.collapse_state import FALLEN_STATES
 from archfem.dynamics.history import History
@@ -37,15 +37,7 @@ from archfem.view.style import limit_width
 # Width of figures of which two stand side by side [mm]
 HALF_WIDTH = 84.0
 
-# Failed joints that each definition of a mechanism needs, in the number of the criteria
-_DEFINITIONS = {
-    "any joints at once": "of any rings and piers together",
-    "one part at once": "of one ring or one pier",
-    "ring and pier at once": "of a ring and a pier together",
-    "one part over the record": "of one ring or one pier, each from its first failure on",
-    "verified": "that permit a motion of the blocks",
-    "Demirel and Aldemir": "of one ring, as worded in Buildings 11 (2021)",
-}
+_UNRULED = "Motions were compared with no spectrum: [report] names no norm of known rules."
 
 
 def build_ground_section(data: ReportData) -> Section:
@@ -61,7 +53,7 @@ def build_ground_section(data: ReportData) -> Section:
             "steps are left out, and displacements drift"
         )
     blocks: list[Any] = [Grid(*result_text.tabulate_motions(motions), caption)]
-    blocks += tabulate_checks(data)
+    blocks += tabulate_checks(data) or [TextBlock(_UNRULED)]
     if missed := [*_list_missed_peaks(data)]:
         blocks.append(TextBlock(f"Steps of runs miss peaks: {'; '.join(missed)}."))
     if data.case.suite is None:
@@ -86,26 +78,29 @@ def _list_missed_peaks(data: ReportData, share: float = 0.98) -> Iterator[str]:
 
 
 def _build_spectra(data: ReportData, motions: list[Motion]) -> list[Any]:
-    """Build the response spectra, beside the target spectrum if there is one."""
-    case, cut = data.case, ", up to the end of the run" * bool(data.cut_motions)
+    """Build the response spectra, beside that of their suite or of an assessment."""
+    own, target = data.case.suite or {}, find_target(data)
+    cut = ", up to the end of the run" * bool(data.cut_motions)
     caption = f"Response spectra, 5 % damped, as applied{cut}"
-    if case.suite is None:
+    if data.case.suite is None and target is None:
         return [FigureBlock.of(draw_spectra(motions), f"{caption}.")]
-    scale, reduction = case.suite.get("scale", 1.0), case.suite.get("reduction", 1.0)
+    scale, reduction = own.get("scale", 1.0), own.get("reduction", 1.0)
     # The suite multiplies by scale and divides by R; recorded motions are as applied.
     pairs = tuple(motion.scaled(reduction / scale) for motion in motions)
-    suite = Suite(case.suite.get("name", "suite"), pairs, scale=scale, reduction=reduction)
-    if case.suite.get("matched", False):
+    name = own.get("name", "suite" if own else motions[0].name)
+    suite = Suite(name, pairs, scale=scale, reduction=reduction)
+    matched = own.get("matched", False)
+    if matched:
         caption += "; matched from {:g} to {:g} s".format(*DEFAULT_BAND)
     if reduction != 1.0:
         caption = (
             "Response spectra, 5 % damped, before they are divided by the reduction factor "
             f"R = {reduction:g}; motions were applied divided by it"
         )
-    blocks: list[Any] = [FigureBlock.of(draw_suite(suite, case.target), caption)]
-    if case.target is not None and not case.suite.get("matched", False):
-        blocks.append(TextBlock("The motions were not matched to the target."))
-    return blocks
+    if target is not None and not matched:
+        caption += "; they were not matched to the target"
+        caption += ", which is the spectrum of [assessment]" * (data.case.target is None)
+    return [FigureBlock.of(draw_suite(suite, target), caption)]
 
 
 def build_run_sections(data: ReportData) -> list[Section]:
@@ -139,29 +134,6 @@ def _build_response(data: ReportData, name: str, players: int) -> list[Any]:
     return [*blocks, *_build_mechanism(data, run), build_player(case, run, title, players)]
 
 
-def build_joint_section(data: ReportData) -> Section:
-    """Build the section of long tables: other mechanisms, and the joints of each run of a suite."""
-    runs = {} if data.case.suite is None else data.runs
-    tables = [_tabulate_joints(data, run, f" under '{name}'") for name, run in runs.items()]
-    return Section("Mechanisms and joints of each run", [*_tabulate_mechanisms(data), *tables])
-
-
-def _tabulate_mechanisms(data: ReportData) -> Iterator[Grid]:
-    """Yield the table of mechanisms by other definitions than that of the response, if any."""
-    rows = []
-    for name, needed in _DEFINITIONS.items():
-        found = {run: x.verdict.mechanisms.get(name) for run, x in data.runs.items()}
-        if name != "verified" and any(found.values()):
-            texts = [
-                f"{run}: {x or 'none'}" if len(found) > 1 else f"{x}" for run, x in found.items()
-            ]
-            rows.append((name, needed, "; ".join(texts)))
-    if rows:
-        yield Grid(
-            (), rows, "First mechanisms by other definitions, with the failed joints of each"
-        )
-
-
 def _build_envelopes(data: ReportData) -> list[FigureBlock]:
     """Draw the envelopes of all runs."""
     caption = "Least and largest eccentricity of each joint; dotted under dead load"
@@ -175,7 +147,7 @@ def _build_envelopes(data: ReportData) -> list[FigureBlock]:
     ]
 
 
-def _tabulate_joints(data: ReportData, run: History, label: str = "") -> Grid:
+def _tabulate_joints(data: ReportData, run: History) -> Grid:
     """Return the table of joints without empty columns; the caption names these, and the joints."""
     head, rows = result_text.tabulate_joints(run.joints, data.dead)
     assessed = run.verdict.assessed
@@ -188,7 +160,7 @@ def _tabulate_joints(data: ReportData, run: History, label: str = "") -> Grid:
         "open": "None came apart.",
     }
     caption = (
-        f"Criteria per joint{label}: eccentricity under dead load, least and largest, largest "
+        "Criteria per joint: eccentricity under dead load, least and largest, largest "
         "V / N, and when and how long at most the joint hinged, slid as a whole (|V| at its limit) "
         "and was open."
     )
@@ -206,13 +178,12 @@ def _tabulate_joints(data: ReportData, run: History, label: str = "") -> Grid:
 def _build_mechanism(data: ReportData, run: History) -> list[Any]:
     """Build verdict and mechanism in a line each, and the fall of a run."""
     verdict, fall = run.verdict, run.verdict.fall
-    lines = [f"Outcome: {summarise_outcomes(data, [run])}"]
+    lines = [f"Outcome: {summarise_outcome(data, run)}"]
     if len(data.runs) == 1:  # of several there are tables
         lines += [f"In doubt: {doubt.cause}" for doubt in verdict.doubts]
         if fall is not None and fall.blocks:
             lines.append(f"lost: {describe_lost(data.case.structure, [fall])}")
-    found = verdict.mechanisms.get("verified")
-    lines.append(f"Mechanism: {f'verified, {found}' if found else describe_mechanism(verdict)}")
+    lines.append(f"Mechanism: {describe_mechanism(verdict)}")
     # the assumptions name the law of closing, and whether it was varied
     law = describe_closing(data.case.structure)
     lines += [line for line in verdict.remarks if not law or not line.startswith(law)]

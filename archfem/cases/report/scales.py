@@ -44,8 +44,8 @@ def _list_unscaled(data: ReportData) -> dict[str, tuple[str, float]]:
     return {name: (_FAILURES[x.verdict.outcome], peak_of_ground(x)) for name, x in failed.items()}
 
 
-def say_first_failure(data: ReportData) -> Iterator[str]:
-    """Yield the least scale at which it falls, or is dislocated before, and peaks over motions."""
+def find_first_failures(data: ReportData) -> Iterator[tuple[str, Ends, str]]:
+    """Yield each first failure over all motions: verb, peaks [g], and all in words."""
     searches, unscaled, least = list_scales(data), _list_unscaled(data), np.inf
     several = len(searches) + len(unscaled) > 1
     for state in ("falls", "dislocated", "mechanism"):
@@ -62,9 +62,10 @@ def say_first_failure(data: ReportData) -> Iterator[str]:
         notes += [f"{ends:#.3g} × over {over}"] * (f"{ends[0]:#.3g}" != f"{ends[1]:#.3g}")
         notes += [UNFINISHED] * any(x.unfinished for x in searches)
         motion = f"'{name}'" if several else "the motion"
-        peak = f"{Ends.of(scale * peak for scale, peak in first.values()):.3g} g"
+        peaks = Ends.of(scale * peak for scale, peak in first.values())
         beside = f" ({', '.join(notes)})" * bool(notes)
-        yield f"{_STATES[state][1]} at {least:#.3g} × {motion}, {peak}{beside}"
+        words = f"{_STATES[state][1]} at {least:#.3g} × {motion}, {peaks:.3g} g{beside}"
+        yield _STATES[state][1], peaks, words
 
 
 def say_fragile(data: ReportData) -> Iterator[str]:
@@ -108,8 +109,8 @@ def describe_scales(data: ReportData) -> Iterator[tuple[float, list[str]]]:
         ends += ["falls at none"]
     elif first.again:  # a crossing is not claimed
         ends += [f"stands again at {Ends.of(first.again):#.3g} ×"]
-    texts = [words, f"of the scales that were run it first {join_words(ends)}"]
-    texts += _compare_motions(searches)
+    first_at = f"of the scales that were run it first {join_words(ends)}"
+    texts = [words, first_at, *_say_as_one(searches)]
     # a search without a scale that holds may have the least of all
     if none := [f"'{each.motion}'" for each in searches if not each.held]:
         texts.append(f"no scale is known up to which it stands under {join_words(none)}")
@@ -124,13 +125,8 @@ def _bound(search: Scales) -> float:
     return min(search.held, search.as_one or np.inf)
 
 
-def _compare_motions(searches: list[Scales]) -> Iterator[str]:
-    """Yield the peaks of its first falls over motions, and the first fall as one rigid body."""
-    falls = {x.states["falls"] * x.pga: x for x in searches if "falls" in x.states}
-    if len(falls) > 1:
-        ends = [(peak, falls[peak]) for peak in (min(falls), max(falls))]
-        texts = [f"{peak:.3g} g ('{x.motion}', {x.states['falls']:#.3g} ×)" for peak, x in ends]
-        yield f"over the motions it first falls at {' to '.join(texts)} of PGA"
+def _say_as_one(searches: list[Scales]) -> Iterator[str]:
+    """Yield the first fall as one rigid body."""
     as_one = {x.motion: x.as_one for x in searches if x.as_one}
     # a smaller one is the margin
     if as_one and min(as_one.values()) > min(map(_bound, searches)):

@@ -1,7 +1,7 @@
 """Sections of a report: inputs, structure, capacity, further results, methods, sources."""
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import nullcontext, suppress
 from csv import reader
 from dataclasses import replace
@@ -25,12 +25,10 @@ from archfem.cases.report.response import (
     HALF_WIDTH,
     build_check_section,
     build_ground_section,
-    build_joint_section,
     build_run_sections,
 )
 from archfem.cases.report.study_findings import read_study, tabulate_study
 from archfem.cases.run import DRAWING_FILE
-from archfem.cases.toml_file import format_tables, parse_tables
 from archfem.dynamics.collapse_state import DISLOCATION, FALLEN_STATES, shallowest_part
 from archfem.dynamics.history import SIGN_CONVENTION
 from archfem.dynamics.recorder import library_versions
@@ -90,7 +88,6 @@ def build_sections(data: ReportData) -> list[Section]:
         Section("Annual rate of collapse", data.read_result("risk", *_RISK_CAPTIONS)),
         Section("Study of many cases", _build_study(data)),
         build_check_section(data),
-        build_joint_section(data),
         build_method_section(data),
         build_source_section(data),
     ]
@@ -470,7 +467,7 @@ def build_method_section(data: ReportData) -> Section:
 
 
 def build_source_section(data: ReportData) -> Section:
-    """Build the section on versions, digests of inputs, and the case itself."""
+    """Build the section on versions, and digests of inputs and case."""
     runs = data.runs.items()
     # Usually one line: all runs were computed with the same versions.
     made = sorted({str(run.dataset.attrs.get("versions", "unknown")) for _, run in runs})
@@ -482,20 +479,6 @@ def build_source_section(data: ReportData) -> Section:
         for name, run in runs
         if "inputs" in run.dataset.attrs
     ]
-    text = data.case.text()
-    rows.append(("SHA-256 of the case", sha256(text.encode()).hexdigest()))
-    listed, note = format_tables(_round_numbers(parse_tables(text))), list[TextBlock]()
-    if listed.strip() != text.strip():
-        words = "Numbers of the case to seven digits; those of its digest are in `case.toml`."
-        note.append(TextBlock(words))
-    blocks = [Grid((), rows), *note, TextBlock(listed, "lines")]
-    return Section("Versions, digests and the case as a file", blocks)
-
-
-def _round_numbers(value: Any) -> Any:
-    """Return a table with its numbers at seven digits, within a micrometre of a length of 10 m."""
-    if isinstance(value, Mapping):
-        return {key: _round_numbers(each) for key, each in value.items()}
-    if isinstance(value, list):
-        return [*map(_round_numbers, value)]
-    return float(f"{value:.7g}") if isinstance(value, float) else value
+    rows.append(("SHA-256 of the case", sha256(data.case.text().encode()).hexdigest()))
+    rows.append(("the case as a file", "case.toml in the folder of the results"))
+    return Section("Versions and digests", [Grid((), rows)])
