@@ -14,7 +14,7 @@ from archfem.limit.fill_strength import Fill
 from archfem.limit.instability import DeepenedBlocks
 from archfem.limit.vehicles import MovingLoad
 from archfem.masonry.loads import PointLoad
-from archfem.masonry.structure import Structure
+from archfem.masonry.structure import CONTACT_TOLERANCE, Structure
 
 
 @validate_arguments
@@ -28,9 +28,9 @@ def minimum_thickness(
 ) -> float:
     """Find the least thickness at which a family of structures stands, by bisection [m].
 
-    The search doubles a very small thickness until one stands, and then halves the bracket. A
-    structure so thin that it cannot be built does not stand, such as unequal stones that no longer
-    touch.
+    The search doubles a thickness of 1e-5 of the size of a thin structure until one stands, and
+    then halves the bracket. A structure so thin that it cannot be built does not stand, such as
+    unequal stones that no longer touch.
 
     Args:
         build: function from a thickness [m] to the structure.
@@ -43,7 +43,8 @@ def minimum_thickness(
         The end of the last bracket that stands [m].
 
     Raises:
-        InvalidInput: no thickness makes it stand, or every one does, or build makes no structure.
+        InvalidInput: no thickness makes it stand, or the least one tried does, or build makes no
+            structure.
 
     References:
         Milankovitch, Z. Math. Phys. 55 (1907) 1-27. Heyman, Int. J. Mech. Sci. 11 (1969) 363-372.
@@ -81,7 +82,8 @@ def _find_bracket(
         if not is_start:
             return 0.5 * thin, thin
         raise InvalidInput(
-            f"it stands at any thickness, even {thin:.3g} m: there is no least one to look for"
+            f"it stands at {thin:.3g} m, the least thickness tried, at which joints are hardly "
+            "more than points: there is no least one to look for above it"
         )
     while True:
         try:
@@ -112,7 +114,7 @@ def _find_thin_member(build: Callable[[float], Structure]) -> tuple[float, bool]
     largest, size = _largest_member(build)
     # the largest may be all thickness: the search starts at a share of the size of a thin one
     _, member = _double_until_built(build, 1e-4 * size, largest)
-    start = 1e-4 * member.size
+    start = 10.0 * CONTACT_TOLERANCE * member.size
     thin, _ = _double_until_built(build, start, largest)
     return thin, thin == start
 

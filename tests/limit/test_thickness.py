@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 import archfem as af
 from archfem.limit import minimum_thickness
@@ -44,7 +45,7 @@ def test_least_thickness_is_a_bracket():
         ),
         (
             lambda: minimum_thickness(lambda t: af.column(breadth=t, heights=[1.0])),
-            "stands at any thickness",
+            r"stands at 1\.2e-05 m, the least thickness tried",
         ),
         (lambda: minimum_thickness(lambda t: ring(thickness=-t)), "builds? makes no structure"),
         (
@@ -94,4 +95,20 @@ def test_a_least_thickness_far_below_the_greatest_that_can_be_built_is_found():
 
     least = minimum_thickness(build, friction=None, tolerance=1e-4)
     assert least == pytest.approx(0.01406, rel=5e-3)  # by a linear programme of its own
+    assert not af.stands(build(0.99 * least), friction=None)
+
+
+@pytest.mark.parametrize(("voussoirs", "expected"), [(8, 5.2052e-4), (16, 1.38943e-4)])
+def test_the_least_thickness_of_a_catenary_is_found(voussoirs, expected):
+    """A half span of 3 m and a rise of 4 m: the thrust line leaves it by the stones' size alone."""
+    parameter = brentq(lambda a: a * (np.cosh(3.0 / a) - 1.0) - 4.0, 0.1, 100.0)
+    along = np.linspace(-1.0, 1.0, 4001) * parameter * np.sinh(3.0 / parameter)
+    x = parameter * np.arcsinh(along / parameter)
+    catenary = np.column_stack([x, 4.0 - parameter * (np.cosh(x / parameter) - 1.0)])
+
+    def build(thickness):
+        return af.shapes.arch_along(catenary, thickness=thickness, voussoirs=voussoirs)
+
+    least = minimum_thickness(build, friction=None, tolerance=1e-4)
+    assert least == pytest.approx(expected, rel=2e-3)  # by a linear programme of its own
     assert not af.stands(build(0.99 * least), friction=None)
