@@ -71,7 +71,7 @@ def build(  # noqa: PLR0913  (keywords of a discretisation, and of the selection
             block.
         cell: "quadrilateral" or "triangle".
         max_cell_size: largest size of cells inside blocks without corners, such as backfill [m]; by
-            default half of the block's mean thickness.
+            default twice the block's mean thickness over the number of cells along it.
         degree: degree of the elements, 1 or 2.
         quadrature: rule on each joint facet, "exact", "lobatto", "trapezoidal", "nodal" (springs at
             mesh nodes) or "gauss"; by default "exact", or "lobatto" with a number of points or

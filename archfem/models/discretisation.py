@@ -34,7 +34,8 @@ class Discretisation:
             the faces of a sector).
         cell: shape of the cells, "quadrilateral" or "triangle".
         max_cell_size: largest size of cells inside blocks without corners, such as backfill [m];
-            None for half of the block's mean thickness 2 A / P, A its area and P its perimeter.
+            None for 4 A / (P n), A the block's area, P its perimeter and n the number of cells
+            along it: a square has n cells on each side.
         degree: polynomial degree of the elements, 1 or 2.
         quadrature: rule on each joint facet, "exact", "lobatto", "trapezoidal", "nodal" or "gauss";
             None for "exact", or "lobatto" with degree 2 or "monolithic", which have no exact rule.

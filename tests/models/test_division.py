@@ -121,12 +121,12 @@ def test_cells_grow_with_the_distance_from_fine_ones():
 
 
 def test_an_edge_far_from_stones_has_as_many_cells_as_fit():
-    """∫ ds over the size, by SciPy; the largest is half of the mean thickness, A / P."""
+    """∫ ds over the size, by SciPy; the largest is 4 A / P over the number along."""
     structure = slab(3.0, 2.0, corners=None)
-    discretisation = af.models.Discretisation(cells=(8, 1), cell="triangle")
+    discretisation = af.models.Discretisation(cells=(8, 5), cell="triangle")
     made = divide_edges(structure, discretisation)
     edges, size = made.edges, made.sizes[1]
-    assert size.max_size == pytest.approx(6.0 / 10.0)
+    assert size.max_size == pytest.approx(4.0 * 6.0 / 10.0 / 5.0)
     assert size.lengths == pytest.approx(3.0 / 8.0)
     assert sorted(size.middles[:, 0]) == pytest.approx(3.0 * (np.arange(8) + 0.5) / 8.0)
     for edge in edges.around[1]:

@@ -65,7 +65,7 @@ def wall():
 @cache
 def models(rule="lobatto", degree=1, cell="quadrilateral"):
     """The wall with all nodes, by matrices and by weak forms."""
-    given = {"cells": (1, 1), "quadrature": rule, "degree": degree, "cell": cell}
+    given = {"cells": (1, 4), "quadrature": rule, "degree": degree, "cell": cell}
     return [af.build(wall(), fidelity=fidelity, **given) for fidelity in ("full", "monolithic")]
 
 

@@ -13,7 +13,7 @@ of quadrilaterals needs an even number on each edge, as it could not be filled o
 numbers are always feasible: any solution may be doubled.
 
 Blocks without corners take the numbers of their neighbours; on their other edges, and inside, the
-cells grow with the distance from those.
+cells grow with the distance from those, up to a size that is in proportion to 1 / `along`.
 """
 
 from collections.abc import Hashable, Iterator, Sequence
@@ -209,10 +209,9 @@ def _check_cell_count(edges: Edges, settings: Discretisation, max_cells: int = 1
     count = sum(
         prod(map(float, _side_cells(edges, number, settings))) for number in edges.structured
     )
-    if (largest := settings.max_cell_size) is not None:
-        blocks = [edges.structure.blocks[number] for number in edges.unstructured]
-        area = sum(block.area for block in blocks if not block.fixed)
-        count += area / largest / largest
+    for number in edges.unstructured:
+        block, largest = edges.structure.blocks[number], _max_cell_size(edges, number, settings)
+        count += 0.0 if block.fixed else block.area / largest / largest
     if not count <= max_cells:
         raise MeshError(
             f"a mesh of {count:.3g} cells, and there is room for {max_cells}: use fewer cells, "
@@ -318,8 +317,17 @@ def _block_cell_sizes(
         for (start, end), count in zip(ends, counts[small], strict=True)
     ]
     lengths = np.repeat(edges.lengths[small] / counts[small], counts[small])
-    max_size = settings.max_cell_size or block.area / float(edges.lengths[around].sum())
-    return CellSizes(np.concatenate(middles), lengths, np.inf if block.fixed else max_size)
+    max_size = np.inf if block.fixed else _max_cell_size(edges, number, settings)
+    return CellSizes(np.concatenate(middles), lengths, max_size)
+
+
+def _max_cell_size(edges: Edges, number: int, settings: Discretisation) -> float:
+    """Return the largest size of cells in a freely meshed block [m]."""
+    if settings.max_cell_size is not None:
+        return settings.max_cell_size
+    # of a square 1 / along of its side, so that the inside refines with the joints
+    perimeter = float(edges.lengths[edges.around[number]].sum())
+    return 4.0 * edges.structure.blocks[number].area / (settings.along * perimeter)
 
 
 def _grade_edges(
