@@ -6,7 +6,6 @@ from itertools import islice
 from typing import Any
 
 import numpy as np
-import xarray as xr
 
 from archfem._display import ResultDisplay, track_progress
 from archfem._typing import Array, Metres, NewtonsPerMetre, Pascals
@@ -569,9 +568,7 @@ def rate(  # noqa: PLR0913  (factors of the check, and the strength of the bridg
     moving = drive(width, area_load, positions[::5] if is_plastic else positions)
     if fill is None and (ends := places_at_ends(weighted, axles, moving)):
         at_ends, positions = drive(width, area_load, ends), [*positions, *ends]
-        everywhere = xr.concat([moving.factors, at_ends.factors], "position").sortby("position")
-        worse = min(moving, at_ends, key=lambda each: each.worst.factor)
-        moving = replace(worse, factors=everywhere)
+        moving = moving.joined(at_ends)
     by_rule = np.nan
     if width > (1.0 + 1e-9) * rule or area_load < driven.area_load:
         least = min(width, rule), max(area_load, driven.area_load)
@@ -635,10 +632,7 @@ def _scale_weights(structure: Structure, factor: float) -> Structure:
 
 def _places_along(structure: Structure, vehicle: Array, steps: int = 100) -> Sequence[float]:
     """Return places from where the vehicle drives onto the structure to where it leaves [m]."""
-    ends = vehicle_positions(structure, vehicle, None, 2)
-    length = float(np.ptp(ends)) - 2.0 * float(vehicle[0, 1])
-    count = 1 + int(np.ceil(steps * float(np.ptp(ends)) / length))
-    return tuple(np.linspace(ends[0], ends[1], count).tolist())
+    return tuple(vehicle_positions(structure, vehicle, None, steps).tolist())
 
 
 def _further_searches(

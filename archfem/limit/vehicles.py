@@ -255,6 +255,16 @@ class MovingLoad(ResultDisplay):
         least = least.assign_attrs(worst.factors["factor"].attrs)
         return replace(worst, factors=worst.factors.assign(factor=least))
 
+    def joined(self, other: "MovingLoad") -> "MovingLoad":
+        """Return the load at these and other places, with the worse of both collapses.
+
+        Args:
+            other: the same load at other places.
+        """
+        everywhere = xr.concat([self.factors, other.factors], "position").sortby("position")
+        worse = min(self, other, key=lambda each: each.worst.factor)
+        return replace(worse, factors=everywhere)
+
     def _summary(self) -> str:
         """Describe the least factor and its place in one line."""
         return f"MovingLoad: least factor {self.worst.factor:.4g}, {self._place}"
@@ -299,8 +309,9 @@ def moving_load(  # noqa: PLR0913  (loads, their places, and the strength of the
         axles: weight of each axle over the bridge's whole width, from the front [N].
         spacings: distances between the axles, one fewer [m].
         positions: x of the vehicle's middle, halfway between first and last axle (n,) [m]; by
-            default 101, from where it drives onto the structure to where it is off it again, or 21
-            with a plastic fill.
+            default those of a rating (`rate`), from where it drives onto the structure to where it
+            is off it again, in steps of 1/100 of the structure's length, or 1/20 with a plastic
+            fill; without fill also where an axle stands at an end of a stone.
         area_load: distributed load beside and below the axles, where it is adverse [Pa]. With a
             plastic fill that is found with the fill as `Fill`, and a warning says so.
         friction: as for `collapse_factor`.
@@ -324,8 +335,8 @@ def moving_load(  # noqa: PLR0913  (loads, their places, and the strength of the
     """
     structure = structure_of(structure)
     refuse_bonds(structure)
-    vehicle, count = parse_axles(axles, spacings), 21 if isinstance(fill, PlasticFill) else 101
-    places = vehicle_positions(structure, vehicle, positions, count)
+    vehicle, steps = parse_axles(axles, spacings), 20 if isinstance(fill, PlasticFill) else 100
+    places = vehicle_positions(structure, vehicle, positions, steps)
     rows = [
         [axles_on_structure(structure, vehicle, direction, x) for x in places]
         for direction in DRIVING_DIRECTIONS
@@ -352,16 +363,24 @@ def moving_load(  # noqa: PLR0913  (loads, their places, and the strength of the
         factors[direction, place] = worst.factor  # by the whole search: may be a weaker state
     length = area_load and -strips[0].force[1] / (area_load * structure.width)  # of a strip
     loaded = [[length * (len(laid[row]) - len(row)) for row in one_way] for one_way in rows]
+    dataset = _tabulate_places(places, factors, on_bridge, loaded)
+    moving = MovingLoad(dataset, worst, DRIVING_DIRECTIONS[direction], float(places[place]))
+    if positions is None and fill is None and (ends := places_at_ends(structure, vehicle, moving)):
+        given = options | {"spacings": spacings, "area_load": area_load}
+        return moving.joined(moving_load(structure, axles, positions=ends, **given))
+    return moving
+
+
+def _tabulate_places(places: Array, factors: Array, axles: Numbers, loaded: Any) -> xr.Dataset:
+    """Return factors, axles and loaded lengths over direction and place, each with its unit."""
     dims = ("direction", "position")
     variables = {
         "factor": (dims, factors, {"units": "1", "long_name": "factor at collapse"}),
-        "axles": (dims, on_bridge, {"units": "1", "long_name": "axles on the structure"}),
+        "axles": (dims, axles, {"units": "1", "long_name": "axles on the structure"}),
         "loaded": (dims, loaded, {"units": "m", "long_name": "road under the distributed load"}),
     }
     position = ("position", places, {"units": "m"})
-    coordinates = {"direction": list(DRIVING_DIRECTIONS), "position": position}
-    dataset = xr.Dataset(variables, coordinates)
-    return MovingLoad(dataset, worst, DRIVING_DIRECTIONS[direction], float(places[place]))
+    return xr.Dataset(variables, {"direction": list(DRIVING_DIRECTIONS), "position": position})
 
 
 def check_factor(value: float, name: str) -> float:
@@ -370,9 +389,13 @@ def check_factor(value: float, name: str) -> float:
 
 
 def vehicle_positions(
-    structure: Structure, vehicle: Array, positions: Sequence[float] | None, count: int = 101
+    structure: Structure, vehicle: Array, positions: Sequence[float] | None, steps: int = 100
 ) -> Array:
-    """Return the positions of the vehicle's middle (n,) [m]."""
+    """Return the positions of the vehicle's middle (n,) [m].
+
+    By default they are from where it drives onto the structure to where it leaves, in steps of a
+    share of the structure's length.
+    """
     if bodies := find_bodies(structure):
         raise InvalidInput(
             f"axles would drive over '{bodies[0]}', which stands on the structure: take it off, in "
@@ -386,6 +409,7 @@ def vehicle_positions(
     points = np.concatenate([structure.blocks[number].drawn() for number in structure.free])
     half = float(vehicle[0, 1])
     low, high = float(points[:, 0].min()), float(points[:, 0].max())
+    count = 1 + int(np.ceil(steps * (high - low + 2.0 * half) / (high - low)))
     return np.linspace(low - half, high + half, count)
 
 
