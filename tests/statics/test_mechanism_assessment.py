@@ -1,12 +1,14 @@
 """Kinematic assessment: six cases worked by hand, the checks of the codes, and refused input."""
 
 from dataclasses import replace
+from itertools import pairwise
 from math import atan2, pi, sqrt
 
 import numpy as np
 import pytest
 from backfilled import SOIL, arch_bridge, rectangle, retaining_wall, slender_bridge, two_walls
 from bonded import bonded_wall
+from scipy.optimize import brentq
 
 import archfem as af
 from archfem.cases.answers import describe_margin, list_ratios
@@ -697,3 +699,68 @@ def test_a_check_that_one_weight_a_body_fails_is_no_pass(scale, count):
     assert said.endswith({0.5: "passes", 1.0: BY_SPLIT}.get(scale, "fails"))
     assert any(ratios.by_split for ratios in listed.values()) is bool(unsure)
     assert not whole.doubts
+
+
+def test_a_wall_held_at_its_top_moves_as_by_hand():
+    """A wall 3 m high and 0.4 m thick bends at 2.1 m; a tie beam holds it from 2.7 m up.
+
+    Two bodies: the lower one turns about its outer foot, the upper one slides up the beam's corner.
+    """
+    b, hinge, levels = 0.4, 2.1, np.array([*np.linspace(0.0, 2.4, 9), 3.0])
+    boxes = {f"course {k}": (0.0, y0, b, y1) for k, (y0, y1) in enumerate(pairwise(levels))}
+    fixed = {"ground": (-1.0, -0.5, 1.0, 0.0), "beam": (b, 2.7, 0.9, 3.0)}
+    blocks = [
+        af.Block(
+            ((x0, y0), (x1, y0), (x1, y1), (x0, y1)),
+            af.Material(30e9, 0.2, 20e3),
+            name,
+            fixed=name in fixed,
+            part="wall",
+            role="pier",
+        )
+        for name, (x0, y0, x1, y1) in (boxes | fixed).items()
+    ]
+
+    def touch(one, other):
+        return af.Contact(1e9, 4e8, friction=1e-9 if "beam" in (one.name, other.name) else 2.0)
+
+    wall = af.masonry.assembled(blocks, touch)
+    found = af.kinematic_assessment(wall, SPECTRUM)
+
+    heights, weights = 0.5 * (levels[1:] + levels[:-1]), np.diff(levels)
+    upper, corner = heights > hinge, b + 2.7j
+
+    def places(turn):
+        """Centroids (x + i y), pin between the bodies, and turn of the upper one."""
+        pin = b + (hinge * 1j - b) * np.exp(-1j * turn)
+        away = corner - pin
+        back = brentq(lambda angle: (away * np.exp(-1j * angle)).real - b, -0.2, 1.2)
+        low = b + (0.5 * b + 1j * heights - b) * np.exp(-1j * turn)
+        high = pin + (0.5 * b + 1j * (heights - hinge)) * np.exp(1j * back)
+        return np.where(upper, high, low), pin, back
+
+    def velocities(turn, step=1e-6):
+        return (places(turn + step)[0] - places(turn - step)[0]) / (2.0 * step)
+
+    def factor(turn):
+        rates = velocities(turn)
+        return (weights @ rates.imag) / (weights @ rates.real)
+
+    def push_of_beam(turn):
+        """Moment of the upper weights about the pin; the beam can only push."""
+        now, pin, _ = places(turn)
+        arms = (now - pin)[upper]
+        return weights[upper] @ (arms.real + factor(turn) * arms.imag)
+
+    rates = velocities(0.0).real
+    work, inertia = weights @ rates, weights @ rates**2
+    parted = brentq(push_of_beam, 1e-4, 0.13)
+    assert factor(parted) > 0.0  # there the upper body leaves the beam and falls
+    control = np.abs(rates).argmax()
+    moved = (places(parted)[0] - places(0.0)[0])[control].real
+    assert found.alpha_0 == pytest.approx(0.5266106, rel=1e-6)
+    assert found.alpha_0 == pytest.approx(factor(0.0), rel=1e-6)
+    assert found.e_star == pytest.approx(work**2 / (weights.sum() * inertia), rel=1e-5)
+    expected = moved * inertia / (rates[control] * work)
+    assert found.d_0_star == pytest.approx(expected, rel=1e-4)
+    assert found.displacement.capacity == pytest.approx(0.4 * expected, rel=1e-4)
