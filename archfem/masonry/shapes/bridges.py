@@ -175,14 +175,16 @@ def buttressed_arch(  # noqa: PLR0913  (all are lengths and properties of one st
 ) -> Structure:
     """Return a circular arch between two buttresses in courses, flush with its intrados.
 
-    Coordinates are those of a `bridge`: x from the left springing, y from the springing level.
+    Coordinates are those of a `bridge`. They start where the centre line of the ring meets the left
+    springing joint: above the clear springing, by half the thickness × cos(embrace / 2).
 
     Args:
         span: clear span between the springings [m].
         thickness: thickness of the ring [m].
         voussoirs: number of stones.
         breadth: breadth of each buttress [m].
-        height: height of the buttresses, from foundation to springing level [m].
+        height: height of the buttresses, from foundation to y = 0, the springing level of the
+            centre line [m].
         rise: clear rise of the intrados above its springings [m]; or
         embrace: angle subtended by the ring [degrees].
         measured: "intrados"; or "centre line", along which span and rise are measured then.
@@ -229,7 +231,7 @@ def arcade(  # noqa: PLR0913  (all are lengths and properties of one structure)
 
     Args:
         spans: clear spans of the arches between their springings [m].
-        heights: heights of the piers, one more than arches, from foundation to springing level [m].
+        heights: heights of the piers, one more than arches, as for `buttressed_arch` [m].
         breadths: breadths of the piers [m].
         thicknesses: thicknesses of the rings [m].
         voussoirs: numbers of stones.
