@@ -166,15 +166,15 @@ def evaluate(case: af.Case, precision: float = 0.1) -> dict[str, Any]:
     )
     if search.searches[step].interrupted:
         raise KeyboardInterrupt
-    states = search.falls(step)
+    falls = [run.fall for run in search.searches[step].runs]
     return {
         **allowed,
         "stands": search.lower * allowed["linear"],
         "falls": search.upper * allowed["linear"],
         "above": len(search.above),
         "unanswered": len(search.unanswered),
-        "runs": len(states),
-        "dislocated": sum(fall is not None and fall.kind == "dislocated" for _, fall in states),
+        "runs": len(falls),
+        "dislocated": sum(fall is not None and fall.kind == "dislocated" for fall in falls),
         "pga": motion.pga / (SPECTRUM["ag"] * 9.80665),
         "seconds": time.process_time() - begun,
     }

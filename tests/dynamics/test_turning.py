@@ -184,9 +184,9 @@ def test_the_scale_at_which_it_falls_is_between_a_run_that_stands_and_one_that_f
     )
     assert 0.3 <= found.lower < found.upper <= 1.0
     for dt in (0.01, 0.005):
-        kinds = dict(found.falls(dt))
-        assert kinds[found.bracket(dt).lower].kind in ("stands", "dislocated")
-        assert kinds[found.bracket(dt).upper].kind in ("partly fallen", "fallen")
+        kinds = {run.scale: run.fall.kind for run in found.searches[dt].runs}
+        assert kinds[found.bracket(dt).lower] in ("stands", "dislocated")
+        assert kinds[found.bracket(dt).upper] in ("partly fallen", "fallen")
     assert "stands" in found.table()
 
 
