@@ -53,7 +53,8 @@ def in_unit(value: Any, unit: str, key: str) -> float:
 
     Args:
         value: 2.95, "2.95 m", "1.48 MPa/mm"; a bare number is in `unit` already. For an
-            acceleration "0.3 g" is 0.3 times standard gravity.
+            acceleration "0.3 g" is 0.3 times standard gravity; for a frequency "10 rad/s" is the
+            angular one, 10/2π Hz.
         unit: unit of the result, "1" for a pure number.
         key: name of the value in an error.
 
@@ -61,8 +62,8 @@ def in_unit(value: Any, unit: str, key: str) -> float:
         The number in that unit.
 
     Raises:
-        InvalidInput: it is no number, not finite, or of another dimension; or an angle where a pure
-            number is required.
+        InvalidInput: it is not one number with one unit, not finite, or of another dimension; or
+            an angle where a pure number is required.
 
     Example:
         >>> af.units.in_unit("1.48 MPa/mm", "Pa/m", "normal_stiffness")
@@ -161,6 +162,33 @@ def _check_text(text: str, unit: str, key: str) -> None:
         raise InvalidInput(f"{key} = {text!r} has a power no unit has: write a number in {unit}")
 
 
+def _split_quantity(text: str, unit: str, key: str) -> tuple[str, str]:
+    """Return the number and the unit of a quantity; pint multiplies the numbers of "2 500 mm"."""
+    number_pattern = r"(?:[-+]?(?:\d+(?:_\d+)*\.?\d*|\.\d+)(?:[eE][-+]?\d+)?|nan|inf)"
+    power_pattern = r"(?<=[^\W\d])(?:[23]|_0)\b|(?<=.)(?:\*\*|\^)\s*\(?\s*-?\d+"
+    number = re.match(number_pattern, text := text.strip())
+    rest = text[number.end() :].strip() if number else ""
+    # pint leaves out signs that it does not know, such as an apostrophe or a long dash
+    if not number or re.search(r"\d|[^\w\s*/·()°%⁻]", re.sub(power_pattern, "", rest)):
+        reason = f"{rest!r} is no unit" if number else "it does not begin with a number"
+        raise InvalidInput(
+            f"{key} = {text!r} is not a quantity, for {reason}: write one number, with nothing "
+            f'between its digits, and then one unit, e.g. "1500.5 {unit}"'
+        )
+    return number[0], rest
+
+
+def _suggest_unit(text: str, unit: str) -> str:
+    """Return the question whether a quantity with usual letters of its unit was intended."""
+    usual = ("N", "kN", "MN", "Pa", "kPa", "MPa", "GPa", "m", "mm", "cm", "s", "ms", "Hz", "g")
+    letters = {each.lower(): each for each in usual} | {"tonf": "tf"}
+    meant = re.sub(r"[^\W\d_]+", lambda word: letters.get(word[0].lower(), word[0]), text)
+    with suppress(InvalidInput):
+        if meant != text and in_unit(meant, unit, "value") is not None:
+            return f"did you mean {meant!r}?"
+    return ""
+
+
 def _refuse_mass(quantity: Any, unit: str, words: str) -> None:
     """Refuse a mass in place of a weight, and a density in place of a weight by volume."""
     masses = {"N": ("a mass", "kg", "kN"), "N/m**3": ("a density", "kg/m**3", "kN/m³")}
@@ -177,17 +205,18 @@ def _convert(text: str, unit: str, key: str) -> float:
     for part in (text, unit):
         _check_text(part, unit, key)
     registry = _registry()
+    number, name = _split_quantity(text, unit, key)
     target = "dimensionless" if unit == "1" else unit
-    text = re.sub(r"\b([A-Za-z]+)([23])\b", r"\1**\2", text)  # as in kN/m3
+    name = re.sub(r"\b([A-Za-z]+)([23])\b", r"\1**\2", name)  # as in kN/m3
     if unit == "m/s**2":  # here g is gravity and gal the unit of Galileo, not gram and gallon
-        # a digit may stand before them, as in "0.3g"
-        text = re.sub(r"(?<![^\W\d])gal\b", "Gal", text)
-        text = re.sub(r"(?<![^\W\d])g\b", "g_0", text)
+        name = re.sub(r"\bg\b", "g_0", re.sub(r"\bgal\b", "Gal", name))
     try:
-        quantity = registry.Quantity(text)
-        # pint takes angles for pure numbers
-        angles = {"radian", "degree", "grade", "turn", "arcminute", "arcsecond", "milliarcsecond"}
-        if unit == "1" and angles & {name for name, _ in quantity.unit_items()}:
+        quantity = registry.Quantity(f"{number} {name}")
+        # pint takes angles for pure numbers, and 1 rad/s for 1 Hz
+        is_angle = "radian" in dict(quantity.to_root_units().unit_items())
+        if is_angle and unit == "Hz":
+            target = "turn/s"
+        if is_angle and unit == "1":
             angle = float(quantity.to("radian").magnitude)
             raise InvalidInput(
                 f"{key} = {text!r} is an angle, and this must be a pure number: a coefficient of "
@@ -200,15 +229,11 @@ def _convert(text: str, unit: str, key: str) -> float:
     except pint.DimensionalityError as error:
         if unit == "1":
             raise InvalidInput(f"{key} = {text!r} has a unit, and this is a pure number") from error
-        reason = f"is not in a unit like {target}: {error}"
+        hint = f" ({question})" if (question := _suggest_unit(text, unit)) else f": {error}"
+        reason = f"is not in a unit like {target}{hint}"
         plain = f'has no unit: write a number, or "{text} {target}"'
-        # a sum such as "1- m" has no quantity yet
         words = plain if str(error.units1) == "dimensionless" else reason
         raise InvalidInput(f"{key} = {text!r} {words}") from error
-    except (pint.UndefinedUnitError, pint.PintError, ValueError, TypeError) as error:
-        raise InvalidInput(
-            f"{key} = {text!r} is not a quantity ({error}): write a number and a unit, e.g. "
-            f'"1.5 {target}"'
-        ) from error
-    except Exception as error:  # of pint's tokenizer
-        raise InvalidInput(f"{key} = {text!r} is not a quantity: {error}") from error
+    except Exception as error:  # also of pint's tokenizer
+        remedy = _suggest_unit(text, unit) or f'write a number and a unit, e.g. "1.5 {target}"'
+        raise InvalidInput(f"{key} = {text!r} is not a quantity ({error}): {remedy}") from error

@@ -34,10 +34,16 @@ def test_a_common_unit_of_another_dimension_is_refused(text, si):
         ("20 kN/m3", "N/m**3", 2e4),
         ("1e3 mm/s2", "m/s**2", 1.0),
         ("9 kN / m2", "Pa", 9e3),
+        ("2kN/m2", "Pa", 2e3),
+        ("22 kN/m³", "N/m**3", 22e3),
+        ("22e-1kN/m^3", "N/m**3", 2.2e3),
+        ("5 kN/(m·mm)", "Pa", 5e6),
+        ("10 s⁻¹", "Hz", 10.0),
+        ("1_500 mm", "m", 1.5),
         ("0.3 g", "m/s**2", 0.3 * 9.80665),
     ],
 )
-def test_powers_may_be_written_without_a_sign(text, si, value):
+def test_one_number_and_one_unit_may_be_written_in_many_ways(text, si, value):
     assert af.units.in_unit(text, si, "x") == pytest.approx(value)
 
 
@@ -50,8 +56,65 @@ def test_a_comma_in_a_number_is_refused(text):
 def test_a_number_as_a_text_is_refused_with_its_remedy():
     with pytest.raises(af.InvalidInput, match=r"x = '2\.25' has no unit: .* or \"2\.25 m\""):
         af.units.in_unit("2.25", "m", "x")
-    with pytest.raises(af.InvalidInput, match=r"x = '1- m' is not in a unit like m: Cannot"):
-        af.units.in_unit("1- m", "m", "x")
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "rest"),
+    [
+        ("2 500 mm", "m", "500 mm"),
+        ("1\u00a0500 mm", "m", "500 mm"),
+        ("1\u202f500 mm", "m", "500 mm"),
+        ("1'500 mm", "m", "'500 mm"),
+        ("-1 200 kN", "N", "200 kN"),
+        ("22 500 N/m**3", "N/m**3", "500 N/m**3"),
+        ("10 000 Pa", "Pa", "000 Pa"),
+        ("5–6 m", "m", "–6 m"),
+        ("5 ± 1 m", "m", "± 1 m"),
+        ("1 1/2 m", "m", "1/2 m"),
+        ("1/2 m", "m", "/2 m"),
+        ("1.2.3 m", "m", ".3 m"),
+        ("2*3 m", "m", "*3 m"),
+        ("5**2 m", "m", "**2 m"),
+        ("0.3 · 9.81 m/s2", "m/s**2", "· 9.81 m/s2"),
+        ("1:2", "1", ":2"),
+        ("1- m", "m", "- m"),
+        ("159 ° 30'", "degree", "° 30'"),
+    ],
+)
+def test_another_number_or_sign_than_one_before_the_unit_is_refused(text, unit, rest):
+    with pytest.raises(af.InvalidInput, match=r"is not a quantity.*write one number") as error:
+        af.units.in_unit(text, unit, "x")
+    assert f"x = {text!r} is not a quantity, for {rest!r} is no unit" in str(error.value)
+
+
+@pytest.mark.parametrize("text", ["~5 m", "<5 m", "(5) m", "½ m", "m"])
+def test_a_quantity_begins_with_its_number(text):
+    with pytest.raises(af.InvalidInput, match="does not begin with a number: write one number"):
+        af.units.in_unit(text, "m", "x")
+
+
+@pytest.mark.parametrize(
+    ("text", "frequency"),
+    [("10 rad/s", 10.0 / (2.0 * np.pi)), ("600 rpm", 10.0), ("10 Hz", 10.0), ("3 cycle/s", 3.0)],
+)
+def test_an_angular_frequency_is_converted_by_a_full_turn(text, frequency):
+    assert af.units.in_unit(text, "Hz", "x") == pytest.approx(frequency, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "meant"),
+    [
+        ("5 KN", "N", "5 kN"),
+        ("5 kn", "N", "5 kN"),
+        ("5 tonf", "N", "5 tf"),
+        ("5 Mpa", "Pa", "5 MPa"),
+        ("20 KN/m3", "N/m**3", "20 kN/m3"),
+        ("0.3 G", "m/s**2", "0.3 g"),
+    ],
+)
+def test_a_unit_in_letters_of_the_wrong_size_is_refused_with_the_usual_one(text, unit, meant):
+    with pytest.raises(af.InvalidInput, match=f"did you mean '{meant}'"):
+        af.units.in_unit(text, unit, "x")
 
 
 @pytest.mark.parametrize(

@@ -463,12 +463,49 @@ def test_components_without_a_time_in_common_are_refused(write):
 
 @pytest.mark.parametrize(
     "stated",
-    ["dt=0.005 sec", "dt = 5 ms", "time step: .005", "Sampling rate: 200 Hz", "DT 5.0E-3 s"],
+    [
+        *("dt=0.005 sec", "dt = 5 ms", "time step: .005", "Sampling rate: 200 Hz", "DT 5.0E-3 s"),
+        *("dt [ms] = 5", "time step 5 milliseconds", "sampling interval (msec): 5", "dt 5 [ms]"),
+        *("dt = 5000 µs", "dt_ms = 5", "delta t 5000 microsec", "dt=0.005; minimum 3"),
+    ],
 )
 def test_the_step_stated_in_a_comment(write, stated):
     motion = af.Motion.read(write(f"% gal, {stated}\n1\n-2\n3\n"))
     assert motion.dt == pytest.approx(0.005)
     assert motion.pga == pytest.approx(0.03)
+
+
+@pytest.mark.parametrize(
+    ("head", "unit"),
+    [
+        *(("Time (ms),Acc (gal)", 1e-3), ("# Time [msec]\tAcc [gal]", 1e-3)),
+        *(("time_ms,a in gal", 1e-3), ("t/ms,a/gal", 1e-3), ("time ms acc gal", 1e-3)),
+        *(("Time (µs),Acc (gal)", 1e-6), ("Zeit (min);gal", 60.0), ("Time,gal\nms,", 1e-3)),
+        *(("Elapsed time (milliseconds), gal", 1e-3), ("# min/max, gal", 1.0)),
+        *(("Time (s),a (gal)", 1.0), ("# atoms, gal", 1.0), ("# max min values, gal", 1.0)),
+    ],
+)
+def test_a_time_column_is_in_the_unit_of_its_head(write, head, unit):
+    """At 10 kHz times in milliseconds would pass for steps of 0.1 s."""
+    rows = "".join(f"{1e-4 * i / unit:.9g} {i % 7}\n" for i in range(200))
+    motion = af.Motion.read(write(f"{head}\n{rows}"))
+    assert motion.dt == pytest.approx(1e-4)
+
+
+@pytest.mark.parametrize(
+    "stated",
+    ["NPTS= 3, DT= 5 MSEC", "NPTS= 3, DT= .005 SEC", "3 5 NPTS, DT (ms)", "NPTS, DT 3 5 MS"],
+)
+def test_the_step_of_peer_is_in_its_unit(write, stated):
+    content = f"PEER\nA, B, 1\nACCELERATION IN UNITS OF G\n{stated}\n.1 .2 .1\n"
+    assert af.Motion.read(write(content)).dt == pytest.approx(0.005)
+
+
+def test_a_record_in_utf_16_is_refused_with_its_encoding(tmp_path):
+    path = tmp_path / "record.txt"
+    path.write_text("# m/s2, dt = 0.01\n1.0\n2.0\n", encoding="utf-16")
+    with pytest.raises(af.InvalidInput, match="is encoded in UTF-16, and UTF-8 is read"):
+        af.Motion.read(path)
 
 
 def test_rounded_times_still_give_the_step(write):
@@ -496,7 +533,7 @@ def test_rounded_times_still_give_the_step(write):
         ("5\n", {"units": "gal", "dt": 0.01}, "one row is no accelerogram"),
         ("1\n2\n", {"units": "gal", "dt": "10 ms"}, "dt = '10 ms' is no number: .*seconds"),
         ("1\n2\nend\n", {"units": "gal", "dt": 0.01}, "line 3: numbers expected, got 'end'"),
-        ("1\n2\n", {"units": "gal", "dt": 3.0}, "sampling interval 3 s"),
+        ("1\n2\n", {"units": "gal", "dt": 3.0}, "sampling interval 3 s.*unit if it is 3 ms"),
     ],
 )
 def test_doubtful_columns_are_refused(write, content, given, message):

@@ -10,8 +10,10 @@ from archfem._validation import check_number
 from archfem.motion.records.record_file import (
     CLOCK_PATTERN,
     NUMBER_PATTERN,
+    TIME_UNIT_PATTERN,
     Channel,
     RecordText,
+    parse_time_unit,
     parse_unit,
 )
 
@@ -29,8 +31,10 @@ def read(
     # even steps: accelerations may fall as well
     if _is_time(rows[::-1]) and np.ptp(falls) < 0.5 * abs(falls.mean()):
         raise text.error("the times of the first column run backwards: reverse its rows", lines[0])
-    step = _find_step(text, rows, lines, _list_stated_steps(comments, dt))
     first = 1 if _is_time(rows) else 0
+    if first:
+        rows[:, 0] *= _find_time_unit(comments)
+    step = _find_step(text, rows, lines, _list_stated_steps(comments, dt))
     directions = _find_directions(comments, rows.shape[1], first)
     if not (first or directions) and _runs_along_lines(rows):
         rows, rest = np.append(rows, rest)[:, None], []
@@ -153,14 +157,24 @@ def _find_unit(text: RecordText, comments: str, units: str | None) -> float:
     return written.pop()
 
 
+def _find_time_unit(comments: str) -> float:
+    """Return the unit of the first column [s] by the start of its head: Time (ms), t/ms or ms."""
+    name = r"(?:[^\W\d_][^,;\t\d=)\]]{0,30}?[(\[]\s*|(?:t|time)[\s/_]+)"
+    unit = rf"({TIME_UNIT_PATTERN})"
+    pattern = rf"^[#%!*\s\"']*(?:{name}{unit}|{unit}[ \"']*[,;\t])"
+    found = re.search(pattern, comments, re.IGNORECASE | re.MULTILINE)
+    return parse_time_unit(found and (found[1] or found[2]))
+
+
 def _list_stated_steps(comments: str, dt: float | None) -> list[float]:
     """Return the steps stated by keyword and in the comments [s]."""
-    number = rf"\b[^\d+\-.\n]{{0,12}}({NUMBER_PATTERN})\s*"
-    step_pattern = r"\b(?:dt|delta\s*t|time\s*step|sampl\w*\s+interval)" + number + "(ms)?"
-    rate_pattern = r"\bsampl\w*\s+(?:rate|freq\w*)" + number + r"(?:Hz|sps)\b"
+    number = rf"[^\d+\-.\n]{{0,12}}({NUMBER_PATTERN})[ \t(\[]*"
+    key, unit = r"\b(?:dt|delta\s*t|time\s*step|sampl\w*\s+interval)", rf"({TIME_UNIT_PATTERN})?"
+    step_pattern = rf"{key}(?![^\W_])[ \t(\[_]*{unit}{number}{unit}"
+    rate_pattern = rf"\bsampl\w*\s+(?:rate|freq\w*)\b{number}(?:Hz|sps)\b"
     steps = [] if dt is None else [check_number(dt, "dt [s]")]
-    for value, milli in re.findall(step_pattern, comments, re.IGNORECASE):
-        steps.append(float(value) * (1e-3 if milli else 1.0))
+    for before, value, after in re.findall(step_pattern, comments, re.IGNORECASE):
+        steps.append(float(value) * parse_time_unit(before or after))
     rates = re.findall(rate_pattern, comments, re.IGNORECASE)
     return steps + [1.0 / max(float(rate), 1e-9) for rate in rates]
 

@@ -5,7 +5,14 @@ import re
 import numpy as np
 
 from archfem._typing import Array
-from archfem.motion.records.record_file import COUNT_PATTERN, NUMBER_PATTERN, Channel, RecordText
+from archfem.motion.records.record_file import (
+    COUNT_PATTERN,
+    NUMBER_PATTERN,
+    TIME_UNIT_PATTERN,
+    Channel,
+    RecordText,
+    parse_time_unit,
+)
 
 
 def read_afad(text: RecordText) -> list[Channel]:
@@ -172,17 +179,19 @@ def _find_count_and_step(text: RecordText, max_lines: int = 12) -> tuple[int, fl
     """Return NPTS, DT [s] and the index of the last header line."""
     # files in the wild begin with blank lines or lack one of the four lines of the header
     pair = rf"({COUNT_PATTERN})[\s,]+({NUMBER_PATTERN})"
-    values_before_names = rf"^\s*{pair}[\s,]+NPTS[\s,]*DT\b"
-    values_after_names = rf"\bNPTS[\s,]+DT\s*[=:]?\s*{pair}"
+    unit = rf"[\s(]*({TIME_UNIT_PATTERN})?"
+    values_before_names = rf"^\s*{pair}[\s,]+NPTS[\s,]*DT\b{unit}"
+    values_after_names = rf"\bNPTS[\s,]+DT\s*[=:]?\s*{pair}{unit}"
     together = text.search(values_before_names, stop=max_lines)
     together = together or text.search(values_after_names, stop=max_lines)
     if together:
         line, values = together
-        return int(values[1]), float(values[2]), line
+        return int(values[1]), float(values[2]) * parse_time_unit(values[3]), line
     count_pattern = rf"\bNPTS\s*[=:]?\s*({COUNT_PATTERN})\b(?!\.)"
     count_line, count = text.find(count_pattern, stop=max_lines)
-    step_line, step = text.find(rf"\bDT\s*[=:]?\s*({NUMBER_PATTERN})", stop=max_lines)
-    return int(count[1]), float(step[1]), max(count_line, step_line)
+    step_line, step = text.find(rf"\bDT\s*[=:]?\s*({NUMBER_PATTERN}){unit}", stop=max_lines)
+    dt = float(step[1]) * parse_time_unit(step[2])
+    return int(count[1]), dt, max(count_line, step_line)
 
 
 def _find_peer_direction(text: RecordText, line: int) -> str:

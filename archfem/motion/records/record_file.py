@@ -1,6 +1,7 @@
 """Text of a record file: its numbers, units and channels, and errors with file and line."""
 
 import re
+from codecs import BOM_UTF16_BE, BOM_UTF16_LE
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -25,6 +26,11 @@ _FACTOR = r"(?=[\d.]*[1-9])(?:\d{1,9}(?:\.\d{0,9})?|\.\d{1,9})(?:e[-+]?\d\d?)?"
 COUNT_PATTERN = r"\d{1,9}"
 
 
+# Pattern of a unit of time other than the second
+TIME_UNIT_PATTERN = (
+    r"(?:(?:milli[- ]?|micro[- ]?|[muµμ])s(?:ec(?:ond)?s?)?|min(?:ute)?s?|h(?:ou)?rs?)(?![^\W_])"
+)
+
 # Pattern of a time on the clock, after a date where there is one
 CLOCK_PATTERN = (
     r"(?<![\d:])(?:(\d{4}|\d\d?)([-/.]?)(\d\d?)\2(\d{4}|\d\d?)[T\s_,;-]+(?=\d{6}|\d\d?:)"
@@ -47,6 +53,8 @@ class RecordText:
         content = re.sub(rb"\s*\0[\0\s]*\Z", b"\n", content.rstrip(b"\x1a"))
         if b"\0" in content or not content.strip():
             kind = "not a text file" if content.strip() else "empty"
+            if content.startswith((BOM_UTF16_LE, BOM_UTF16_BE)):
+                kind = "encoded in UTF-16, and UTF-8 is read"
             raise InvalidInput(f"{Path(path)} is {kind}: give an accelerogram as text")
         try:
             text = content.decode("utf-8-sig")
@@ -205,8 +213,9 @@ class RecordText:
     def check_step(self, dt: float, line: int | None = None) -> float:
         """Return a valid sampling interval [s]."""
         if not 0.0 < dt <= 0.1:  # below 10 Hz no motion of a structure is recorded
+            hint = f"; write the unit if it is {dt:g} ms" if 0.1 < dt <= 100.0 else ""
             raise self.error(
-                f"sampling interval {dt:g} s, expected more than 0 and up to 0.1 s", line
+                f"sampling interval {dt:g} s, expected more than 0 and up to 0.1 s{hint}", line
             )
         return dt
 
@@ -309,6 +318,13 @@ class Channel:
         """Create a channel of each column of a table (n, columns)."""
         columns = zip(table.T, names, strict=True)
         return [cls.from_direction(column, dt, name, start_time) for column, name in columns]
+
+
+def parse_time_unit(name: str | None) -> float:
+    """Return the value of a unit found by `TIME_UNIT_PATTERN` [s], a second for none."""
+    units = {"mic": 1e-6, "min": 60.0, "m": 1e-3, "h": 3600.0, "": 1e-6}
+    head = (name or "").lower()
+    return next(value for start, value in units.items() if head.startswith(start)) if head else 1.0
 
 
 def parse_unit(name: str) -> float:
