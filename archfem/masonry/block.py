@@ -191,8 +191,12 @@ class Block:
                 f"{self.outline[short[0]]}: leave one out"
             )
         if self.area <= 0.0:
+            import shapely
+
+            simple = shapely.LinearRing(self.outline).is_simple
+            remedy = "anticlockwise" if simple else "without edges that cross"
             raise InvalidStructure(
-                f"block '{self.name}' has area {self.area:.3g} m²: give its outline anticlockwise"
+                f"block '{self.name}' has area {self.area:.3g} m²: give its outline {remedy}"
             )
 
     @cached_property

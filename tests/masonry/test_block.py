@@ -8,6 +8,18 @@ import archfem as af
 SQUARE = ((0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (0.0, 1.0))
 
 
+@pytest.mark.parametrize(
+    ("outline", "remedy"),
+    [
+        (SQUARE[::-1], "anticlockwise"),
+        ((*SQUARE[:1], SQUARE[2], SQUARE[1], SQUARE[3]), "without edges that cross"),
+    ],
+)
+def test_an_outline_without_a_positive_area_is_refused_with_its_remedy(outline, remedy):
+    with pytest.raises(af.errors.InvalidStructure, match=f"m²: give its outline {remedy}"):
+        af.Block(outline, af.STONE, "b")
+
+
 def test_polygon_measures():
     block = af.Block(SQUARE, af.STONE, "square")
     assert block.area == pytest.approx(2.0)

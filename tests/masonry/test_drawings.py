@@ -4,6 +4,7 @@ import json
 import re
 import resource
 import struct
+from collections import Counter
 from itertools import pairwise
 from pathlib import Path
 
@@ -419,6 +420,69 @@ def test_lines_in_place_of_outlines_are_counted(tmp_path):
     drawing.saveas(tmp_path / "lines.dxf")
     with pytest.raises(af.InvalidInput, match="no polylines, but 2 LINE: make a closed one"):
         af.read_outlines(tmp_path / "lines.dxf")
+
+
+@pytest.mark.parametrize("hide", ["entity", "off", "frozen", "insert", "frozen insert"])
+def test_outlines_that_a_dxf_hides_are_no_stones_but_counted(tmp_path, hide):
+    drawing = ezdxf.new(units=6)
+    for layer in ("ROCK", "WALL", "OLD", "SHEET"):
+        drawing.layers.add(layer)
+    space, block = drawing.modelspace(), drawing.blocks.new("OLDER")
+    space.add_lwpolyline(square(0, -1), close=True, dxfattribs={"layer": "ROCK"})
+    space.add_lwpolyline(square(0, 0), close=True, dxfattribs={"layer": "WALL"})
+    target, flags = (block, {}) if "insert" in hide else (space, {"invisible": hide == "entity"})
+    target.add_lwpolyline(square(0, 1), close=True, dxfattribs={"layer": "old", **flags})
+    if target is block:
+        invisible = {"invisible": int(hide == "insert")}
+        space.add_blockref("OLDER", (0, 0), dxfattribs={"layer": "SHEET", **invisible})
+    if hide == "off":
+        drawing.layers.get("OLD").off()
+    if hide == "frozen":
+        drawing.layers.get("OLD").freeze()
+    if hide == "frozen insert":
+        drawing.layers.get("SHEET").freeze()
+    drawing.saveas(tmp_path / "a.dxf")
+    layers = {"ROCK": af.masonry.Layer(fixed=True), "WALL": af.masonry.Layer(role="pier")}
+    survey = af.read_outlines(tmp_path / "a.dxf", layers=layers)
+    layer = "SHEET" if "insert" in hide else "old"
+    assert [block.name for block in survey.blocks] == ["ROCK 1", "WALL 1"]
+    assert str(survey).endswith(f"ignored layers: '{layer} (hidden)' with 1 outlines")
+
+
+def test_an_insert_on_a_layer_that_is_off_shows_its_parts_on_other_layers(tmp_path):
+    drawing = ezdxf.new(units=6)
+    drawing.layers.add("SHEET").off()
+    block = drawing.blocks.new("WALLS")
+    block.add_lwpolyline(square(0, 0), close=True, dxfattribs={"layer": "WALL"})
+    block.add_lwpolyline(square(2, 0), close=True, dxfattribs={"layer": "0"})
+    drawing.modelspace().add_blockref("WALLS", (0, 0), dxfattribs={"layer": "SHEET"})
+    drawing.saveas(tmp_path / "a.dxf")
+    ignored = Counter()
+    assert [each.layer for each in read_drawing(tmp_path / "a.dxf", ignored=ignored)] == ["WALL"]
+    assert ignored == {"SHEET (hidden)": 1}
+    layers = {"WALL": af.masonry.Layer(), "SHEET": af.masonry.Layer()}
+    with pytest.raises(af.InvalidInput, match=r"no outlines on layer 'SHEET'.*and 1 .*are hidden"):
+        af.read_outlines(tmp_path / "a.dxf", layers=layers)
+
+
+@pytest.mark.parametrize("unit", [None, "ft"])
+def test_a_us_survey_foot_is_1200_3937_m(tmp_path, unit):
+    """As a foot of 0.3048 m it would be 2e-6 shorter."""
+    drawing = ezdxf.new(units=21)
+    drawing.modelspace().add_lwpolyline(square(0, 0, 3.937), close=True)
+    drawing.saveas(tmp_path / "a.dxf")
+    (outline,) = read_drawing(tmp_path / "a.dxf", unit)
+    assert outline.points.max() == pytest.approx(1.2, rel=1e-12 if unit is None else 3e-6)
+    assert not outline.frame.stated
+
+
+def test_a_layer_of_geojson_is_refused_where_a_part_is_missing(tmp_path):
+    path = geojson(tmp_path / "a.geojson", {"a": square(0, 0)})
+    path.write_text(path.read_text().replace('"name"', '"Layer": "POST", "name"'))
+    with pytest.raises(af.InvalidInput, match=r"'layer', which is not read.*read are name, part"):
+        read_drawing(path)
+    path.write_text(path.read_text().replace('"name"', '"part": "post", "name"'))
+    assert [each.layer for each in read_drawing(path)] == ["post"]
 
 
 def test_the_unit_of_a_drawing_is_judged_before_its_open_ends(tmp_path):

@@ -1,6 +1,7 @@
 """Elevations in SVG: shapes, curves and transformations against closed forms; bad files."""
 
 import math
+from collections import Counter
 from itertools import pairwise
 
 import numpy as np
@@ -96,6 +97,20 @@ def test_transformations_are_applied_from_the_inside():
     assert skewed[2] == pytest.approx([2.0, -1.0])
 
 
+def test_hidden_shapes_are_counted_and_visible_parts_of_hidden_groups_read():
+    def draw(k, attributes):
+        return f'<rect id="{k}" x="{2 * k}px" width="1" height="1" {attributes}/>'
+
+    hidden, shown = draw(1, ""), draw(2, "visibility='visible'")
+    whole = f'<g id="A" style="visibility: hidden">{hidden}{shown}</g>'
+    none = f'<g id="B" display="none">{draw(3, "") + shown}<use/></g>'
+    others = draw(4, "visibility='hidden'") + draw(5, "style='fill:red;visibility:collapse'")
+    ignored = Counter()
+    found = read_svg(HEAD + whole + none + others + draw(6, "") + "</svg>", 1e-3, ignored)
+    assert [name for name, _, _ in found] == ["2", "6"]
+    assert ignored == {"A (hidden)": 1, "B (hidden)": 2, "drawing (hidden)": 2}
+
+
 def test_what_is_hidden_or_defined_is_no_stone():
     square = '<rect width="1" height="1"/>'
     hidden = f'<g style="display:none">{square}</g><defs>{square}</defs><text>note</text>'
@@ -114,7 +129,7 @@ def test_what_is_hidden_or_defined_is_no_stone():
         ('<path id="a" d="M0 0 L1"/>', "'a' has no number for 'L'"),
         ('<path id="a" d="0 0 L1 1"/>', "'a' has no command of a path"),
         ('<polygon id="a" points="0 0 1 1"/>', "'a' has 2 corners"),
-        ('<rect width="1em" height="1"/>', "could not convert"),
+        ('<rect width="1em" height="1"/>', "width = '1em', and a number without a unit"),
         ('<rect width="1" height="1" transform="bend(3)"/>', "is none of SVG"),
         ("<g>", "it is no SVG"),
         ("<!ENTITY a 'b'>", "defines entities"),

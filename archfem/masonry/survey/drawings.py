@@ -10,7 +10,7 @@ import re
 from cmath import rect
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from importlib import import_module
@@ -91,9 +91,10 @@ def read_drawing(
 ) -> list[Outline]:
     """Read the closed polygons of a drawing; arcs stray by half of snap.
 
-    Outlines on the layers that are keys of `ignored` are left out, and counted there.
+    Outlines on the layers that are keys of `ignored` are left out, and counted there; so are those
+    that the drawing hides, under "layer (hidden)".
     """
-    path = Path(path)
+    path, ignored = Path(path), Counter() if ignored is None else ignored
     readers = {".geojson": _read_geojson, ".json": _read_geojson, ".msh": _read_msh}
     readers |= {".dxf": partial(_read_dxf, snap=snap), ".svg": partial(_read_svg, snap=snap)}
     readers[".ifc"] = _read_ifc
@@ -101,7 +102,7 @@ def read_drawing(
         raise InvalidInput(f"{path} is no drawing: give a .geojson, .dxf, .svg, .ifc or .msh file")
     check_file(path, "drawing", max_bytes=2**25)
     try:
-        outlines = list(read(path, unit, ignored or Counter()))
+        outlines = list(read(path, unit, ignored))
         _check_sizes(outlines)
     except InvalidInput as error:
         raise InvalidInput(f"{path}: {error}") from error
@@ -166,7 +167,8 @@ def _check_sizes(outlines: list[Outline]) -> None:
     """Refuse a drawing without outlines, with too many, or whose unit is evidently wrong."""
     if not outlines:
         raise InvalidInput(
-            "it has no closed outlines to read: in a DXF draw them in model space, not on a sheet"
+            "it has no closed outlines to read: in a DXF draw them in model space, not on a sheet, "
+            "and on layers that are shown"
         )
     points = sum(len(each.points) for each in outlines)
     if points > 20_000:  # every edge is compared with every vertex
@@ -220,7 +222,8 @@ def _read_geojson(path: Path, unit: str | None, ignored: Counter[str]) -> Iterat
 def _read_unit(unit: str, upwards: float = 1.0, other: Frame | None = None) -> Frame:
     """Return the coordinates of a drawing in a unit, which may contradict that of the file."""
     factor = in_unit(f"1 {unit}", "m", "unit")
-    stated = other.unit if other and not isclose(factor, other.factor) else ""
+    # a US survey foot is 2e-6 longer than a foot
+    stated = other.unit if other and not isclose(factor, other.factor, rel_tol=1e-5) else ""
     return Frame(factor, unit, upwards, stated)
 
 
@@ -259,6 +262,11 @@ def _read_feature(feature: dict[str, Any], number: int, factor: float) -> Outlin
 def _check_properties(data: dict[str, Any], name: str) -> None:
     """Refuse misspelt properties and values of the wrong kind."""
     words = ("name", "part", "role", "material")
+    if not data.get("part") and {key.lower() for key in data} >= {"layer"}:
+        raise InvalidInput(
+            f"'{name}' has a property 'layer', which is not read, and no part: rename it to part; "
+            "read are name, part, role, material and fixed"
+        )
     for key in set(data) - {*words, "fixed"}:  # others are ignored
         if hint := suggest_name(key.lower(), [*words, "fixed"], 0.8):
             raise InvalidInput(f"'{name}' has a property '{key}': {hint}")
@@ -340,7 +348,13 @@ def _load_dxf(path: Path, ignored: Counter[str]) -> tuple[list[Entity], Frame | 
 
     drawing: Any = readfile(path)
     entities = []
-    for entity, layer in islice(_walk_dxf(drawing.modelspace(), ignored), MAX_ENTITIES + 1):
+    hidden = {
+        each.dxf.name.casefold(): each.is_frozen()
+        for each in drawing.layers
+        if each.is_off() or each.is_frozen()
+    }
+    walk = _walk_dxf(drawing.modelspace(), ignored, hidden)
+    for entity, layer in islice(walk, MAX_ENTITIES + 1):
         kind = entity.dxftype()
         if kind in POLYLINES:
             light = kind == "LWPOLYLINE"
@@ -359,14 +373,21 @@ def _load_dxf(path: Path, ignored: Counter[str]) -> tuple[list[Entity], Frame | 
         else:
             entities.append(Entity(kind, layer, []))
     known = drawing.units  # 0 where the drawing has none
-    factor = float(units.conversion_factor(known, InsertUnits.Meters)) if known else 0.0
-    return entities, Frame(factor, units.decode(known) or "units") if known else None
+    if known == InsertUnits.USSurveyFeet:  # which ezdxf does not convert
+        return entities, Frame(1200.0 / 3937.0, "US survey ft")
+    with suppress(TypeError, ValueError):  # of other units that it does not convert
+        factor = float(units.conversion_factor(known, InsertUnits.Meters))
+        return entities, Frame(factor, units.decode(known) or "units")
+    return entities, None
 
 
 def _walk_dxf(
-    space: Any, ignored: Counter[str], parent: str | None = None
+    space: Any, ignored: Counter[str], hidden: Mapping[str, bool], parent: str | None = None
 ) -> Iterator[tuple[Any, str]]:
-    """Yield entities and their layers, also those of inserted blocks, but ignored layers."""
+    """Yield entities and their layers, also those of inserted blocks, but ignored and hidden ones.
+
+    Layers that are off or frozen are hidden, with True for frozen ones.
+    """
     lost: list[tuple[Any, str]] = []  # of a block, which ezdxf does not transform
 
     def keep(part: Any, _: str) -> None:
@@ -378,12 +399,18 @@ def _walk_dxf(
         if layer in ignored:
             ignored[layer] += entity.dxftype() in POLYLINES
             continue
-        copied = entity.dxftype() == "INSERT" and entity.mcount > 1
+        is_insert, state = entity.dxftype() == "INSERT", hidden.get(layer.casefold())
+        # of an insert on a layer that is off, parts on other layers are shown
+        if entity.dxf.get("invisible") == 1 or state or (state is not None and not is_insert):
+            if is_insert or entity.dxftype() in POLYLINES:
+                ignored[f"{layer} (hidden)"] += 1
+            continue
+        copied = is_insert and entity.mcount > 1
         for each in entity.multi_insert() if copied else (entity,):
             yield each, layer
             if each.dxftype() == "INSERT":
                 parts = each.virtual_entities(skipped_entity_callback=keep)
-                yield from _walk_dxf(parts, ignored, layer)
+                yield from _walk_dxf(parts, ignored, hidden, layer)
     yield from lost
 
 

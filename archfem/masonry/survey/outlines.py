@@ -92,7 +92,7 @@ class Survey:
         size: breadth and height of the drawing [m].
         moved: largest displacement of a vertex by snapping [m].
         frame: unit of the coordinates.
-        ignored: number of outlines on each ignored layer.
+        ignored: number of outlines on each ignored layer, and as "layer (hidden)" of hidden ones.
         lost: ignored outlines that lie between stones as one does: layer, place and the share of
             the circumference that touches them [-].
     """
@@ -150,7 +150,7 @@ def read_outlines(
     ignored = Counter({name: 0 for name, layer in known.items() if layer.ignore})
     outlines = read_drawing(path, unit, ignored, snap)
     if layers is not None:
-        _check_layers(outlines, layers, path)
+        _check_layers(outlines, layers, path, ignored)
     try:
         points, moved, _ = _close_or_advise(outlines, snap)
         blocks = [
@@ -255,7 +255,9 @@ def _name_joints(structure: Structure, path: Path, unit: str | None) -> Structur
     return replace(structure, joints=tuple(joints))
 
 
-def _check_layers(outlines: list[Outline], layers: Mapping[str, Layer], path: str | Path) -> None:
+def _check_layers(
+    outlines: list[Outline], layers: Mapping[str, Layer], path: str | Path, ignored: Counter[str]
+) -> None:
     """Refuse layers of the file without properties, and properties of missing layers."""
     there = {outline.layer for outline in outlines}
     if strange := sorted(there - set(layers)):
@@ -268,8 +270,10 @@ def _check_layers(outlines: list[Outline], layers: Mapping[str, Layer], path: st
         )
     expected = {name for name, layer in layers.items() if not layer.ignore}
     if missing := sorted(expected - there):
+        hidden = ignored.get(f"{missing[0]} (hidden)")
+        also = f", and {hidden} outlines on it are hidden, which are not read" if hidden else ""
         raise InvalidInput(
-            f"{path} has no outlines on layer '{missing[0]}': its layers are {sorted(there)}"
+            f"{path} has no outlines on layer '{missing[0]}': its layers are {sorted(there)}{also}"
         )
 
 

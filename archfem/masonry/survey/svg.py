@@ -45,8 +45,9 @@ def read_svg(
 ) -> Iterator[tuple[str, str, Array]]:
     """Yield name, layer and vertices (n, 2) of the closed shapes, y upwards, in units of the file.
 
-    Shapes in layers that are keys of `ignored` are left out, and counted there. Chords deviate
-    from curves by at most `near`, by which ends of a closed shape may be apart.
+    Shapes in layers that are keys of `ignored` are left out, and counted there, as are hidden ones
+    under "layer (hidden)". Chords deviate from curves by at most `near`, by which ends of a closed
+    shape may be apart.
     """
     if "<!ENTITY" in text:
         raise InvalidInput("it defines entities, which are not read: save it as plain SVG")
@@ -56,10 +57,10 @@ def read_svg(
         raise InvalidInput(f"it is no SVG: {error}") from error
     if _kind(root) != "svg":
         raise InvalidInput(f"it is no SVG: its root is '{_kind(root)}'")
-    numbers, ignored = Counter[str](), ignored or Counter()
-    for element, layer, matrix in _walk(root, "drawing", np.eye(3)):
-        if layer in ignored:
-            ignored[layer] += 1
+    numbers, ignored = Counter[str](), Counter() if ignored is None else ignored
+    for element, layer, matrix, is_hidden in _walk(root, "drawing", np.eye(3)):
+        if layer in ignored or is_hidden:
+            ignored[layer if layer in ignored else f"{layer} (hidden)"] += 1
             continue
         numbers[layer] += 1
         name = element.get("id") or f"{layer} {numbers[layer]}"
@@ -83,21 +84,33 @@ def _kind(element: XML.Element) -> str:
     return element.tag.rpartition("}")[2] if isinstance(element.tag, str) else ""
 
 
+def _read_style(element: XML.Element, name: str) -> str | None:
+    """Return a property of the style of an element, else its attribute of that name."""
+    found = re.findall(rf"(?:^|;)\s*{name}\s*:\s*([\w-]+)", element.get("style", ""))
+    return found[-1] if found else element.get(name)
+
+
 def _walk(
-    parent: XML.Element, layer: str, matrix: Array
-) -> Iterator[tuple[XML.Element, str, Array]]:
-    """Yield the shapes with their layers, the innermost named groups, and their matrices."""
+    parent: XML.Element, layer: str, matrix: Array, visibility: str = "visible"
+) -> Iterator[tuple[XML.Element, str, Array, bool]]:
+    """Yield shapes, their layers (innermost named groups), matrices and whether they are hidden."""
     for element in parent:
         kind = _kind(element)
-        hidden = re.search(r"display\s*:\s*none", element.get("style", ""))
-        if kind in PASSED or not kind or hidden or element.get("display") == "none":
+        if kind in PASSED or not kind:
             continue
         own = matrix @ _read_transform(element.get("transform", ""))
+        # parts of a hidden group may be visible, but none of one without display
+        shown = _read_style(element, "visibility") or visibility
+        if "none" in (visibility, _read_style(element, "display")):
+            shown = "none"
+        is_hidden = shown in ("none", "hidden", "collapse")
         if kind in ("g", "svg", "a"):
             labels = [value for key, value in element.items() if key.endswith("}label")]
-            yield from _walk(element, (labels or [element.get("id") or layer])[0], own)
+            yield from _walk(element, (labels or [element.get("id") or layer])[0], own, shown)
         elif kind in SHAPES:
-            yield element, layer, own
+            yield element, layer, own, is_hidden
+        elif is_hidden:
+            continue
         elif "}" not in element.tag or "w3.org" in element.tag:
             raise InvalidInput(
                 f"layer '{layer}' has a '{kind}': convert objects to paths, and unlink clones"
@@ -143,10 +156,14 @@ def _trace(element: XML.Element, name: str) -> Iterator[list[Segment]]:
         yield from _read_path(element.get("d", ""), name)
         return
     if _kind(element) == "rect":
-        try:
-            x, y, w, h = (float(element.get(key, "0")) for key in ("x", "y", "width", "height"))
-        except ValueError as error:
-            raise InvalidInput(f"'{name}' is a rectangle with {error}: save plain SVG") from error
+        sizes = {key: element.get(key, "0") for key in ("x", "y", "width", "height")}
+        for key, text in sizes.items():
+            if not re.fullmatch(NUMBER, text.strip().removesuffix("px")):
+                raise InvalidInput(
+                    f"'{name}' is a rectangle with {key} = {text!r}, and a number without a unit "
+                    "is read: convert it to a path"
+                )
+        x, y, w, h = (float(text.strip().removesuffix("px")) for text in sizes.values())
         corners = [complex(x, y), complex(x + w, y), complex(x + w, y + h), complex(x, y + h)]
     else:
         values = [float(number) for number in re.findall(NUMBER, element.get("points", ""))]
