@@ -8,7 +8,7 @@ from math import degrees, inf, isfinite, pi, prod, tan
 from typing import Any
 
 from archfem._validation import is_number, short_repr, validate_arguments
-from archfem.errors import InvalidInput
+from archfem.errors import InvalidInput, logger
 
 mm = 1e-3  # m
 kN = 1e3  # N
@@ -130,6 +130,16 @@ def in_si_unit(values: Sequence[Any]) -> tuple[list[Any], str]:
             convert = partial(in_unit, unit=unit, key="value")
             return [None if value is None else convert(value) for value in values], unit
     return list(values), ""
+
+
+def warn_if_in_g(acceleration: float, key: str) -> None:
+    """Warn of a peak acceleration [m/s²] so small that it is probably a multiple of g."""
+    if acceleration < 0.5:  # up to about 0.05 g seismicity is very low (EN 1998-1, 3.2.1)
+        words = "%s is %.3g m/s², which is %.3g g: write %.3g m/s² if it is %.3g g"
+        in_g = acceleration * STANDARD_GRAVITY
+        logger.warning(
+            words, key, acceleration, acceleration / STANDARD_GRAVITY, in_g, acceleration
+        )
 
 
 def format_mm(length: float) -> str:

@@ -91,7 +91,7 @@ MADE = [
     (lambda: af.Material(30e9, 0.2, 2000.0), "looks like kg/m³: .* have 1.962e.04"),
     (lambda: af.Material(30e9, 0.2, 1e-300), "is not between 0.001 and"),
     (lambda: af.Tbec2018(1.0, 1e300, "ZC"), r"S_1 1e\+300 g: both are between 0 and 10 g"),
-    (lambda: af.Eurocode8(1e300, "B"), "is not between 0 and 2"),
+    (lambda: af.Eurocode8(1e300, "B"), "is not between 0 and 1"),
     (lambda: af.motion.TableSpectrum([1.0, 2.0], [1.0, 1e300]), "more than 10 g"),
     (lambda: af.StiffnessDamping(0.05, 1e-300), "is not between 0.001 and 1e"),
     (lambda: af.Material("30 GPa", 0.2, 2e4), "young of 'material' = '30 GPa' is not a finite"),

@@ -30,7 +30,7 @@ from archfem.statics.mechanism_assessment import (
     kinematic_assessment,
 )
 from archfem.statics.pushover import Pushover, Stop, pushover
-from archfem.units import MPa, kN
+from archfem.units import MPa, kN, warn_if_in_g
 
 # Least weight of the heaviest axle of a vehicle that a case may give without its unit [N]: those of
 # lorries in kg are less
@@ -81,6 +81,7 @@ class LimitAnalysis:
                 strength is in another unit.
         """
         check_options(structure, self.friction, self.strength)
+        _check_places(structure, *self.live, *self.dead)
         if self.live and not isinstance(self.fill, PlasticFill):
             given = self.friction, self.strength, self.fill, self.dead
             self_weight_programme(structure, *given)[0].load(self.live)
@@ -162,6 +163,11 @@ class PushoverSettings:
     dead: tuple[Action, ...]  # loads beside self-weight that do not grow
     options: dict[str, Any]  # other arguments of `pushover`
 
+    def check(self, structure: Structure) -> None:
+        """Refuse a load that misses the structure, and a settlement of another block."""
+        live = [self.live] if isinstance(self.live, Settlement) else self.live
+        _check_places(structure, *live, *self.dead)
+
     def solve(self, start: Equilibrium, criteria: Criteria) -> Pushover:
         """Push the structure from its dead load."""
         given = {**self.options, "dead": self.dead, "criteria": criteria}
@@ -174,6 +180,13 @@ class PushoverSettings:
             grows = f"loads that grow together: {len(self.live)}"
         control = self.options.get("control", "displacement")
         return f"pushover: {grows}; loads that stay: {len(self.dead)}; control by {control}"
+
+
+def _check_places(structure: Structure, *loads: Action | Settlement) -> None:
+    """Refuse loads at points that miss the structure, and settlements of blocks that are free."""
+    for load in loads:
+        if not isinstance(load, BodyForce):
+            load.place(structure)
 
 
 # Keys of loads that grow, as multiples of the weight or at points, and of loads that stay
@@ -221,6 +234,7 @@ def parse_limit(table: Any, strength: float | None = None) -> LimitAnalysis:
         given = np.inf
     if (demand := values.get("demand")) is not None:
         check_number(demand, "limit.demand [m/s²]", minimum=1e-3)
+        warn_if_in_g(demand, "limit.demand")
     return LimitAnalysis(live, friction, given, fill, dead, demand)
 
 

@@ -297,6 +297,8 @@ def carry_out(
     selected = case if pairs is None else case.alone(*pairs)
     selected.check_ground()
     case.limit.check(case.structure)
+    if case.pushover is not None:
+        case.pushover.check(case.structure)
     at_rest = DeadLoadResult.of(case)
     yield at_rest
     if case.pushover is not None:

@@ -67,6 +67,8 @@ def _check_case(options: argparse.Namespace) -> int:
     print(result_text.describe_supports(case.structure))
     print(result_text.describe_depths(case.structure))
     case.limit.check(case.structure)
+    if case.pushover is not None:
+        case.pushover.check(case.structure)
     if case.limit.live and case.limit.friction == "nonassociated":
         print("limit analysis: `archfem limit` searches sliding without dilatancy, in both senses")
     elif case.limit.live:

@@ -322,6 +322,8 @@ def collapse_factor(
     loads = live if isinstance(live, Settlement) else list_loads(live)
     if isinstance(loads, Settlement):
         refuse_bonds(structure)
+    else:
+        warn_lift(loads)
     stays = tuple(list_loads(dead)) if dead else ()
     result = _solve_loads(structure, loads, stays, friction, strength, fill)
     if isinstance(fill, Fill) and result.outcome is not Outcome.INFEASIBLE:
@@ -661,6 +663,17 @@ def describe_fill(fill: Fill | PlasticFill | None, structure: Structure) -> str:
     height = fill.backing - find_clear_springing(structure)
     above = "" if np.isnan(height) else f", {height:.3g} m above the lowest clear springing"
     return f"{text}; backing up to y = {fill.backing:.4g} m{above}: {holds}"
+
+
+def warn_lift(loads: Sequence[Action]) -> None:
+    """Warn of a load at a point that lifts, as one does whose sign is wrong."""
+    for load in loads:
+        if isinstance(load, PointLoad) and load.force[1] > 0.0:
+            logger.warning(
+                "the point load at x = %.4g m acts upwards by %.4g kN, and lifts the structure: a "
+                "weight is negative, as in (0, -1)",
+                *(load.x, load.force[1] / kN),
+            )
 
 
 def warn_dilatancy(structure: Structure) -> None:

@@ -13,7 +13,7 @@ from archfem._typing import Array, Degrees, Metres, Pascals
 from archfem._validation import check_between, check_choice, check_number
 from archfem.errors import InvalidInput
 from archfem.masonry.structure import Structure
-from archfem.units import in_degrees
+from archfem.units import in_degrees, kPa
 
 # `Fill` or `PlasticFill`, or None
 AnyFill = TypeVar("AnyFill", bound=Any)
@@ -206,6 +206,11 @@ def read_strength(fill: Any, *shares: str) -> None:
             object.__setattr__(fill, key, in_degrees(value, f"fill, {key}"))
     for key in ("friction_angle", "cohesion", *shares, "spread"):
         check_number(getattr(fill, key), f"fill, {key}", minimum=0.0)
+    if 0.0 < fill.cohesion < 100.0:
+        raise InvalidInput(
+            f"fill, cohesion {fill.cohesion:.4g} Pa is less than soil has: give pascals, "
+            f"{fill.cohesion * kPa:.4g} for {fill.cohesion:.4g} kPa, or 0"
+        )
     if not (fill.friction_angle == 0.0 or 1.0 <= fill.friction_angle <= 60.0):
         raise InvalidInput(
             f"fill, friction_angle {fill.friction_angle:.4g}° is neither 0 nor between 1° and "

@@ -91,6 +91,13 @@ def _european_branches(
     return SpectrumBranches(ground * top, 1.0 / top, corners, longest=4.0)
 
 
+def _check_ground(acceleration: float, name: str) -> None:
+    """Refuse an acceleration of the ground [g] that no map has, as one in m/s²."""
+    number = check_number(acceleration, name)
+    remedy = f"{number:.4g} m/s² are {number / STANDARD_GRAVITY:.3g} g"
+    check_between(acceleration, name, 0.0, 1.0, ends="(]", remedy=remedy)
+
+
 class CodeSpectrum:
     """Elastic spectra of a code, which all have the same branches."""
 
@@ -268,7 +275,7 @@ class Eurocode8(CodeSpectrum):
     damping: OtherDamping = 0.05
 
     def __post_init__(self) -> None:
-        check_between(self.ag, "design ground acceleration [g]", 0.0, 2.0)
+        _check_ground(self.ag, "design ground acceleration [g]")
         check_fields(self)
         if self.type not in self._ground_types or self.ground not in self._ground_types[1]:
             raise InvalidInput(
@@ -398,7 +405,7 @@ class Ntc2018(CodeSpectrum):
 
     def __post_init__(self) -> None:
         check_choice(self.site, "subsoil", self._subsoil_factors)
-        check_between(self.ag, "a_g [g]", 0.0, 2.0)
+        _check_ground(self.ag, "a_g [g]")
         check_between(self.tc_star, "T_C* [s]", 0.05, 2.0)
         check_between(self.f0, "F_0", 2.2, 5.0, ends="[)")
         check_between(self.topography, "topography S_T", 1.0, 1.4, ends="[]")

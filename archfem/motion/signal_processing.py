@@ -16,7 +16,7 @@ from archfem._validation import (
     short_repr,
 )
 from archfem.errors import InvalidInput
-from archfem.units import STANDARD_GRAVITY
+from archfem.units import STANDARD_GRAVITY, warn_if_in_g
 
 # No record exceeds this acceleration [m/s²]: the unit must be wrong.
 MAX_PEAK_ACCELERATION = 5.0 * STANDARD_GRAVITY
@@ -232,6 +232,7 @@ def generate_accelerogram(
             f"synthetic motion of {duration:g} s at {dt:g} s, pga {pga:g} m/s², vertical ratio "
             f"{ratio:g}: expected 50 samples or more, pga > 0 and ratio >= 0"
         )
+    warn_if_in_g(pga, "the pga of a synthetic motion")
     count_pieces(duration, dt, "samples of a synthetic motion", MAX_SAMPLES)
     random = np.random.default_rng(check_integer(seed, "seed of a synthetic motion", minimum=0))
     count = round(duration / dt) + 1

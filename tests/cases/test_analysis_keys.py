@@ -9,7 +9,13 @@ import pytest
 from backfilled import arch_bridge
 
 import archfem as af
-from archfem.cases.analysis_keys import parse_assessment, parse_limit, parse_rating, rate_case
+from archfem.cases.analysis_keys import (
+    parse_assessment,
+    parse_limit,
+    parse_pushover,
+    parse_rating,
+    rate_case,
+)
 from archfem.dynamics.damping import resolve_effective_damping
 from archfem.dynamics.schemes import EffectiveDamping
 
@@ -200,6 +206,31 @@ def test_invalid_limits_are_refused(given, says):
 def test_a_load_beside_the_structure_is_refused(ring):
     with pytest.raises(af.InvalidInput, match=r"x = 9 m misses the structure"):
         parse_limit({"point": {**POINT, "x": 9.0}}).solve(ring)
+
+
+@pytest.mark.parametrize("key", ["point", "dead"])
+@pytest.mark.parametrize("parse", [parse_limit, parse_pushover])
+def test_a_check_refuses_loads_beside_the_structure(ring, parse, key):
+    far = {**POINT, "x": 120.0}
+    given = {"point": far} if key == "point" else {"point": POINT, "dead": [far]}
+    with pytest.raises(af.InvalidInput, match=r"x = 120 m misses the structure"):
+        parse(given).check(ring)
+    parse({"point": POINT}).check(ring)
+
+
+def test_a_check_refuses_a_settlement_of_another_block_than_a_support(ring):
+    settled = parse_pushover({"settlement": {"block": "no block", "motion": [0.0, -1.0, 0.0]}})
+    with pytest.raises(af.InvalidInput, match="block 'no block' cannot settle"):
+        settled.check(ring)
+
+
+def test_a_demand_that_looks_like_a_multiple_of_g_is_named_in_both_units(caplog):
+    parse_limit({"horizontal": 1.0, "demand": "0.24 g"})
+    assert not caplog.messages
+    parse_limit({"horizontal": 1.0, "demand": 0.24})
+    assert caplog.messages == [
+        "limit.demand is 0.24 m/s², which is 0.0245 g: write 2.35 m/s² if it is 0.24 g"
+    ]
 
 
 SMALL_CASE = """

@@ -27,6 +27,13 @@ def test_the_steepest_dilatancy_that_is_left_out_is_stated(each, said, warned):
     assert bool(warned()) == bool(said)
 
 
+@pytest.mark.parametrize(("force", "said"), [((1e3, 0.0), False), ((0.0, 1e5), True)])
+def test_a_load_that_lifts_is_named(force, said, warned):
+    pier = af.column(breadth=0.6, heights=[2.4])
+    af.collapse_factor(pier, live=af.PointLoad(0.1, force))
+    assert ("at x = 0.1 m acts upwards by 100 kN, and lifts" in warned()) == said
+
+
 def test_joints_that_slide_are_named_with_their_factor(warned):
     collapse.warn_sliding([], 0.3)
     assert not warned()

@@ -217,6 +217,7 @@ def test_a_wall_slides_under_the_seismic_pressure_of_its_fill():
         ({"roughness": 1.2}, "roughness = 1.2 is above 1"),
         ({"gap": 0.0}, r"gap \[-\] = 0.0 is below 0.001"),
         ({"cohesion": -1.0}, "cohesion"),
+        ({"cohesion": 5.0}, "cohesion 5 Pa is less than soil has: give pascals, 5000 for 5 kPa"),
     ],
 )
 def test_wrong_values_are_refused(change, words):

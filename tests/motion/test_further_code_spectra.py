@@ -96,7 +96,10 @@ def test_eurocode_of_2024_at_its_corners():
     [
         (lambda: Ntc2018(0.2, 2.5, 0.3, "S1"), "subsoil = 'S1' is not known"),
         (lambda: Ntc2018(0.2, 2.1, 0.3, "A"), "F_0 = 2.1 is not between 2.2"),
-        (lambda: Ntc2018(2.56, 2.5, 0.3, "A"), r"a_g \[g\] = 2.56 is not between 0 and 2"),
+        (
+            lambda: Ntc2018(2.56, 2.5, 0.3, "A"),
+            r"a_g \[g\] = 2.56 is not between 0 and 1: 2.56 m/s² are 0.261 g",
+        ),
         (lambda: Ntc2018(0.2, 2.5, 0.3, "A", topography=2.0), "not between 1 and 1.4"),
         (lambda: Ntc2018(0.2, 2.5, 0.3, "A").horizontal(4.1), "defined up to 4 s"),
         (lambda: Asce2022(1.0, 0.5, 0.4), "it is beyond T_S"),

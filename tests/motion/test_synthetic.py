@@ -7,6 +7,11 @@ import archfem as af
 from archfem.motion import signal_processing
 
 
+def test_a_peak_that_looks_like_a_multiple_of_g_is_named_in_both_units(caplog):
+    af.Motion.synthetic(duration=5.0, pga=0.3, seed=1)
+    assert "is 0.3 m/s², which is 0.0306 g: write 2.94 m/s² if it is 0.3 g" in caplog.text
+
+
 def test_synthetic_motion_repeats_and_ends_at_rest():
     first, second = (af.Motion.synthetic(seed=7) for _ in range(2))
     other = af.Motion.synthetic(seed=8)
