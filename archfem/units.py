@@ -192,10 +192,10 @@ def _suggest_unit(text: str, unit: str) -> str:
     """Return the question whether a quantity with usual letters of its unit was intended."""
     usual = ("N", "kN", "MN", "Pa", "kPa", "MPa", "GPa", "m", "mm", "cm", "s", "ms", "Hz", "g")
     letters = {each.lower(): each for each in usual} | {"tonf": "tf"}
-    meant = re.sub(r"[^\W\d_]+", lambda word: letters.get(word[0].lower(), word[0]), text)
+    intended = re.sub(r"[^\W\d_]+", lambda word: letters.get(word[0].lower(), word[0]), text)
     with suppress(InvalidInput):
-        if meant != text and in_unit(meant, unit, "value") is not None:
-            return f"did you mean {meant!r}?"
+        if intended != text and in_unit(intended, unit, "value") is not None:
+            return f"did you mean {intended!r}?"
     return ""
 
 

@@ -102,7 +102,7 @@ def test_an_angular_frequency_is_converted_by_a_full_turn(text, frequency):
 
 
 @pytest.mark.parametrize(
-    ("text", "unit", "meant"),
+    ("text", "unit", "intended"),
     [
         ("5 KN", "N", "5 kN"),
         ("5 kn", "N", "5 kN"),
@@ -112,8 +112,8 @@ def test_an_angular_frequency_is_converted_by_a_full_turn(text, frequency):
         ("0.3 G", "m/s**2", "0.3 g"),
     ],
 )
-def test_a_unit_in_letters_of_the_wrong_size_is_refused_with_the_usual_one(text, unit, meant):
-    with pytest.raises(af.InvalidInput, match=f"did you mean '{meant}'"):
+def test_a_unit_in_letters_of_the_wrong_size_is_refused_with_the_usual_one(text, unit, intended):
+    with pytest.raises(af.InvalidInput, match=f"did you mean '{intended}'"):
         af.units.in_unit(text, unit, "x")
 
 

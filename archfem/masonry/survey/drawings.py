@@ -10,12 +10,12 @@ import re
 from cmath import rect
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 from importlib import import_module
 from importlib.util import find_spec
-from itertools import islice, pairwise
+from itertools import pairwise
 from math import acos, atan, ceil, dist, isclose, radians, tau
 from pathlib import Path
 from typing import Any
@@ -30,18 +30,17 @@ from archfem.errors import InvalidInput
 from archfem.masonry.block import measure_polygon
 from archfem.masonry.structure import suggest_name
 from archfem.masonry.survey.assemblies import is_assembly, read_plane_assembly, trace_elevation
+from archfem.masonry.survey.dxf import MAX_ENTITIES, POLYLINES, Entity, load_dxf
 from archfem.masonry.survey.ifc import load_ifc_reader
 from archfem.masonry.survey.svg import read_svg
 from archfem.units import in_unit
 
-# Entities of a DXF file that are read, and those that draw no stone; all others may draw one
-POLYLINES = ("LWPOLYLINE", "POLYLINE")
+# Entities of a DXF file that draw no stone; all others but polylines may draw one
 ANNOTATIONS = (
     *("TEXT", "MTEXT", "ATTDEF", "DIMENSION", "ARC_DIMENSION", "LARGE_RADIAL_DIMENSION", "LEADER"),
     *("MULTILEADER", "TOLERANCE", "POINT", "RAY", "XLINE", "VIEWPORT", "IMAGE", "WIPEOUT"),
     *("PDFUNDERLAY", "DWFUNDERLAY", "DGNUNDERLAY", "OLE2FRAME", "ACAD_TABLE", "LIGHT", "SUN"),
 )
-MAX_ENTITIES = 100_000  # blocks inserted into blocks may be any number
 UNITS = ("mm", "cm", "m")  # that a drawing without one may have
 SMALLEST_BLOCK, LARGEST_BLOCK = 0.1, 20.0  # typical diagonals by a unit of the drawing [m]
 
@@ -114,8 +113,8 @@ def read_polylines(
 ) -> tuple[list[Outline], list[Outline]]:
     """Read the curves of a DXF file that is in error: closed outlines, and open lines."""
     with _foreign_reader("ezdxf", "DXF drawing"):
-        read, frame = _load_dxf(path, ignored)
-    frame = (frame or Frame(1.0, "units")) if unit is None else _read_unit(unit)
+        read, stated = load_dxf(path, ignored)
+    frame = Frame(*stated or (1.0, "units")) if unit is None else _read_unit(unit)
     closed, lines = list[Outline](), list[Outline]()
     for entity in read:
         points = np.array([point[:2] for point in entity.points], dtype=float) * frame.factor
@@ -278,26 +277,12 @@ def _check_properties(data: dict[str, Any], name: str) -> None:
             raise InvalidInput(f"'{name}': {key} = {short_repr(data[key])} is a table: give words")
 
 
-@dataclass(frozen=True, eq=False)
-class Entity:
-    """Entity of a DXF file: a polyline, a text or another curve."""
-
-    kind: str
-    layer: str
-    points: list[tuple[float, ...]]  # vertices, or the place of a text, in drawing units
-    text: str = ""
-    closed: bool = False
-    is_mesh: bool = False
-    # tangent of a quarter of the angle of each edge, positive where its arc turns left
-    bulges: tuple[float, ...] = ()
-
-
 def _read_dxf(
     path: Path, unit: str | None, ignored: Counter[str], snap: float
 ) -> Iterator[Outline]:
     """Read the closed polylines of a DXF file, named by the texts inside them."""
     with _foreign_reader("ezdxf", "DXF drawing"):
-        read, frame = _load_dxf(path, ignored)
+        read, stated = load_dxf(path, ignored)
     if len(read) > MAX_ENTITIES:
         raise InvalidInput(f"it has more than {MAX_ENTITIES} entities: leave out other things")
     polylines = [entity for entity in read if entity.kind in POLYLINES]
@@ -314,7 +299,8 @@ def _read_dxf(
         )
     points = [complex(*point[:2]) for each in polylines for point in each.points]
     corners = np.array([point for point in points if abs(point) < 1e12])  # others are refused
-    header, frame = frame, frame if unit is None else _read_unit(unit, other=frame)
+    header = frame = Frame(*stated) if stated else None
+    frame = frame if unit is None else _read_unit(unit, other=frame)
     if frame is None:
         drawn = np.column_stack([corners.real, corners.imag])
         raise _refuse_unit("the drawing does not say its unit ($INSUNITS)", drawn)
@@ -338,80 +324,6 @@ def _read_dxf(
     for outline in outlines:
         counts[outline.layer] += 1
         yield replace(outline, name=_block_name(outline, texts, counts[outline.layer]))
-
-
-def _load_dxf(path: Path, ignored: Counter[str]) -> tuple[list[Entity], Frame | None]:
-    """Load all entities of a DXF file but ignored layers, and its unit if it has one."""
-    from ezdxf import units  # slow to import
-    from ezdxf.enums import InsertUnits
-    from ezdxf.filemanagement import readfile
-
-    drawing: Any = readfile(path)
-    entities = []
-    hidden = {
-        each.dxf.name.casefold(): each.is_frozen()
-        for each in drawing.layers
-        if each.is_off() or each.is_frozen()
-    }
-    walk = _walk_dxf(drawing.modelspace(), ignored, hidden)
-    for entity, layer in islice(walk, MAX_ENTITIES + 1):
-        kind = entity.dxftype()
-        if kind in POLYLINES:
-            light = kind == "LWPOLYLINE"
-            points = map(tuple, entity.vertices_in_wcs() if light else entity.points_in_wcs())
-            is_mesh = not (light or entity.is_2d_polyline or entity.is_3d_polyline)
-            # a mirrored polyline has its normal downwards, and arcs on the other side
-            sense = -1.0 if entity.dxf.extrusion.z < 0.0 else 1.0
-            row = [v[0] for v in entity.get_points("b")] if light else entity.vertices
-            bulges = tuple(sense * (v if light else v.dxf.get("bulge", 0.0)) for v in row)
-            kinds = entity.is_closed, is_mesh, bulges
-            entities.append(Entity(kind, layer, list(points), "", *kinds))
-        elif kind in ("TEXT", "MTEXT"):
-            place = entity.dxf.insert if kind == "MTEXT" else entity.get_placement()[1]
-            text = " ".join(entity.plain_text().split())
-            entities.append(Entity(kind, layer, [(place.x, place.y)], text))
-        else:
-            entities.append(Entity(kind, layer, []))
-    known = drawing.units  # 0 where the drawing has none
-    if known == InsertUnits.USSurveyFeet:  # which ezdxf does not convert
-        return entities, Frame(1200.0 / 3937.0, "US survey ft")
-    with suppress(TypeError, ValueError):  # of other units that it does not convert
-        factor = float(units.conversion_factor(known, InsertUnits.Meters))
-        return entities, Frame(factor, units.decode(known) or "units")
-    return entities, None
-
-
-def _walk_dxf(
-    space: Any, ignored: Counter[str], hidden: Mapping[str, bool], parent: str | None = None
-) -> Iterator[tuple[Any, str]]:
-    """Yield entities and their layers, also those of inserted blocks, but ignored and hidden ones.
-
-    Layers that are off or frozen are hidden, with True for frozen ones.
-    """
-    lost: list[tuple[Any, str]] = []  # of a block, which ezdxf does not transform
-
-    def keep(part: Any, _: str) -> None:
-        lost.append((part, part.dxf.layer))
-
-    for entity in space:
-        # within a block, layer 0 is that of the insert
-        layer = parent if parent is not None and entity.dxf.layer == "0" else entity.dxf.layer
-        if layer in ignored:
-            ignored[layer] += entity.dxftype() in POLYLINES
-            continue
-        is_insert, state = entity.dxftype() == "INSERT", hidden.get(layer.casefold())
-        # of an insert on a layer that is off, parts on other layers are shown
-        if entity.dxf.get("invisible") == 1 or state or (state is not None and not is_insert):
-            if is_insert or entity.dxftype() in POLYLINES:
-                ignored[f"{layer} (hidden)"] += 1
-            continue
-        copied = is_insert and entity.mcount > 1
-        for each in entity.multi_insert() if copied else (entity,):
-            yield each, layer
-            if each.dxftype() == "INSERT":
-                parts = each.virtual_entities(skipped_entity_callback=keep)
-                yield from _walk_dxf(parts, ignored, hidden, layer)
-    yield from lost
 
 
 def _draw_arcs(entity: Entity, corners: Array, snap: float) -> list[tuple[float, ...]]:
