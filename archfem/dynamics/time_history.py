@@ -131,6 +131,7 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
     recorder = _make_recorder(stepper, first, dt, record or Record(), criteria)
     adaptive = AdaptiveStepper(stepper, tolerance, first, SlipError(model.structure, motion, first))
     try:
+        recorder.add(first)
         monitors = event, LooseningMonitor.of(model, start) if model.large_displacements else None
         batches = _take_steps(adaptive, start, dt, motion.duration)
         ending, outcome = _run_steps(batches, recorder, monitors, motion)
@@ -142,11 +143,7 @@ def time_history(  # noqa: PLR0913  (one call, one object for each thing that ma
         error.history = recorder.build_history(motion, Ending.FAILED, words)
         raise
     history = recorder.build_history(motion, ending, outcome)
-    history.dataset.attrs["slip_error"] = float(adaptive.slip_error.total.max(initial=0.0))
-    if dt is None:
-        history = _state_tolerance(history, tolerance, adaptive.unmet_share)
-    else:
-        history = _doubt_steps_of_sliding(history, adaptive.slip_error, dt)
+    history = _state_step_errors(history, adaptive, dt, tolerance)
     if not model.large_displacements or ending is Ending.INTERRUPTED:
         return history
     whole = recorder.record.whole_fall
@@ -171,6 +168,16 @@ def _resolve_start(
         return model, start, resolve_effective_damping(damping, model, None)[0]
     rest = start or dead_load(model, newton)
     return rest.transfer_memory(model), rest, resolve_effective_damping(damping, model, rest)[0]
+
+
+def _state_step_errors(
+    history: History, adaptive: AdaptiveStepper, dt: float | None, tolerance: float
+) -> History:
+    """Return the history with the errors of its steps, and the doubts that follow."""
+    history.dataset.attrs["slip_error"] = float(adaptive.slip_error.total.max(initial=0.0))
+    if dt is None:
+        return _state_tolerance(history, tolerance, adaptive.unmet_share)
+    return _doubt_steps_of_sliding(history, adaptive.slip_error, dt)
 
 
 def _state_tolerance(history: History, tolerance: float, share: float) -> History:
@@ -267,13 +274,11 @@ def _check_types(**arguments: Any) -> None:
 def _make_recorder(
     stepper: Stepper, first: Batch, dt: float | None, record: Record, criteria: Criteria
 ) -> Recorder:
-    """Return the recorder of a run, with its start and its validity checks."""
+    """Return the recorder of a run, with its validity checks."""
     equation = stepper.equation
     damps, drag = isinstance(equation.scheme, HHT), equation.drag
     monitor = RunMonitor(equation.model, first, damps=damps, mass_damping=drag)
-    recorder = Recorder(monitor, first.state(0), stepper.name, dt, record, criteria)
-    recorder.add(first)
-    return recorder
+    return Recorder(monitor, first.state(0), stepper.name, dt, record, criteria)
 
 
 # What may end a run: an event, and blocks that become loose where displacements are large

@@ -218,7 +218,9 @@ def test_tables_state_what_is_assessed(other, ring):
         table = result_text.describe_pairs({"one": run, "two": run})
         assert (SENTENCE in table.splitlines()) == said
         assert (of_history(run).get("assessed") == SENTENCE) == said
+        limit, assessment = SimpleNamespace(demand=None), SimpleNamespace(spectrum=None)
         case = SimpleNamespace(structure=model.structure, suite=None, report={})
+        case.limit, case.assessment, case.target = limit, assessment, None
         data = report_data.ReportData(case, {"one": run})
         facts = conclusion.list_facts(data)
         assert (("joints", SENTENCE) in facts) == said

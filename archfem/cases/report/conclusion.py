@@ -101,6 +101,7 @@ def list_facts(data: ReportData) -> list[tuple[str, str]]:
     ]
     runs, structure = list(data.runs.values()), data.case.structure
     blocks = [("structure", f"{len(structure.free)} blocks, {len(structure.joints)} joints")]
+    blocks += [("joints", structure.assessment)] if structure.assessment else []
     doubtful = list_decisive_doubts(data, list_doubts(data))
     doubts = [("in doubt", ", ".join(doubtful))] if doubtful else []
     verdict = " ".join(map(sentence, _say_plainly(data, doubtful)))
