@@ -203,7 +203,7 @@ def test_pairs_of_a_run_that_was_killed_are_used_again_for_the_same_case(two_run
 COLUMN = {
     "structure": {"shape": "column", "breadth": 1.0, "heights": [1.0]},
     "model": {"fidelity": "rigid"},
-    "motion": {"synthetic": {"duration": 0.3, "pga": 0.1}},
+    "motion": {"synthetic": {"duration": 0.3, "pga": 1.0}},
 }
 
 
