@@ -46,6 +46,20 @@ SAFE_FLAGS = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
 # Links of Windows to folders, which Python recognises since 3.12
 _is_junction = getattr(os.path, "isjunction", lambda _: False)
 
+# Number of the format of result files: raise it where a key, column or attribute of them changes
+# name or meaning. A file of another number is refused when it is read.
+FORMAT = 1
+
+# What computes a file of another format again, by its kind
+REMEDIES = {
+    "history file": "run `archfem run` again",
+    "file of a verdict's range": "run `archfem verdict` again",
+    "file of a risk": "delete it and run `archfem risk` again",
+    "table": "run `archfem study` again",
+    "study": "run `archfem study` again",
+    "list of results": "run the commands of its folder again",
+}
+
 # Results that are written from those of another command, and vanish when these are replaced
 DERIVED = {"run": ("report", "page"), "study": ("study summary",)}
 
@@ -333,10 +347,19 @@ def is_locked(folder: Path) -> bool:
     return False
 
 
+def check_format(path: str | Path, what: str, found: str) -> None:
+    """Refuse a result file of another kind, or of another version of archfem."""
+    if found != (own := f"{what} {FORMAT}"):
+        raise InvalidInput(
+            f"{path} was written by another version of archfem (format '{found}', not '{own}'): "
+            f"{REMEDIES.get(what, 'run again')}"
+        )
+
+
 def write_sealed_json(path: Path, content: Any, *, flush: bool = True) -> None:
     """Write a JSON file with the SHA-256 of its content, by which a damaged file is noticed."""
     with atomic_write(path, flush=flush) as draft:
-        sealed = {"content": content, "sha256": hash_json(content)}
+        sealed = {"format": FORMAT, "content": content, "sha256": hash_json(content)}
         draft.write_text(json.dumps(sealed), encoding="utf-8")
 
 
@@ -350,6 +373,7 @@ def read_sealed_json(path: Path, what: str) -> Any:
         content, digest = None, ""
     if digest != hash_json(content):
         raise InvalidInput(f"{path} is damaged: it is not what was written there; run again")
+    check_format(path, what, f"{what} {sealed.get('format')}")
     return content
 
 
@@ -448,7 +472,8 @@ def _find_digests(path: Path) -> Iterator[str]:
     # the history of a pair is in a folder within the result folder
     for folder in (path.parent, path.parent.parent):
         name = path.relative_to(folder).as_posix()
-        groups = read_file_list(folder).values()
+        # a draft is in no list, and that beside it may be what a new run replaces
+        groups = [] if name.startswith(DRAFT_PREFIX) else read_file_list(folder).values()
         yield from (group.files[name] for group in groups if name in group.files)
 
 

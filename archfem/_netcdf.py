@@ -15,7 +15,14 @@ from typing import Any
 import netCDF4
 import xarray as xr
 
-from archfem._files import atomic_write, check_listed, read_bytes, refuse_listed
+from archfem._files import (
+    FORMAT,
+    atomic_write,
+    check_format,
+    check_listed,
+    read_bytes,
+    refuse_listed,
+)
 from archfem.errors import InvalidInput
 
 # Precedes the digest at the end of a file.
@@ -24,20 +31,23 @@ CHECKSUM_MARK = b"\narchfem: SHA-256 of all before this line "
 # Prefix of variables that hold texts for which an attribute has no room [bytes]
 LONG_ATTRIBUTE, MAX_ATTRIBUTE_SIZE = "attribute ", 60_000
 
-# Attribute of a dataset with a checksum: without the mark such a file is truncated.
-CHECKSUM_ATTRIBUTE = "sealed"
+# Attribute of a file with its kind and format: without the mark such a file is truncated.
+FORMAT_ATTRIBUTE = "archfem_format"
 
 
 def write_dataset(
-    dataset: xr.Dataset, path: Path, encoding: Mapping[Any, Any] = MappingProxyType({})
+    dataset: xr.Dataset,
+    path: Path,
+    what: str,
+    encoding: Mapping[Any, Any] = MappingProxyType({}),
 ) -> Path:
-    """Write a dataset atomically: a killed run leaves the old file or the new one."""
+    """Write a dataset, a file of a kind, atomically: a killed run leaves the old or the new one."""
     refuse_listed(path)
     file = netCDF4.Dataset(path.name, "w", memory=1)
     try:
         store = xr.backends.NetCDF4DataStore(file)  # type: ignore[no-untyped-call]
         large = [name for name, values in dataset.items() if values.ndim > 1]
-        small = dataset.drop_vars(large).assign_attrs({CHECKSUM_ATTRIBUTE: 1})
+        small = dataset.drop_vars(large).assign_attrs({FORMAT_ATTRIBUTE: f"{what} {FORMAT}"})
         for name, text in dataset.attrs.items():
             if isinstance(text, str) and len(text.encode()) > MAX_ATTRIBUTE_SIZE:
                 small[f"{LONG_ATTRIBUTE}{name}"] = small.attrs.pop(name)
@@ -59,7 +69,7 @@ def write_dataset(
 
 
 def read_dataset(path: str | Path, what: str) -> xr.Dataset:
-    """Read a NetCDF file and verify its checksum; in a result folder also that of the list."""
+    """Read a NetCDF file of a kind and verify checksum and format; in a folder also its list."""
     # a history has no other limit of size than the disk's
     content = read_bytes(path, what, max_bytes=2**40)
     end = content.rfind(CHECKSUM_MARK)
@@ -83,8 +93,10 @@ def read_dataset(path: str | Path, what: str) -> xr.Dataset:
     for name in [str(name) for name in dataset if str(name).startswith(LONG_ATTRIBUTE)]:
         dataset.attrs[name.removeprefix(LONG_ATTRIBUTE)] = str(dataset[name].item())
         dataset = dataset.drop_vars(name)
-    if dataset.attrs.pop(CHECKSUM_ATTRIBUTE, None) is not None and end < 0:
+    found = str(dataset.attrs.pop(FORMAT_ATTRIBUTE, "none"))
+    if found != "none" and end < 0:
         raise damaged
+    check_format(path, what, found)
     return dataset
 
 

@@ -34,12 +34,13 @@ def risk_of_two():
     low = np.linspace(2.0, 4.0, 8)
     samples = {"lower": low, "upper": 1.1 * low, "record_number": np.arange(8) % 2}
     samples |= {"runs": np.ones(8, int), "error": [""] * 8, "alternative": ["as given"] * 8}
+    samples |= {"admissible_step": np.full(8, np.inf)}
     records = {f"unscaled_{name}": np.array([1.0, 1.2]) for name in ("pga", "pgv", "sa", "sa_avg")}
     return af.studies.CollapseRisk(
         xr.Dataset(
             {name: ("sample", values) for name, values in samples.items()}
             | {name: ("record", values) for name, values in records.items()},
-            attrs={"hazard": json.dumps(hazard)},
+            attrs={"hazard": json.dumps(hazard), "doubts": "[]", "dt": 0.005},
         )
     )
 

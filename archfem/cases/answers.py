@@ -46,7 +46,7 @@ class Row(NamedTuple):
     demand: str  # "-" where there is none
     outcome: str  # or capacity
     factor: str  # "-" where there is none
-    numbers: Mapping[str, Any]  # such as the fields of `Ratios`; none in earlier files
+    numbers: Mapping[str, Any]  # such as the fields of `Ratios`; none without an answer
 
 
 class Ratios(NamedTuple):
@@ -128,20 +128,14 @@ class Statement(NamedTuple):
         return self._replace(doubts=[*doubts, *self.doubts], notes=[*self.notes, *notes])
 
     @classmethod
-    def read(cls, text: str) -> "Statement | None":
-        """Return what `as_file` wrote; None of an earlier version with other values."""
-        values = json.loads(text)
-        if values.keys() != {*cls._fields}:
-            return None
-        # earlier versions have no numbers, and doubts as texts
-        rows = [Row(*(*row, {})[:5]) for row in values["rows"]]
-        doubts = [[x] if isinstance(x, str) else x for x in values["doubts"]]
-        found = read_doubts(json.dumps(doubts))
-        return cls(values["sentences"], rows, found, values["notes"])
+    def read(cls, text: str) -> "Statement":
+        """Return what `as_file` wrote."""
+        sentences, rows, doubts, notes = (json.loads(text)[name] for name in cls._fields)
+        return cls(sentences, [Row(*x) for x in rows], read_doubts(json.dumps(doubts)), notes)
 
 
 def read_numbers(kind: type[Numbers], stated: Statement | None) -> list[Numbers]:
-    """Return the numbers of the rows that have them; files of earlier versions have none."""
+    """Return the numbers of a kind of the rows that have them."""
     rows = stated.rows if stated else []
     return [kind(**row.numbers) for row in rows if {*row.numbers} == {*kind.__annotations__}]
 

@@ -30,7 +30,7 @@ from archfem.cases.toml_file import read_tables
 from archfem.dynamics.analysis import Analysis
 from archfem.dynamics.damping import resolve_effective_damping
 from archfem.dynamics.fall import mark_interrupted
-from archfem.dynamics.history import Ending, History, partial_history
+from archfem.dynamics.history import FILE_KIND, Ending, History, partial_history
 from archfem.dynamics.schemes import Viscous
 from archfem.dynamics.slip_error import least_compression
 from archfem.dynamics.time_history import time_history
@@ -583,7 +583,7 @@ def case_files(case: Case) -> dict[str, str]:
 def _is_of(path: Path, case: Case) -> bool:
     """Return whether a file is a history of a case and its input files by this program."""
     try:
-        stored = read_dataset(path, "history file").attrs.get("inputs")
+        stored = read_dataset(path, FILE_KIND).attrs.get("inputs")
     except InvalidInput:
         return False
     return bool(stored == case.hash_inputs())

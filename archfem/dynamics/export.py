@@ -101,11 +101,9 @@ def _joint_data(run: xr.Dataset, time: float) -> dict[str, NDArray[Any]]:
     step = run.sel(time=time, method="nearest")
     data: dict[str, NDArray[Any]] = {"joint": np.arange(run.sizes["joint"], dtype=np.int64)}
     names = ("N", "V", "M", "eccentricity", "friction", "opening", "slip", "rotation")
-    # files of early versions have no gaps
     for name in (*names, "hinge", "slide", "open"):
-        if name in run:
-            values = step[name].values
-            data[name] = values.astype(np.uint8 if values.dtype == bool else float)
+        values = step[name].values
+        data[name] = values.astype(np.uint8 if values.dtype == bool else float)
     return data
 
 

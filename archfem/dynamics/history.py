@@ -1,6 +1,5 @@
 """History of a run: recorded joints and fields, first mechanisms, verdict, and its file."""
 
-import json
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from enum import StrEnum
@@ -27,7 +26,7 @@ from archfem.dynamics.verdict import (
     extremes_remark,
     total_duration_remark,
 )
-from archfem.errors import DidNotConverge, InvalidInput, logger
+from archfem.errors import DidNotConverge, InvalidInput
 from archfem.joints.criteria import (
     HEAD_COORDINATE,
     Criteria,
@@ -52,9 +51,8 @@ SIGN_CONVENTION = (
     "gravity along -y; displacements relative to the ground"
 )
 
-# Number of the coordinates of elastic blocks in large displacements; 1, which files do not say,
-# were those of a dense basis
-COORDINATES_VERSION = 2
+# Kind of the file of a history
+FILE_KIND = "history file"
 
 
 class Ending(StrEnum):
@@ -104,14 +102,13 @@ ATTRIBUTE_KINDS: dict[str, Callable[[Any], Any]] = {
 # Dimensions of variables, which every file has but for the ground's motion, and texts of joints
 DIMENSIONS: dict[str, tuple[str, ...]] = {
     **dict.fromkeys(("N", "V", "M", "eccentricity", "friction"), ("time", "joint")),
-    **dict.fromkeys(("name", "part", "depth", "friction_limit"), ("joint",)),
+    **dict.fromkeys(("hinge", "slide", "open"), ("time", "joint")),
+    **dict.fromkeys(("name", "part", "role", "judged", "depth", "height"), ("joint",)),
+    "friction_limit": ("joint",),
     "time": ("time",),
     "ground": ("time", "axis"),
 }
 TEXTS = ("name", "part", "role")
-
-# Variables that other variables need
-COMPANIONS = {"rotation": ("slip",), "hinge": ("open", "slide")}
 
 
 @validate_methods
@@ -132,10 +129,7 @@ class History(ResultDisplay):
 
     @property
     def joints(self) -> xr.Dataset:
-        """N, V, M, eccentricity, friction, opening, rotation, slip and flags over time and joint.
-
-        Files of earlier versions have no opening, rotation and slip.
-        """
+        """N, V, M, eccentricity, friction, opening, rotation, slip and flags, by time and joint."""
         dataset = self.dataset
         return dataset[[k for k in dataset.data_vars if "joint" in dataset.variables[k].dims]]
 
@@ -179,21 +173,12 @@ class History(ResultDisplay):
     @property
     def outcome(self) -> str:
         """How the run ended, in words."""
-        return str(self.dataset.attrs.get("outcome", "ended, its file does not say how"))
+        return str(self.dataset.attrs.get("outcome", "ended with its record"))
 
     @property
     def ending(self) -> Ending:
-        """How the run ended.
-
-        Raises:
-            InvalidInput: the file was written by an early version, with `outcome` only.
-        """
-        if "ended" not in self.dataset.attrs:
-            raise InvalidInput(
-                "this history says only in words how its run ended, as earlier versions wrote it: "
-                f"'{self.outcome}'; run it again"
-            )
-        return Ending(self.dataset.attrs["ended"])
+        """How the run ended; a record of joints alone is finished."""
+        return Ending(self.dataset.attrs.get("ended", Ending.FINISHED))
 
     @property
     def doubts(self) -> tuple[Doubt, ...]:
@@ -206,17 +191,15 @@ class History(ResultDisplay):
         piece; a stack that as one rigid body falls, stands or moves otherwise; and joints between
         stones that fail and are not assessed. The last need the structure.
         """
-        text = str(self.dataset.attrs.get("doubts", "[]"))
-        if not text.startswith("["):  # files of earlier versions have a line for each
-            text = json.dumps([line.split("\t") for line in text.splitlines()])
-        return (*read_doubts(text), *self._doubts_of_run)
+        stored = read_doubts(str(self.dataset.attrs.get("doubts", "[]")))
+        return (*stored, *self._doubts_of_run)
 
     @cached_property
     def _doubts_of_run(self) -> list[Doubt]:
         """Doubts of a run broken off, and of joints that fail and, by roles, are not assessed."""
         joints, structure = self.joints, self.structure
         doubts = [] if structure is None else doubt_unassessed_joints(joints, structure)
-        if self.dataset.attrs.get("ended") in (Ending.INTERRUPTED, Ending.FAILED):
+        if not self.ending.is_complete:
             cause = f"the run {self.outcome.partition(':')[0]}, and what comes after is not known"
             doubts.append(Doubt(cause, "run the motion again, to its end"))
         return doubts
@@ -272,7 +255,7 @@ class History(ResultDisplay):
             str(attrs["fall"]),
             None if np.isnan(time) else time,
             tuple(name for name in str(attrs["fall_blocks"]).split("\n") if name),
-            float(attrs.get("displacement", np.nan)),
+            float(attrs["displacement"]),
             float(attrs["fall_residual"]),
             bool(attrs["fall_resting"]),
             float(attrs.get("admissible_step", np.inf)),
@@ -287,8 +270,7 @@ class History(ResultDisplay):
     def verdict(self) -> Verdict:
         """Assessment of the run; `str(run.verdict)` describes it in words."""
         attrs, joints, mechanisms = self.dataset.attrs, self.joints, self.mechanisms
-        finished = attrs.get("ended") == Ending.FINISHED or "outcome" not in attrs
-        remarks = [] if finished else [f"the run {self.outcome}"]
+        remarks = [] if self.ending is Ending.FINISHED else [f"the run {self.outcome}"]
         if self.structure is not None and self.fall is not None and self.fall.time is None:
             remarks.append(describe_dislocation(self.structure))
         remarks += extremes_remark(self.dataset)
@@ -302,7 +284,6 @@ class History(ResultDisplay):
             remarks.append(total_duration_remark(joints))
         if self.structure is not None and (law := describe_closing(self.structure)):
             remarks.append(f"{law}, which was not varied")
-        broken_off = not (finished or self.ending.is_complete)
         return Verdict(
             outcome=classify_outcome(self),
             doubts=self.doubts,
@@ -311,7 +292,7 @@ class History(ResultDisplay):
             mechanisms=mechanisms,
             fall=self.fall,
             assessed=describe_assessed_joints(joints),
-            incomplete=self.outcome.partition(":")[0] if broken_off else "",
+            incomplete="" if self.ending.is_complete else self.outcome.partition(":")[0],
             remarks=tuple(remarks),
         )
 
@@ -354,12 +335,12 @@ class History(ResultDisplay):
             if variable.dtype == np.float64 and "joint" in variable.dims:
                 encoding.setdefault(name, {})["dtype"] = "float32"
         with np.errstate(over="ignore", under="ignore"):  # |V| / N just before a joint opens
-            return write_dataset(self.dataset, Path(path), encoding)
+            return write_dataset(self.dataset, Path(path), FILE_KIND, encoding)
 
     @classmethod
     @validate_arguments
     def read(cls, path: str | Path, structure: Structure | None = None) -> "History":
-        """Read a file written by `save`; files of earlier versions get the default criteria.
+        """Read a file written by `save`.
 
         Args:
             path: file to read.
@@ -368,9 +349,9 @@ class History(ResultDisplay):
 
         Raises:
             InvalidInput: there is no such file, or it is damaged, something else, or of another
-                structure; or it has no roles of parts and no structure is given.
+                structure or version of archfem.
         """
-        dataset = read_dataset(path, "history file")
+        dataset = read_dataset(path, FILE_KIND)
         _check_content(path, dataset)
         if structure is not None:
             _check_structure(path, dataset, structure)
@@ -380,16 +361,11 @@ class History(ResultDisplay):
             )
             if structure.heads.any():
                 dataset.coords[HEAD_COORDINATE] = "joint", structure.heads
-        elif "role" not in dataset.coords:
-            raise InvalidInput(
-                f"{path} does not say which parts are rings and piers, as files of earlier "
-                "versions do not: give the structure that was shaken too"
-            )
         for values in dataset.data_vars.values():
             # arithmetic with single precision would round again; one by one, for they are large
             if values.dtype == np.float32:
                 values.data = values.data.astype(np.float64)
-        return cls(with_failure_flags(_without_other_coordinates(path, dataset)), structure)
+        return cls(dataset, structure)
 
     def to_vtk(self, model: Model, path: str | Path) -> Path:
         """Write a series for ParaView: blocks, and joints as the gaps between their faces.
@@ -473,20 +449,6 @@ class History(ResultDisplay):
         return call_late_bound("History.report", self, path)
 
 
-def _without_other_coordinates(path: str | Path, dataset: xr.Dataset) -> xr.Dataset:
-    """Return a file's content without coordinates that had another meaning when it was written."""
-    attrs = dataset.attrs
-    elastic = attrs.get("displacements") == "large" and attrs.get("fidelity") != "rigid"
-    if not elastic or attrs.get("coordinates_version", 1) == COORDINATES_VERSION:
-        return dataset
-    logger.warning(
-        "%s has elastic blocks in coordinates of an earlier version: it is read without them, and "
-        "films, stress and last_state need a new run",
-        path,
-    )
-    return dataset.drop_dims("coordinate", errors="ignore")
-
-
 def _check_content(path: str | Path, dataset: xr.Dataset) -> None:
     """Refuse a file whose variables and attributes are not those of a history."""
     shapes = {name: values.dims for name, values in dataset.variables.items()}
@@ -500,8 +462,7 @@ def _check_content(path: str | Path, dataset: xr.Dataset) -> None:
             name not in TEXTS and {"time", "joint"} & {*values.dims} and values.dtype.kind in "OSUM"
         )
     ]
-    for present, others in COMPANIONS.items():
-        wrong += [name for name in others if present in shapes and name not in shapes]
+    wrong += ["slip"] if "rotation" in shapes and "slip" not in shapes else []
     required = [name for name in ATTRIBUTE_KINDS if "fall" in dataset.attrs and name[:5] == "fall_"]
     for name, kind in ATTRIBUTE_KINDS.items():
         try:

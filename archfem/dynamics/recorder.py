@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from archfem._typing import Array
 from archfem._validation import check_integer
-from archfem.dynamics.history import COORDINATES_VERSION, SIGN_CONVENTION, Ending, History
+from archfem.dynamics.history import SIGN_CONVENTION, Ending, History
 from archfem.dynamics.monitor import RunMonitor
 from archfem.dynamics.solvers.integrator import Stepper
 from archfem.dynamics.state import Batch, State
@@ -200,7 +200,6 @@ class Recorder:
             "structure": structure.fingerprint,
             "method": self.method,
             "last_time": self.state.time,
-            "coordinates_version": COORDINATES_VERSION,
             "energy_drift": monitor.worst_drift,
             "displacements": "large" if self.model.large_displacements else "small",
             "displacement": float(monitor.displacements.largest[stones].max()),

@@ -48,9 +48,6 @@ PUBLISHED_DEFINITION = "Demirel and Aldemir"
 
 ALL_DEFINITIONS = (*MECHANISM_DEFINITIONS, PUBLISHED_DEFINITION)
 
-
-# Begin of a line with a doubt, in texts and result files
-
 # What a run without doubts still leaves open
 NO_RANGE = "one motion, one set of properties: range not computed"
 
@@ -65,8 +62,8 @@ class Verdict:
             mechanism" with small ones, by any of the definitions.
         doubts: reasons why the result may be wrong, each with its remedy.
         displacement: largest displacement of any corner of a block relative to the ground, from its
-            place at the start of the run, under dead load [m]. Backfill does not count. NaN in
-            files of earlier versions.
+            place at the start of the run, under dead load [m]. Backfill does not count. NaN of
+            a record of joints alone.
         residual: the same at the end of the run [m].
         mechanisms: first mechanism, or None, by each definition of `MECHANISM_DEFINITIONS` that
             applies, and by the criterion of Demirel and Aldemir; "verified" only where the

@@ -21,6 +21,9 @@ from archfem.masonry.structure import join_names
 from archfem.models.model import Doubt, read_doubts
 from archfem.units import format_mm
 
+# Kind of the file of all runs
+FILE_KIND = "file of a verdict's range"
+
 # Largest share of random permutations of the outcomes with a condition that separates them as well
 # as the one that is named [-], and the number of permutations
 MAX_CHANCE, PERMUTATIONS = 0.05, 999
@@ -354,7 +357,7 @@ class VerdictRange(ResultDisplay):
         Args:
             path: file to write; folders are created.
         """
-        return write_dataset(self.dataset, Path(path), {})
+        return write_dataset(self.dataset, Path(path), FILE_KIND)
 
     @classmethod
     def read(cls, path: str | Path) -> "VerdictRange":
@@ -364,9 +367,9 @@ class VerdictRange(ResultDisplay):
             path: file to read.
 
         Raises:
-            InvalidInput: there is no such file, or it is damaged.
+            InvalidInput: there is no such file, or it is damaged or of another version.
         """
-        return cls(read_dataset(path, "file of a verdict's range"))
+        return cls(read_dataset(path, FILE_KIND))
 
     def tabulate(self) -> tuple[list[str], list[list[str]]]:
         """Return what is `counted` by value, and the share that a property explains.

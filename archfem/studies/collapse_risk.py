@@ -72,6 +72,9 @@ from archfem.studies.variations import (
 )
 from archfem.units import STANDARD_GRAVITY
 
+# Kind of the file of all samples
+FILE_KIND = "file of a risk"
+
 # Properties that are varied by default; the alternatives of joint rules are for `alternatives`
 VARIED = ("k_n", "k_s", "friction", "damping_ratio")
 
@@ -242,7 +245,7 @@ def collapse_risk(  # noqa: PLR0913  (one call, one argument for each thing that
         for k, row in evaluate_with_progress(points, bracket_capacity, workers, "risk"):
             _store_row(table, k, row)
             if out is not None:
-                write_dataset(table, Path(out), {})
+                write_dataset(table, Path(out), FILE_KIND)
     found = CollapseRisk(table)
     found.check_answered()
     return found
@@ -252,8 +255,8 @@ def _size_blocks(out: str | Path | None, samples: int) -> list[tuple[int, int]]:
     """Return beginning and size of each hypercube: those of a file, and one of added samples."""
     sizes = [samples]
     if out is not None and Path(out).exists():
-        kept = read_dataset(out, "file of a risk")
-        sizes = json.loads(kept.attrs.get("blocks", f"[{kept.sizes.get('sample', 0)}]"))
+        kept = read_dataset(out, FILE_KIND)
+        sizes = json.loads(kept.attrs["blocks"])
         if (added := samples - sum(sizes)) < 0:
             raise InvalidInput(
                 f"{out} has {sum(sizes)} samples, and a part of a Latin hypercube is none: give "
@@ -367,8 +370,8 @@ def _continue_file(out: str | Path | None, table: xr.Dataset) -> None:
     """Store the results that a file has of the same samples, its first ones."""
     if out is None or not Path(out).exists():
         return
-    kept = read_dataset(out, "file of a risk")
-    count = kept.sizes.get("sample", 0)
+    kept = read_dataset(out, FILE_KIND)
+    count = kept.sizes["sample"]
     first = table.isel(sample=slice(count))
     varies = (*RESULTS, "unscaled_sa")  # which is at the period of the hazard
     same = all(
@@ -376,13 +379,13 @@ def _continue_file(out: str | Path | None, table: xr.Dataset) -> None:
         for key in first
     )
     keys = ("properties", "inputs")
-    if not same or any(kept.attrs.get(key) != table.attrs[key] for key in keys):
+    if not same or any(kept.attrs[key] != table.attrs[key] for key in keys):
         raise InvalidInput(
             f"{out} has samples of other arguments: name another file, or delete this one"
         )
     for name in RESULTS:
         table[name].values[:count] = kept[name].values
-    write_dataset(table, Path(out), {})  # with the hazard of this call
+    write_dataset(table, Path(out), FILE_KIND)  # with the hazard of this call
 
 
 def _first_scales(table: xr.Dataset, measure: str, begin: int) -> Array:
@@ -627,7 +630,7 @@ class CollapseRisk(ResultDisplay):
         last, unit = self.hazard.intensity[-1], MEASURES[self.hazard.measure]
         edges, shares = self.disaggregation(240)
         beyond = 1.0 - float(shares[edges[:-1] <= last].sum())
-        doubts = [*read_doubts(self.dataset.attrs.get("doubts", "[]"))]
+        doubts = [*read_doubts(self.dataset.attrs["doubts"])]
         if beyond > LARGEST_EXTRAPOLATED_SHARE:
             cause = (
                 f"{beyond:.0%} of the rate comes from intensities above {last:.3g} {unit}, once in "
@@ -635,9 +638,8 @@ class CollapseRisk(ResultDisplay):
             )
             doubts.append(Doubt(cause, "give its points at longer return periods"))
         doubts += self._doubt_records()
-        if "admissible_step" in self.dataset:  # files of earlier versions have none
-            steps, dt = self.dataset["admissible_step"].values.tolist(), self.dataset.attrs["dt"]
-            doubts += doubt_steps_of_sliding(steps, dt, "samples", "")
+        steps, dt = self.dataset["admissible_step"].values.tolist(), self.dataset.attrs["dt"]
+        doubts += doubt_steps_of_sliding(steps, dt, "samples", "")
         count = len(self.dataset["sample"])
         # a twentieth of all is what the 90 % interval leaves out at each of its ends
         if count - len(self.answered) > 0.05 * count:
@@ -712,7 +714,7 @@ class CollapseRisk(ResultDisplay):
         Args:
             path: file to write; folders are created.
         """
-        return write_dataset(self.dataset, Path(path), {})
+        return write_dataset(self.dataset, Path(path), FILE_KIND)
 
     @classmethod
     def read(cls, path: str | Path) -> "CollapseRisk":
@@ -722,9 +724,9 @@ class CollapseRisk(ResultDisplay):
             path: file to read.
 
         Raises:
-            InvalidInput: there is no such file, or it is damaged.
+            InvalidInput: there is no such file, or it is damaged or of another version.
         """
-        return cls(read_dataset(path, "file of a risk"))
+        return cls(read_dataset(path, FILE_KIND))
 
 
 def draw_risk_result(found: CollapseRisk) -> Any:

@@ -108,7 +108,7 @@ class Store:
         quoted = frame.map(_quote_formula).rename(columns=_quote_formula)
         with explain_full_disk(folder), _files.stage_results(folder, "study", inputs) as draft:
             netcdf, csv, excel, parquet = (draft / name for name in RESULT_FILES)
-            write_dataset(table, netcdf)
+            write_dataset(table, netcdf, "table")
             # Some versions of HDF5 write the time into a file: a table of the same content stays,
             # and with it what was derived from it.
             if _holds_same(folder / netcdf.name, netcdf):

@@ -1,6 +1,5 @@
 """Sentences of a report's conclusion: margins, doubts by weight, and what was not varied."""
 
-import json
 from dataclasses import replace
 from itertools import pairwise
 from types import SimpleNamespace
@@ -42,7 +41,10 @@ def data_of(case, found=None, **verdicts):
     runs = {
         name: SimpleNamespace(
             verdict=verdict,
-            dataset=xr.Dataset({"ground": (("t", "x"), [[2.0, 0.0]])}, attrs={"motion": name}),
+            dataset=xr.Dataset(
+                {"ground": (("t", "x"), [[2.0, 0.0]])},
+                attrs={"motion": name, "pga": 2.0, "fidelity": ""},
+            ),
         )
         for name, verdict in verdicts.items()
     }
@@ -376,19 +378,13 @@ def test_rewording_a_sentence_changes_no_number_of_the_report(case):
         assert again == said
 
 
-def test_a_file_of_an_earlier_version_is_shown_without_a_margin(case):
-    """Its rows have no numbers, and its doubts are texts."""
-    row = ["scale of the motion", "'a', PGA 0.2 g", "stands at 0.3 g (1.5 × the motion)", "1.5"]
-    old = {"sentences": ["scale"], "rows": [row], "doubts": ["under 'a': it falls"], "notes": []}
-    stated = answers.Statement.read(json.dumps(old))
-    assert stated.rows == [answers.Row(*row, {})]
-    assert stated.doubts == (Doubt("under 'a': it falls"),)
-    data = data_of(case)
-    assert say_margin(data, scale=stated) == []
-    assert [x.cause for _, x in doubts.list_doubts(data)] == ["under 'a': it falls"]
+def test_what_is_stated_of_a_result_is_read_as_it_was_written():
+    stated = state("scale of the motion", scales("a", 1.5, falls=2.0, again=[]))
+    stated = stated._replace(doubts=[Doubt("under {}: it falls", "hold it", ("a",))], notes=["x"])
     again = answers.Statement.read(stated.as_file("scale")["scale.json"])
-    assert (again.rows, again.doubts) == (stated.rows, stated.doubts)
-    assert answers.Statement.read(json.dumps({"factor": 1.0})) is None
+    assert again == stated._replace(doubts=again.doubts)
+    assert [str(each) for each in again.doubts] == [str(each) for each in stated.doubts]
+    assert answers.read_numbers(answers.Scales, again)[0].states == {"falls": 2.0}
 
 
 def test_of_unequal_outcomes_the_worst_is_the_first(case):

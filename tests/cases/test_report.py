@@ -35,7 +35,7 @@ from archfem.cases.report.sections import (
     build_structure_section,
 )
 from archfem.cases.result_text import ResultTable
-from archfem.cases.run import MOTION_VARIABLE, carry_out, replace_run
+from archfem.cases.run import carry_out, replace_run
 from archfem.cases.structure_keys import write_structure
 from archfem.limit import rating
 from archfem.models.model import Doubt
@@ -291,24 +291,18 @@ def test_a_check_that_passes_at_rest_says_so():
     assert answers.Ratios(**row.numbers) == answers.Ratios("a code", ["right"], 1.5, 1.5, moved=0.5)
 
 
-@pytest.mark.parametrize("kind", ["without values", "with others", "of another case"])
-def test_results_of_an_earlier_version_are_named_and_not_stated(kept, undrawn, kind):
+def test_results_of_another_case_are_named_and_not_stated(kept, undrawn):
     write_stated(kept, af.Hazard.power(0.02116, 3.0))
-    inputs = read_file_list(kept)["run"].inputs
-    with replace_results(kept, "limit", "other" if "case" in kind else inputs) as draft:
-        files = {"limit.txt": "limit analysis: it turns, at 0.25 g to the left"}
+    with replace_results(kept, "limit", "other") as draft:
         stated = state_each(af.Hazard.power(0.02116, 3.0))["limit", "limit"]
-        files |= stated.as_file("limit") if "case" in kind else {}
-        files |= {"limit.json": '{"factor": 0.25}'} if "others" in kind else {}
-        write_files(files, draft)
+        text = "limit analysis: it turns, at 0.25 g to the left"
+        write_files({"limit.txt": text, **stated.as_file("limit")}, draft)
     found = af.cases.open_results(kept)
     data = report_data.ReportData(found.case, found.runs, found.folder)
     pieces = build_conclusion(data).pieces
     texts = [each.text for each in pieces if each.kind == "words"]
-    said = "Not stated in full, for an earlier version of archfem made it: {}."
-    if "case" in kind:
-        said = "Not stated, for its case, drawing or version of archfem is not that of the runs: {}"
-        said += "; or run `archfem run` again, if the runs are older."
+    said = "Not stated, for its case, drawing or version of archfem is not that of the runs: {}"
+    said += "; or run `archfem run` again, if the runs are older."
     assert said.format("limit analysis (run `archfem limit` again)") in texts
     assert sum(text.startswith("Not stated") for text in texts) == 1
     assert not any("turns" in text for text in texts)
@@ -420,15 +414,6 @@ def test_supports_bear_the_weight(ring, caplog):
     assert supported_weight_ratio(ring, rest.joints) == pytest.approx(1.0, abs=1e-9)
     half = rest.joints.assign(N=0.5 * rest.joints["N"], V=0.5 * rest.joints["V"])
     assert supported_weight_ratio(ring, half) == pytest.approx(0.5, abs=1e-9)
-
-
-def test_the_ground_of_a_run_is_that_which_was_applied(stack):
-    motion = af.Motion.synthetic(seed=3, duration=1.0, pga=1.0)
-    run = af.time_history(af.build(stack, fidelity="rigid"), motion, dt=0.005)
-    found = report_data.read_motion(run, "ground")
-    assert found.dt == pytest.approx(0.005)
-    assert np.allclose(found.horizontal, run.dataset["ground"].values[:, 0], atol=1e-9)
-    assert found.pga == pytest.approx(motion.pga)
 
 
 def test_a_report_of_a_history_is_of_its_pair_or_its_motion(kept, monkeypatch, tmp_path):
@@ -1089,13 +1074,6 @@ def test_a_motion_is_measured_to_its_end_where_the_structure_falls_before(tmp_pa
     whole = case.ground_motion()
     assert np.array_equal(data.motions["pulse"].horizontal, whole.horizontal)
     assert list(row.values()) == result_text.tabulate_motions([whole]).rows[0]
-    # a file of an earlier version has the steps of the run alone, and the report says so
-    cut = replace(run.history, dataset=run.history.dataset.drop_vars(MOTION_VARIABLE))
-    data = report_data.ReportData(case, {"pulse": cut})
-    grid, *_, spectra = build_ground_section(data).pieces
-    assert data.motions["pulse"].pga < whole.pga
-    assert "those of pulse at the steps of the runs up to their ends" in grid.caption
-    assert "as applied, up to the end of the run" in spectra.caption
 
 
 def test_a_study_stands_in_a_report(kept, unplotted, tmp_path, capsys):

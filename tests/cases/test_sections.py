@@ -15,6 +15,7 @@ from archfem.cases.case import case_of
 from archfem.cases.report import conclusion, report_data, response, sections
 from archfem.cases.report.response import _check_row, supported_weight_ratio
 from archfem.cases.result_text import tabulate_joints, tabulate_motions, tabulate_runs
+from archfem.cases.run import MOTION_VARIABLE
 from archfem.dynamics import VerdictRange
 from archfem.models.model import Doubt
 
@@ -42,7 +43,9 @@ def runs(piers):
     shape = np.sin(np.linspace(0.0, 2.0 * np.pi, 21))
     for name, size in (("first", -0.6), ("second", 0.3)):
         motion = af.Motion(size * shape, 0.005, 0.5 * size * shape)
-        found[name] = af.time_history(model, motion, dt=0.005)
+        found[name] = run = af.time_history(model, motion, dt=0.005)
+        samples = np.column_stack([motion.horizontal, motion.vertical])
+        run.dataset[MOTION_VARIABLE] = ("sample", "axis"), samples, {"dt": motion.dt}
     return found
 
 
@@ -216,22 +219,12 @@ def test_the_assumptions_name_the_law_of_the_joints(piers):
         assert f", which was {varied}; " in sections._describe_joints(data)
 
 
-def test_the_pga_of_older_files_is_that_at_their_steps(piers, runs):
-    old = af.History(runs["first"].dataset.drop_attrs(), piers)
-    old.dataset.attrs |= {k: v for k, v in runs["first"].dataset.attrs.items() if k != "pga"}
-    data = report_data.ReportData(made_case(piers), {"only": old})
-    assert dict(conclusion.list_facts(data))["motion"] == "PGA 0.06 g"
-
-
 def test_the_pga_of_a_report_is_that_of_the_motion_and_not_of_the_steps(piers):
     motion = af.Motion(np.array([0.0, 2.0, -1.0, 0.0]), 0.005)
     run = af.time_history(af.build(piers, fidelity="rigid"), motion, dt=0.003)
     assert np.abs(run.dataset["ground"]).max() < 1.9
     data = report_data.ReportData(made_case(piers), {"only": run})
     assert dict(conclusion.list_facts(data))["motion"] == "PGA 0.20 g"
-    del run.dataset.attrs["pga"]  # as in files of older versions
-    largest = float(np.abs(run.dataset["ground"][:, 0]).max())
-    assert dict(conclusion.list_facts(data))["motion"] == f"PGA {largest / 9.80665:.2f} g"
 
 
 def test_a_report_of_several_runs_has_a_section_for_each(runs, piers, monkeypatch):
@@ -429,7 +422,7 @@ def test_motions_of_a_suite_are_shown_before_they_were_scaled_and_reduced(monkey
     monkeypatch.setattr(response.FigureBlock, "of", lambda figure, caption: caption)
     motion = af.Motion(np.array([0.0, 1.0, -0.5]), 0.01)
     for given, factor in (({}, 1.0), ({"scale": 1.5, "reduction": 4.0}, 4.0 / 1.5)):
-        data = SimpleNamespace(case=made_case(None, suite=given), cut_motions=[])
+        data = SimpleNamespace(case=made_case(None, suite=given))
         (caption,) = response._build_spectra(data, [motion])
         assert seen[-1].pairs[0].horizontal == pytest.approx(factor * motion.horizontal)
         assert (seen[-1].scale, seen[-1].reduction) == (
@@ -439,42 +432,16 @@ def test_motions_of_a_suite_are_shown_before_they_were_scaled_and_reduced(monkey
         assert ("R = 4;" in caption) == ("reduction" in given)
     for matched in (True, False):
         case = made_case(None, suite={"matched": matched}, target="some")
-        (caption,) = response._build_spectra(SimpleNamespace(case=case, cut_motions=[]), [motion])
+        (caption,) = response._build_spectra(SimpleNamespace(case=case), [motion])
         assert caption.endswith("; they were not matched to the target") != matched
     case.assessment.spectrum, case.target = "another", None
-    (caption,) = response._build_spectra(SimpleNamespace(case=case, cut_motions=[]), [motion])
+    (caption,) = response._build_spectra(SimpleNamespace(case=case), [motion])
     assert caption.endswith(", which is the spectrum of [assessment]")
 
 
 def test_sentences_begin_with_a_capital_and_end_with_one_stop():
     assert conclusion.sentence(" it stands ") == "It stands."
     assert conclusion.sentence("it stands.") == "It stands."
-
-
-def test_a_ground_motion_is_read_at_even_steps_from_its_first_to_its_last():
-    """Steps that are mostly 10 ms, two of them halved, from 0.5 s on; a straight acceleration."""
-    times = 0.5 + np.array([0.0, 0.01, 0.015, 0.02, 0.03, 0.04, 0.05])
-    ground = xr.DataArray(np.column_stack([3.0 * times, 0.0 * times]), dims=("time", "axis"))
-    run = SimpleNamespace(time=times, dataset={"ground": ground})
-    found = report_data.read_motion(run, "read")
-    assert found.dt == pytest.approx(0.01)
-    assert found.horizontal == pytest.approx(3.0 * (0.5 + 0.01 * np.arange(6)))
-    assert found.components == ("horizontal",)
-
-
-@pytest.mark.parametrize(("times", "dt"), [([2.0], 1.0), ([2.0, 2.25], 0.25)])
-def test_one_step_is_a_motion_too(times, dt):
-    ground = xr.DataArray([[1.0, 0.0], [3.0, 0.0]][: len(times)])
-    run = SimpleNamespace(time=np.array(times), dataset={"ground": ground})
-    found = report_data.read_motion(run, "read")
-    assert (found.dt, found.horizontal.tolist()) == (dt, [1.0, 3.0][: len(times)])
-
-
-def test_two_steps_are_a_motion_of_their_interval():
-    ground = xr.DataArray([[1.0, 0.0], [3.0, 0.0]])
-    run = SimpleNamespace(time=np.array([2.0, 2.5]), dataset={"ground": ground})
-    found = report_data.read_motion(run, "read")
-    assert (found.dt, found.horizontal.tolist()) == (0.5, [1.0, 3.0])
 
 
 @pytest.mark.parametrize(("players", "megabytes"), [(1, 8.0), (4, 2.0), (100, 0.8)])
@@ -499,5 +466,3 @@ def test_supports_are_judged_by_the_first_record_and_iterations_by_the_largest(p
     assert f"{later:.4f}" != "1.0000"
     assert row[3] == f"≤ {int(run.dataset['iterations'].max())}"
     assert (row[0], row[-1]) == ("first", run.outcome)
-    without = SimpleNamespace(joints=run.joints, outcome="", dataset=xr.Dataset())
-    assert _check_row(SimpleNamespace(structure=piers), "", without)[3] == "–"

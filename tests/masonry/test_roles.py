@@ -352,15 +352,3 @@ def test_a_saved_history_keeps_roles(tmp_path):
         af.joints.assessed_joints(dataset)["joint"]
     )
     assert again.mechanism == af.limit.counted_mechanisms(dataset)["any joints at once"]
-
-
-def test_a_file_without_roles_is_read_with_its_structure(tmp_path):
-    made = viaduct(*NAMES["English"])
-    dataset = af.joints.joint_dataset(made, quake(made), np.arange(6.0)).drop_vars("role")
-    path = af.History(dataset).save(tmp_path / "run.nc")
-    with pytest.raises(
-        af.errors.InvalidInput, match=r"rings and piers, .* give the structure that was shake"
-    ):
-        af.History.read(path)
-    found = af.History.read(path, made)
-    assert af.joints.part_roles(found.joints)["west vault"] == "ring"

@@ -147,9 +147,9 @@ def test_a_study_continues_where_it_was_ended(study, undrawn, tmp_path, monkeypa
 
     monkeypatch.setattr("archfem.studies.process_pool.evaluate_serially", never)
 
-    def write_otherwise(dataset, path):
+    def write_otherwise(dataset, path, what):
         encoding = {name: {"zlib": True} for name in dataset if dataset[name].dtype == float}
-        return write_dataset(dataset, path, encoding)
+        return write_dataset(dataset, path, what, encoding)
 
     # other bytes of the same table, as where HDF5 writes the time into a file
     monkeypatch.setattr("archfem.studies.result_store.write_dataset", write_otherwise)

@@ -72,9 +72,6 @@ SECTIONS = {
 # Fidelity of the variations of a verdict
 VARIED_FIDELITY = "rigid"
 
-# Results with a margin, which is made of the numbers of their rows
-_NUMBERED = {"limit", "pushover", "assessment", "scale"}
-
 # What commands keep of results that they have not finished
 _BEGUN = {RESULTS["risk"]: "risk_samples.nc"}
 
@@ -294,29 +291,23 @@ def _largest_demand(data: ReportData) -> float:
 
 
 def _list_outdated(data: ReportData) -> Iterator[str]:
-    """Yield sentences on results that another version, or another case, has left, or no answer."""
+    """Yield sentences on results that another case has left, or no answer."""
     listed = {} if data.folder is None else read_file_list(data.folder)
     shown = [name for name in SHOWN_RESULTS if data.list_parts(f"{name}.txt")]
     unstated = RESULTS.keys() - {*shown, *data.statements}
-    unstated |= {
-        name
-        for name in _NUMBERED & data.statements.keys()
-        if any(row.factor != "-" and not row.numbers for row in data.statements[name].rows)
-    }
     absent = {f"{name}.txt": RESULTS[name] for name in unstated}
-    own, earlier, other = group_of(listed, CASE_FILE), list[str](), list[str]()
-    for command, group in listed.items():
-        names = [name for path in group.files if (name := path.rpartition("/")[2]) in absent]
-        again = [f"{absent[name]} (run `archfem {command}` again)" for name in names]
-        (earlier if own and group.inputs == own.inputs else other).extend(again)
+    own = group_of(listed, CASE_FILE)
+    other = [
+        f"{absent[name]} (run `archfem {command}` again)"
+        for command, group in listed.items()
+        for path in group.files
+        if (name := path.rpartition("/")[2]) in absent and not (own and group.inputs == own.inputs)
+    ]
     for name in _BEGUN.keys() & absent.values():
         if data.folder and (data.folder / _BEGUN[name]).exists():
             yield f"The {name} was begun and has no answer: runs are left to compute."
     if data.case.report.get("project") == PLACEHOLDER:
         yield "The name of the project is that of the template: fill in [report] of the case."
-    if earlier:
-        made = "Not stated in full, for an earlier version of archfem made it"
-        yield f"{made}: {', '.join(earlier)}."
     if other:
         # digests of inputs do not say which is the older
         made = "Not stated, for its case, drawing or version of archfem is not that of the runs"

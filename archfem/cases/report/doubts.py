@@ -5,8 +5,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from archfem._files import read_sealed_json
 from archfem.cases.answers import RESULTS, Ratios, read_numbers
 from archfem.cases.report.motion_rules import note_checks
@@ -157,9 +155,7 @@ def list_unvaried(data: ReportData) -> list[str]:
 
 def peak_of_ground(run: History) -> float:
     """Return the horizontal peak acceleration of a run [g]."""
-    # Files of older versions have the acceleration at their steps alone.
-    recorded = np.abs(run.dataset["ground"].values[:, 0]).max()
-    return float(run.dataset.attrs.get("pga", recorded)) / STANDARD_GRAVITY
+    return float(run.dataset.attrs["pga"]) / STANDARD_GRAVITY
 
 
 def read_spectrum(data: ReportData) -> Mapping[str, Any]:

@@ -7,7 +7,6 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import xarray as xr
 
 from archfem._display import DOUBT_MARK
@@ -59,7 +58,7 @@ class ReportData:
 
     @cached_property
     def motions(self) -> dict[str, Motion]:
-        """Ground motions as applied: the whole ones, or of earlier versions those at the steps."""
+        """Ground motions as applied, whole."""
         return {name: read_motion(run, name) for name, run in self.runs.items()}
 
     @cached_property
@@ -78,14 +77,9 @@ class ReportData:
         return found
 
     @cached_property
-    def cut_motions(self) -> list[str]:
-        """Names of motions that are known at the steps of their runs alone."""
-        return [name for name, run in self.runs.items() if MOTION_VARIABLE not in run.dataset]
-
-    @cached_property
     def fidelity(self) -> str:
         """Fidelity of the runs, which "auto" has selected; without runs that of the case."""
-        recorded = {str(run.dataset.attrs.get("fidelity", "")) for run in self.runs.values()}
+        recorded = {run.dataset.attrs["fidelity"] for run in self.runs.values()}
         return ", ".join(sorted(recorded)) or self.case.analysis.discretisation.name
 
     def read_table(self, section: str) -> Table:
@@ -136,12 +130,12 @@ class ReportData:
     @cached_property
     def statements(self) -> dict[str, Statement]:
         """What the commands state of their results, by the names of their files."""
-        found: dict[str, dict[str, Statement]] = {name: {} for name in RESULTS}
-        for name, by_pair in found.items():
-            for pair, place in self.list_parts(f"{name}.json").items():
-                if stated := Statement.read(self.read_text(place) or "{}"):
-                    by_pair[pair] = stated
-        return {name: _join_statements(by_pair) for name, by_pair in found.items() if by_pair}
+        found = dict[str, Statement]()
+        for name in RESULTS:
+            places = self.list_parts(f"{name}.json").items()
+            by_pair = {pair: Statement.read(self.read_text(place) or "") for pair, place in places}
+            found |= {name: _join_statements(by_pair)} if by_pair else {}
+        return found
 
     @cached_property
     def files(self) -> dict[str, Path]:
@@ -190,17 +184,11 @@ def _join_statements(by_pair: Mapping[str, Statement]) -> Statement:
 
 
 def read_motion(run: History, name: str) -> Motion:
-    """Return the motion of a run, or of earlier versions that at its steps, at even ones."""
-    times, ground = run.time, run.dataset["ground"].values
-    if MOTION_VARIABLE in run.dataset:
-        samples, dt = run.dataset[MOTION_VARIABLE].values, run.dataset[MOTION_VARIABLE].attrs["dt"]
-    else:
-        # Adaptive and event steps are uneven; the median is the step of the record.
-        dt = float(np.median(np.diff(times))) if len(times) > 1 else 1.0
-        even = times[0] + dt * np.arange(round((times[-1] - times[0]) / dt) + 1)
-        samples = np.column_stack([np.interp(even, times, column) for column in ground.T])
-    horizontal, vertical = samples.T
-    return Motion(horizontal, float(dt), vertical if vertical.any() else None, name)
+    """Return the whole motion of a run."""
+    samples = run.dataset[MOTION_VARIABLE]
+    horizontal, vertical = samples.values.T
+    dt = float(samples.attrs["dt"])
+    return Motion(horizontal, dt, vertical if vertical.any() else None, name)
 
 
 def build_player(case: Case, run: History, title: str, players: int = 1) -> Player:

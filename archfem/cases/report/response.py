@@ -21,7 +21,7 @@ from archfem.cases.report.report_data import ReportData, build_player
 from archfem.dynamics.collapse_state import FALLEN_STATES
 from archfem.dynamics.history import History
 from archfem.masonry.joint_closing import describe_closing
-from archfem.masonry.structure import Structure, join_names, join_words
+from archfem.masonry.structure import Structure, join_words
 from archfem.models.model import group_doubts, merge_doubts
 from archfem.motion.matching import DEFAULT_BAND
 from archfem.motion.motion import Motion
@@ -46,12 +46,6 @@ def build_ground_section(data: ReportData) -> Section:
     if not motions:
         return Section("Ground motion", [])
     caption = "Measures of the motions as applied, at their own samples, without a correction"
-    if data.cut_motions:
-        caption = (
-            f"Measures of the motions; those of {join_names(data.cut_motions)} at the steps of the "
-            "runs up to their ends, for an earlier version of archfem made these: peaks between "
-            "steps are left out, and displacements drift"
-        )
     blocks: list[Any] = [Grid(*result_text.tabulate_motions(motions), caption)]
     blocks += tabulate_checks(data) or [TextBlock(_UNRULED)]
     if missed := [*_list_missed_peaks(data)]:
@@ -80,8 +74,7 @@ def _list_missed_peaks(data: ReportData, share: float = 0.98) -> Iterator[str]:
 def _build_spectra(data: ReportData, motions: list[Motion]) -> list[Any]:
     """Build the response spectra, beside that of their suite or of an assessment."""
     own, target = data.case.suite or {}, find_target(data)
-    cut = ", up to the end of the run" * bool(data.cut_motions)
-    caption = f"Response spectra, 5 % damped, as applied{cut}"
+    caption = "Response spectra, 5 % damped, as applied"
     if data.case.suite is None and target is None:
         return [FigureBlock.of(draw_spectra(motions), f"{caption}.")]
     scale, reduction = own.get("scale", 1.0), own.get("reduction", 1.0)
@@ -241,14 +234,13 @@ def _check_row(case: Case, name: str, run: History) -> list[str]:
     """Row of the checks of a run."""
     attrs = run.dataset.attrs
     predicted = attrs.get("predicted_error")
-    iterations = run.dataset["iterations"].values if "iterations" in run.dataset else np.zeros(0)
     ratio = supported_weight_ratio(case.structure, run.joints.isel(time=0, drop=True))
     return [
         name,
-        f"{abs(float(attrs.get('energy_drift', np.nan))):.1e}",
+        f"{abs(float(attrs['energy_drift'])):.1e}",
         f"{ratio:.4f} of the weight",
-        f"≤ {int(iterations.max())}" if len(iterations) else "–",
-        f"{int(attrs.get('halved_steps', 0))} steps",
+        f"≤ {int(run.dataset['iterations'].max())}",
+        f"{int(attrs['halved_steps'])} steps",
         "–" if predicted is None else f"{float(predicted):.2g} in |e|",
         run.outcome,
     ]

@@ -470,7 +470,7 @@ def build_source_section(data: ReportData) -> Section:
     """Build the section on versions, and digests of inputs and case."""
     runs = data.runs.items()
     # Usually one line: all runs were computed with the same versions.
-    made = sorted({str(run.dataset.attrs.get("versions", "unknown")) for _, run in runs})
+    made = sorted({run.dataset.attrs["versions"] for _, run in runs})
     own = library_versions()
     rows = [("computed with", text) for text in made]
     rows += [] if made == [own] else [("report written with", own)]
