@@ -32,7 +32,6 @@ from archfem.joints.criteria import (
     envelope,
     first_time,
     longest_duration,
-    with_failure_flags,
 )
 from archfem.limit.collapse import Collapse, Outcome, describe_crushing, describe_fill
 from archfem.limit.fill_strength import Fill, PlasticFill, as_pressure
@@ -90,7 +89,7 @@ class ResultTable(NamedTuple):
 
 def tabulate_joints(joints: xr.Dataset, dead: xr.Dataset | None = None) -> ResultTable:
     """Tabulate envelope and failures of the assessed joints: first time and longest duration."""
-    joints = assessed_joints(with_failure_flags(joints))
+    joints = assessed_joints(joints)
     # Without dead load the column is undefined, which reads "open".
     at_rest = np.full(joints.sizes["joint"], np.nan)
     if dead is not None:

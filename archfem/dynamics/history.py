@@ -462,7 +462,8 @@ def _check_content(path: str | Path, dataset: xr.Dataset) -> None:
             name not in TEXTS and {"time", "joint"} & {*values.dims} and values.dtype.kind in "OSUM"
         )
     ]
-    wrong += ["slip"] if "rotation" in shapes and "slip" not in shapes else []
+    needed = ["cohesion_limit", *["slip"] * ("rotation" in shapes)]
+    wrong += [name for name in needed if name not in shapes]
     required = [name for name in ATTRIBUTE_KINDS if "fall" in dataset.attrs and name[:5] == "fall_"]
     for name, kind in ATTRIBUTE_KINDS.items():
         try:

@@ -232,11 +232,10 @@ def tension_margin(normal: Array, tension: Array) -> Array:
 
 
 def with_failure_flags(joints: xr.Dataset, criteria: Criteria | None = None) -> xr.Dataset:
-    """Return joints with the failure flags and attributes of some criteria."""
-    if criteria is None and "hinge" in joints:
+    """Return joints with the failure flags and attributes of some criteria; None keeps those."""
+    if criteria is None:
         return joints
     check_criteria(criteria)
-    criteria = criteria or Criteria.of(joints)
     normal, e, friction = (
         joints[name].transpose(..., "joint", missing_dims="ignore")
         for name in ("N", "eccentricity", "friction")
@@ -257,15 +256,11 @@ def with_failure_flags(joints: xr.Dataset, criteria: Criteria | None = None) -> 
 
 def sliding_limits(joints: xr.Dataset, criteria: Criteria) -> Array:
     """Return |V| / N at which joints slide, as by `sliding_ratio` (…, n_joints) [-]."""
-    normal, e = (
+    normal, e, cohesion = (  # which is over time too where faces slide far
         joints[name].transpose(..., "joint", missing_dims="ignore").values
-        for name in ("N", "eccentricity")
+        for name in ("N", "eccentricity", "cohesion_limit")
     )
     friction = joints["friction_limit"].values
-    cohesion = np.zeros_like(friction)
-    if "cohesion_limit" in joints.coords:  # over time too where faces slide far
-        limits = joints["cohesion_limit"]
-        cohesion = limits.transpose(..., "joint", missing_dims="ignore").values
     return sliding_ratio(normal, e, criteria.coefficients(friction), criteria.cohesions(cohesion))
 
 

@@ -32,7 +32,7 @@ from archfem.dynamics.motion_scaling import (
     search_scales,
 )
 from archfem.errors import DidNotConverge, InvalidInput
-from archfem.joints.criteria import assessed_joints, with_failure_flags
+from archfem.joints.criteria import assessed_joints
 from archfem.limit.mechanism_count import Mechanism, counted_mechanism
 from archfem.models.model import Doubt
 from archfem.motion.motion import Motion, admissible_range
@@ -122,7 +122,7 @@ def _run(result: DeadLoadResult, motion: Motion) -> dict[str, Any]:
     if complete:
         findings = largest_values(run)
         demands = {name: findings[name] for name in DEMAND_LABELS}
-    joints = with_failure_flags(run.joints)
+    joints = run.joints
     reached = {
         "first hinge": bool(assessed_joints(joints)["hinge"].values.any()),
         "four failures": counted_mechanism(joints) is not None,

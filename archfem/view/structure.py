@@ -142,7 +142,6 @@ def draw_instants(states: Mapping[str, tuple[Structure, xr.Dataset | None]]) -> 
     for axes, (label, (structure, joints)) in zip(panels, states.items(), strict=True):
         if joints is not None:
             check_instant(structure, joints)
-            joints = with_failure_flags(joints)
         _draw_state(axes, structure, joints, label)
     _explain_panels(figure, drawn)
     return figure

@@ -251,7 +251,7 @@ def test_variables_that_no_run_has_are_refused_by_name(few_instants, run, tmp_pa
         "part": few_instants["part"][0],
         "rotation": few_instants["rotation"].astype("S1"),
     }
-    for name in ["M", "time", "slip", "open", "role", *changed]:
+    for name in ["M", "time", "slip", "open", "role", "cohesion_limit", *changed]:
         dataset = few_instants.drop_vars(name)
         if name in changed:
             dataset = few_instants.assign({name: changed[name].variable})

@@ -84,9 +84,10 @@ def joints_of(failing):
             "part": ("joint", PARTS),
             "role": ("joint", ROLES),
             "friction_limit": ("joint", np.full(20, 0.6)),
+            "cohesion_limit": ("joint", np.zeros(20)),
         },
     )
-    return with_failure_flags(joints)
+    return with_failure_flags(joints, Criteria())
 
 
 def test_definitions_of_a_counted_mechanism():

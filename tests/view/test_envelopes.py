@@ -85,9 +85,6 @@ def test_piers_that_differ_are_drawn_by_height(bridge, short):
     assert lines["high"].get_xdata().tolist() == list(range(18))
     assert lines["dead load low"].get_ydata() == pytest.approx(0.2)
     assert lines["dead load low"].get_color() == lines["low"].get_color()
-    # a file of an earlier version has no heights
-    bare = {name: af.History(run.dataset.drop_vars("height")) for name, run in runs.items()}
-    assert draw_envelope(bare).axes[-1].get_xlabel() == "joint [-]"
 
 
 def test_runs_of_one_structure_share_a_colour(run):
