@@ -19,7 +19,7 @@ from archfem.studies.collapse_risk import CollapseRisk
 STACK = {
     "structure": {"shape": "column", "breadth": 0.5, "heights": [1.0, 1.0]},
     "model": {"fidelity": "rigid", "displacements": "large"},
-    "motion": {"synthetic": {"duration": 0.5, "pga": 0.1}},
+    "motion": {"synthetic": {"duration": 0.5, "pga": 1.0}},
     "record": {"fields_every": 4},
 }
 

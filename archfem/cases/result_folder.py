@@ -13,7 +13,6 @@ from archfem._optional import can_film
 from archfem._validation import validate_arguments, validate_methods
 from archfem.cases.answers import NO_DEMAND, state_outcome
 from archfem.cases.case import Case
-from archfem.cases.provenance import list_input_files
 from archfem.cases.result_text import (
     PushFactors,
     Remark,
@@ -111,15 +110,14 @@ def open_results(folder: str | Path, *, inputs: str | Path | None = None) -> Res
 
     Args:
         folder: the folder.
-        inputs: folder of the mesh that the case names, or of a drawing in results of earlier
-            versions; by default the result folder.
+        inputs: folder of the mesh that the case names; by default the result folder.
 
     Returns:
         Case and histories of the folder.
 
     Raises:
-        InvalidInput: it is no result folder, the drawing does not exist, or a file was changed or
-            is of another run.
+        InvalidInput: it is no result folder, or a file was changed, or is of another run or
+            another version of archfem.
     """
     place = Path(folder)
     if not place.is_dir():
@@ -178,18 +176,11 @@ def _missing_case_message(place: Path) -> str:
 
 
 def _read_case(place: Path, inputs: Path | None) -> Case:
-    """Read the case of a folder; its drawing is in another folder, that of the original case."""
-    path, start = place / CASE_FILE, place if inputs is None else inputs
+    """Read the case of a folder; its mesh is in another folder, that of the original case."""
+    path = place / CASE_FILE
     settings = read_tables(path, "case file")
-    drawing = list_input_files({"structure": settings.get("structure")}, start)
-    if drawing and not drawing[0].is_file():
-        raise InvalidInput(
-            f"{path} names the drawing {settings['structure']['file']}, and there is none in "
-            f"{start}: give the folder of the case that was run, as inputs, or by "
-            f"`archfem report {place} --inputs FOLDER`"
-        )
     try:
-        return Case.of(settings, start)
+        return Case.of(settings, place if inputs is None else inputs)
     except ArchfemError as error:
         raise type(error)(f"{path}: {error}") from error
 

@@ -350,7 +350,7 @@ def test_folders_that_hold_no_results_are_refused(kept, tmp_path):
         af.cases.open_results(tmp_path)
     drawing = '[structure]\nshape = "outlines"\nfile = "stones.geojson"\n'
     (tmp_path / "case.toml").write_text(drawing)
-    with pytest.raises(af.InvalidInput, match=r"names the drawing stones.geojson.*--inputs"):
+    with pytest.raises(af.InvalidInput, match=r"case\.toml: .*stones\.geojson"):
         af.cases.open_results(tmp_path)
 
 
