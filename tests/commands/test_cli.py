@@ -335,7 +335,8 @@ def test_sigterm_interrupts_where_gmsh_is_loaded():
         ]
     )
     ran = subprocess.run([sys.executable, "-c", script], text=True, capture_output=True)
-    assert (ran.stdout, ran.stderr) == ("130\n", "archfem: interrupted\n")
+    # PETSc of Debian 13 says on standard error that it found two MPI libraries
+    assert (ran.stdout, ran.stderr.splitlines()[-1]) == ("130\n", "archfem: interrupted")
 
 
 def test_sigterm_in_limit_analysis_keeps_dead_load_and_motion(
