@@ -225,8 +225,9 @@ class RunMonitor:
         time, size = self._last.time, self.model.structure.size
         if not np.isfinite(self.worst_drift):
             raise DidNotConverge(
-                f"by t = {time:.4g} s displacements or speeds are not numbers any more: the start "
-                "is unphysical, or the run needs damping or a smaller dt",
+                f"by t = {self._worst_time:.4g} s displacements, speeds or energies are not "
+                "numbers any more: the start is unphysical, or the run needs the scheme "
+                "Conserving, damping or another dt",
                 last=self._before,
             )
         if self._drift_error is not None:

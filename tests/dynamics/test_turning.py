@@ -1,10 +1,12 @@
 """Time histories of blocks in large displacements, and their results."""
 
 from functools import cache
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
+from portals import box
 from repeats import each_once
 
 import archfem as af
@@ -170,6 +172,27 @@ def test_a_column_that_still_topples_as_its_motion_ends_is_followed_to_the_groun
     assert run.ending == "finished"
     assert run.fall.kind == "fallen"
     assert run.fall.time > push.duration
+
+
+def test_a_symmetric_wall_at_rest_stays_there():
+    """Courses from five stones to one, on joints of which parts are open all the time."""
+    blocks = [box(-9.0, -1.0, 9.0, 0.0, "ground", fixed=True, part="ground", role="other")]
+    for course in range(5):
+        edges, low, half = 0.3 * np.arange(6 - course), 0.3 * course, 0.15 * (5 - course)
+        for left, right in pairwise(edges - half):
+            lean = 0.1 * (left == -half), 0.1 * (right == half)
+            top = (right - lean[1], low + 0.3), (left + lean[0], low + 0.3)
+            name = f"stone {len(blocks)}"
+            corners = (left, low), (right, low), *top
+            blocks.append(af.Block(corners, af.STONE, name, part="wall", role="pier"))
+    wall = af.masonry.assembled(blocks, af.Contact(1.48e9, 0.3e9, friction=0.3), width=0.4)
+    built = af.build(wall, fidelity="rigid", displacements="large")
+    still = af.Motion(np.zeros(5), 1.0)
+    for dt in (0.0025, 0.002, 0.001):
+        run = af.time_history(built, still, dt=dt, damping="effective")
+        assert run.verdict.displacement < 1e-9
+        assert abs(run.dataset.attrs["energy_drift"]) < 1e-9
+        assert run.dataset.attrs["fallback_steps"] == 0
 
 
 @pytest.mark.slow

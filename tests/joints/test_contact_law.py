@@ -39,6 +39,7 @@ mean_tractions = from_python(point_law.mean_tractions)
 closed_means = from_python(point_law.closed_means)
 shear_means = from_python(point_law.shear_means)
 shear_limit = from_python(point_law.shear_limit)
+damping_tractions = from_python(point_law.damping_tractions)
 facet_energy = from_python(point_law.facet_energy)
 point_energy = from_python(point_law.point_energy)
 
@@ -273,6 +274,25 @@ def test_facets_are_the_same_in_numpy_and_compiled(lag):
         assert np.all(np.abs(own[2] - 0.5 * np.diff(force)[:, 0]) <= SAME * stiffness * whole)
     partly = (np.sign(ends).max(axis=1) > 0.0) & (np.sign(ends).min(axis=1) < 0.0)
     assert 0.2 < partly.mean() < 0.9
+
+
+@pytest.mark.parametrize("lag", [0.0, 0.3])
+def test_a_facet_at_rest_presses_by_closed_form_and_loses_nothing(lag):
+    """Partly closed, with gaps that differ by rounding from the start to the end of a step."""
+    random, count = np.random.default_rng(6), 20000
+    record, stiffness = np.array([ContactLaw.of(af.Contact(1e9, 1e9, 0.6))], CONTACT_RECORD)[0], 1e9
+    sizes = 10.0 ** random.uniform(-16.0, -4.0, (2, count))
+    ends = sizes * np.array([[-1.0], [1.0]])
+    rounded = ends * (1.0 + np.finfo(float).eps * random.integers(-3, 4, (2, count)))
+    # closed over this share, with a traction that falls to zero there
+    share = sizes[0] / sizes.sum(axis=0)
+    far = stiffness * ends[0] * share**2 / 6.0
+    near = 0.5 * stiffness * ends[0] * share - far
+    scale = stiffness * sizes.max(axis=0)
+    pressed = compiled(lambda *gaps: mean_tractions(record, gaps, lag, True)[0], *ends, *rounded)
+    damped = compiled(lambda *gaps: damping_tractions(record, gaps, lag, True), *ends, *rounded)
+    assert np.all(np.abs(pressed - [near, far]) <= 1e-14 * scale)
+    assert np.all(np.abs(damped) <= 1e-14 * scale)
 
 
 def test_joints_that_never_slide_are_linear_along_to_the_last_digit():

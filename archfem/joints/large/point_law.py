@@ -19,6 +19,9 @@ from archfem.joints.normal_law import GAUSS_POINTS, GAUSS_WEIGHTS
 # Parameters of the law at one place
 CONTACT_RECORD: np.dtype[Any] = np.dtype([(name, np.float64) for name in ContactLaw._fields])
 
+# Least divisor: its inverse is a number, unlike that of zero or of a denormal number
+LEAST_DIVISOR = 1e-300
+
 
 @inlined_kernel
 def releases(contact, gaps):  # type: ignore
@@ -238,7 +241,8 @@ def _add_crossing(stiffness, ends, lag, part, sums):  # type: ignore
         y = begin + GAUSS_POINTS[k] * length
         x = 1.0 - y
         before, after = x * a + y * c, x * b + y * d
-        inverse = 1.0 / select(moves, abs(before) + abs(after), 1.0)
+        # at rest a part is as short as rounding, and both gaps may vanish there
+        inverse = 1.0 / greatest(abs(before) + abs(after), LEAST_DIVISOR)
         closing, opened = least(before, after), greatest(before, after) * inverse
         square = 0.5 * opened * opened
         taken = select(
