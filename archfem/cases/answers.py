@@ -16,7 +16,7 @@ from archfem.models.model import Doubt, Ends, read_doubts, write_doubts
 from archfem.motion.hazard import DESIGN_PERIOD, MEASURES
 from archfem.motion.matching import DEFAULT_BAND
 from archfem.motion.motion import Motion
-from archfem.statics.assessment_checks import UPPER_BOUND, AssessmentCheck
+from archfem.statics.assessment_checks import AssessmentCheck
 from archfem.statics.mechanism_assessment import KinematicAssessment
 from archfem.units import STANDARD_GRAVITY
 
@@ -47,6 +47,10 @@ class Row(NamedTuple):
     outcome: str  # or capacity
     factor: str  # "-" where there is none
     numbers: Mapping[str, Any]  # such as the fields of `Ratios`; none without an answer
+
+
+# Begin of a note on motions that are matched up to a shorter period than that of a check
+MATCHED = "the motions of the suite are matched from"
 
 
 class Ratios(NamedTuple):
@@ -217,8 +221,7 @@ def state_assessments(
     last = [str(result.checks[-1]) for result in found.values()]
     rows, sentences = [], []
     for (text, _), (check, ratios, directions) in checks.items():
-        ways, outcome = " and ".join(directions), check.outcome
-        outcome += f" by {UPPER_BOUND} alone" * (check.passes and check.bounded)
+        ways, outcome = " and ".join(directions), check.words
         if check.passes and check.at_rest:
             outcome += ", for the mechanism does not begin to move"
         demand, capacity = (f"{x:.4g} {check.unit}" for x in (check.demand, check.capacity))
@@ -253,9 +256,9 @@ def describe_margin(found: Iterable[KinematicAssessment]) -> str:
     if same:
         over = FillRange.least_of(same)
         text, outcome = f"{over.describe(digits=3)}{ratios.beside}", over.outcome
-        outcome = check.outcome if outcome == "passes" else outcome
+        outcome = check.words if outcome == "passes" else outcome
         return f"least margin {text}, by {check.name}: {outcome}"
-    return f"least margin {ratios}, by {check.name}: {check.outcome}"
+    return f"least margin {ratios}, by {check.name}: {check.words}"
 
 
 def note_band(case: Case, found: Iterable[KinematicAssessment]) -> list[str]:
@@ -265,7 +268,7 @@ def note_band(case: Case, found: Iterable[KinematicAssessment]) -> list[str]:
     if not longer or not (case.suite or {}).get("matched", False):
         return []
     return [
-        f"{NOTE_MARK}the motions of the suite are matched from {low:g} to {high:g} s, and T = "
+        f"{NOTE_MARK}{MATCHED} {low:g} to {high:g} s, and T = "
         f"{max(longer):.2f} s is longer: there they may be weaker than the spectrum; judge their "
         "displacements by the figure of spectra"
     ]

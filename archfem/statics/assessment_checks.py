@@ -143,6 +143,11 @@ class AssessmentCheck:
         is_split = self.bodies is not None and self.bodies < 1.0
         return BY_SPLIT if found == "passes" and is_split else found
 
+    @property
+    def words(self) -> str:
+        """The outcome in words, with an upper bound by which alone it passes."""
+        return self.outcome + f" by {UPPER_BOUND} alone" * (self.passes and self.bounded)
+
     def doubt_split(self) -> list[Doubt]:
         """Return the doubt of a check that passes with the weights of single blocks alone."""
         if self.outcome != BY_SPLIT:
@@ -179,7 +184,7 @@ class AssessmentCheck:
         rest = " before the mechanism begins to move"
         return (
             f"{self.name}: capacity {self.capacity:.4g} {self.unit}, demand {self.demand:.4g} "
-            f"{self.unit}{period}: {self.outcome}, the spectrum may be "
+            f"{self.unit}{period}: {self.words}, the spectrum may be "
             f"{self.ratios} times as strong{rest if self.at_rest else ''}"
         )
 

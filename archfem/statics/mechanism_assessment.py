@@ -96,7 +96,8 @@ class KinematicAssessment(ResultDisplay):
         T_s: secant period 2π √(d_s* / a*(d_s*)) at d_s* = 0.16 d₀* [s]: 0.4 of the 0.4 d₀* of
             NTC-2008; undefined (NaN) where d₀* is infinite.
         curve: capacity curve over place: `d` [m], `a` [m/s²], `alpha` [-], and `d_control`, the
-            horizontal displacement of the control point [m].
+            horizontal displacement of the control point [m]; its attribute `holds` is the last
+            place from which on it is no upper bound.
         linear: check of the acceleration with the behaviour factor.
         displacement: check of the displacement; None where the mechanism cannot move.
         limit_state: rules of the displacement check.
@@ -551,7 +552,8 @@ class _Oscillator:
         acceleration = factors * self.placed.structure.gravity / self.e_star
         values = {"d": moved, "a": acceleration, "alpha": factors, "d_control": control}
         units = {"d": "m", "a": "m/s2", "alpha": "1", "d_control": "m"}
-        return xr.Dataset({key: ("place", values[key], {"units": units[key]}) for key in values})
+        columns = {key: ("place", values[key], {"units": units[key]}) for key in values}
+        return xr.Dataset(columns, attrs={"holds": 0 if self.bounded_at_rest else self.holds})
 
     def notes(self, factor: float) -> list[str]:
         """Return the assumptions of the curve, and its omissions on the safe side."""

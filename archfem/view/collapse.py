@@ -25,7 +25,7 @@ from archfem.limit.vehicles import MovingLoad
 from archfem.masonry.loads import PointLoad
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import Structure, rigid_motion_matrix
-from archfem.statics.assessment_checks import BY_SPLIT, AssessmentCheck
+from archfem.statics.assessment_checks import BY_SPLIT, UPPER_BOUND, AssessmentCheck
 from archfem.statics.mechanism_assessment import KinematicAssessment
 from archfem.view.joint_marks import Marker, outline_moving_blocks, scale_motion
 from archfem.view.positions import FallingBlocks
@@ -382,7 +382,12 @@ def _draw_capacity_curve(axes: Axes, found: KinematicAssessment) -> None:
     reduced = curve["a"].values / found.confidence_factor
     last = float(curve["d"][-1])
     factor = f", FC = {found.confidence_factor:g}"
-    axes.plot(curve["d"], reduced, color=Colour.THRUST, lw=1.8, label=f"capacity a*(d*){factor}")
+    style = {"color": Colour.THRUST, "lw": 1.8, "label": f"capacity a*(d*){factor}"}
+    place = curve.attrs["holds"] + 1
+    axes.plot(curve["d"][:place], reduced[:place], **style)
+    if place < len(reduced):
+        style |= {"ls": ":", "label": f"the same, {UPPER_BOUND}"}
+        axes.plot(curve["d"][place - 1 :], reduced[place - 1 :], **style)
     periods = np.geomspace(0.02 * check.period, max(4.0, check.period), 160)  # as codes, to 4 s
     displacement, acceleration = found.demand(periods)
     damping = f"{100.0 * found.limit_state.damping:.0f} %"
@@ -411,7 +416,7 @@ def _title_check(check: AssessmentCheck) -> str:
     some = check.over_fill is not None and check.over_fill.needed
     if check.outcome == BY_SPLIT:
         return f"{check.name}: {check.outcome}, ratio {check.bodies:.3g} to {check.ratios}"
-    outcome = "passes with some assumptions" if some else check.outcome
+    outcome = "passes with some assumptions" if some else check.words
     return f"{check.name}: {outcome}, ratio {check.ratios}"
 
 

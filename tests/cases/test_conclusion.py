@@ -339,19 +339,54 @@ def test_the_answer_has_displacements_the_first_fall_and_the_checks(case):
     vars(data)["case"] = af.Case.of({**case.settings, "assessment": SPECTRUM})
     passed = answers.Ratios("damage", ["right"], 1.1, 1.1, moved=0.842)
     for ratios, verified, found in (
-        (passed, None, "withstands"),
-        (passed, "rocks", "withstands at rest alone, and moves in the runs,"),
-        (passed._replace(bodies=0.9), None, "withstands or not, by the split of weights,"),
-        (passed._replace(bounded=True), None, "is not shown to withstand, as the ratio is an up"),
+        (passed, None, "it withstands"),
+        (passed, "rocks", "it withstands at rest alone, and moves in the runs,"),
+        (passed._replace(bodies=0.9), None, "it withstands or not, by the split of weights,"),
+        (passed._replace(bounded=True), None, "alone it is not shown to withstand the EC8"),
     ):
         data.runs["a"].verdict.mechanisms["verified"] = verified
         data.statements["assessment"] = state("assessment", ratios)._replace(doubts=[bound])
         facts = dict(conclusion.list_facts(data))
-        assert f"By the kinematic assessment it {found}" in facts["verdict"]
+        assert f"By the kinematic assessment {found}" in facts["verdict"]
         assert facts["in doubt"] == "kinematic assessment, scale of the motion"
     assert "; " not in facts["verdict"]
     said = " ".join(say_margin(data, assessment=data.statements["assessment"]))
-    assert "by damage, right, an upper bound: motions of this spectrum under which it st" in said
+    assert "by damage, right, an upper bound: the runs do not decide, for 3 at least are" in said
+
+
+@pytest.mark.parametrize(
+    ("change", "outcome", "says"),
+    [
+        ({}, "stands", "the 3 motions matched to this spectrum, under which it stands, decide"),
+        ({}, "fallen", "the 3 motions matched to this spectrum, under which it falls, decide"),
+        ({}, "unknown", "the runs do not decide, for outcomes are unknown"),
+        ({"scale": 0.8}, "stands", "the runs do not decide, for they have 0.8 of its size"),
+        ({"reduction": 2.0}, "stands", "the runs do not decide, for they have 0.5 of its size"),
+        ({"matched": False}, "stands", "the runs do not decide, for they are not matched to it, "),
+        ({"displacements": "small"}, "stands", "the runs do not decide, for their displacements "),
+        ({"ag": 0.25}, "stands", "the runs do not decide, for their target is another spectrum"),
+    ],
+)
+def test_a_matched_suite_is_the_test_of_an_upper_bound_on_its_spectrum(change, outcome, says):
+    """Unless it is weaker than the spectrum, of another, or in small displacements."""
+    given = dict(change)
+    spectrum = {"code": "EC8", "ag": given.pop("ag", 0.2), "ground": "A"}
+    pairs = {name: {"synthetic": {"seed": k, "duration": 1.0}} for k, name in enumerate("abc")}
+    tables = {
+        "structure": {"shape": "column", "breadth": 0.5, "heights": [1.0, 1.0]},
+        "model": {"fidelity": "rigid", "displacements": given.pop("displacements", "large")},
+        "suite": {"matched": True, "target": SPECTRUM["spectrum"], "pairs": pairs} | given,
+        "assessment": {"spectrum": spectrum},
+    }
+    runs = {"a": verdict_of(outcome), "b": verdict_of(), "c": verdict_of()}
+    data = data_of(af.Case.of(tables), **runs)
+    ratios = answers.Ratios("damage", ["right"], 1.5, 1.5, bounded=True)
+    (said,) = say_margin(data, assessment=state("assessment", ratios))
+    assert f"an upper bound: {says}" in said
+    assert says in dict(conclusion.list_facts(data))["verdict"]
+    vars(data)["runs"] = {}
+    tests = "an upper bound: time histories with large displacements under motions of this spec"
+    assert tests in say_margin(data, assessment=state("assessment", ratios))[0]
 
 
 def test_rewording_a_sentence_changes_no_number_of_the_report(case):

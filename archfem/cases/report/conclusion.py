@@ -21,9 +21,11 @@ from archfem.cases.report.doubts import (
     list_elastic_fill,
     list_notes,
     list_unvaried,
+    object_to_motions,
     peak_of_ground,
     read_spectrum,
 )
+from archfem.cases.report.motion_rules import check_motions
 from archfem.cases.report.report_data import SCALES_ACROSS, SHOWN_RESULTS, ReportData
 from archfem.cases.report.scales import describe_scales, find_first_failures, say_fragile
 from archfem.cases.report.study_findings import read_study, say_what_changes
@@ -118,7 +120,7 @@ def _say_plainly(data: ReportData, doubtful: Sequence[str]) -> Iterator[str]:
         yield from say_fragile(data)
         yield _say_what_decides(data.verdict_ranges)
     for found in dict.fromkeys(_judge_checks(data)):  # of each direction
-        yield f"by the kinematic assessment it {found} {name_spectrum(data)}"
+        yield f"by the kinematic assessment {found}"
     for name, stated in data.statements.items():
         pushes = [x for x in read_numbers(PushFactors, stated) if x.site and not data.runs]
         yield from (next(_describe_push(data, name, push)) for push in pushes)
@@ -135,9 +137,7 @@ def _say_plainly(data: ReportData, doubtful: Sequence[str]) -> Iterator[str]:
 
 def _say_survival(data: ReportData, doubtful: Sequence[str]) -> Iterator[str]:
     """Yield whether it survives the motions, and how often with other properties."""
-    verdicts = [run.verdict for run in data.runs.values()]
-    outcomes = {"unknown" if x.incomplete else x.outcome for x in verdicts}
-    answer = next(words for outcome, (_, words) in _VERBS.items() if outcome in outcomes)
+    verdicts, (_, answer) = [run.verdict for run in data.runs.values()], _find_worst(data)
     in_doubt = " (in doubt, as below)" * (HISTORIES in doubtful)
     sizes = [x.displacement for x in verdicts if x.outcome in COLLAPSE_STATES[:2]]
     known = bool(sizes) and np.isfinite(sizes).all()
@@ -148,6 +148,13 @@ def _say_survival(data: ReportData, doubtful: Sequence[str]) -> Iterator[str]:
         motion = found.dataset.attrs.get("motion")
         under = f", under '{motion}'" * (len(data.runs) > 1 and bool(motion))
         yield f"with other plausible properties it {found.count}{under}"
+
+
+def _find_worst(data: ReportData) -> tuple[str, str]:
+    """Return the worst outcome of the runs as a verb and in plain words."""
+    verdicts = [run.verdict for run in data.runs.values()]
+    outcomes = {"unknown" if x.incomplete else x.outcome for x in verdicts}
+    return next(words for outcome, words in _VERBS.items() if outcome in outcomes)
 
 
 def _say_what_decides(ranges: Sequence[VerdictRange]) -> str:
@@ -167,19 +174,34 @@ def _say_what_decides(ranges: Sequence[VerdictRange]) -> str:
 
 def _judge_checks(data: ReportData) -> Iterator[str]:
     """Yield whether the structure withstands the spectrum, by each check of an assessment."""
+    of = name_spectrum(data)
     for check in list_checks(data):
         if check.needed:
-            yield "does not withstand under some assumptions on the fill"
+            yield f"it does not withstand under some assumptions on the fill {of}"
         elif check.least < 1.0:
-            yield "does not withstand"
+            yield f"it does not withstand {of}"
         elif check.by_split:
-            yield "withstands or not, by the split of weights,"
+            yield f"it withstands or not, by the split of weights, {of}"
         elif check.bounded:
-            yield "is not shown to withstand, as the ratio is an upper bound,"
+            bound = f"as its ratio, {check.least:.3g}, is an upper bound"
+            yield f"alone it is not shown to withstand {of}, {bound}: {_say_test(data)}"
         elif check.moved and _say_motion(data, check.least, peak_of_spectrum(data.case)):
-            yield "withstands at rest alone, and moves in the runs,"
+            yield f"it withstands at rest alone, and moves in the runs, {of}"
         else:
-            yield "withstands"
+            yield f"it withstands {of}"
+
+
+def _say_test(data: ReportData) -> str:
+    """Say whether the runs decide what a ratio that is an upper bound does not."""
+    if not data.runs:
+        return "time histories with large displacements under motions of this spectrum can test it"
+    if objection := object_to_motions(data):
+        return f"the runs do not decide, for {objection}"
+    count, missed = len(data.runs), ", ".join(x.rule for x in check_motions(data) if x.met is False)
+    motions = f"the {count} motions" if count > 1 else "the motion"
+    of = "matched to" if (data.case.suite or {}).get("matched") else "of"
+    decide = f"decide{'s' * (count == 1)}" + f" (rule not met: {missed})" * bool(missed)
+    return f"{motions} {of} this spectrum, under which it {_find_worst(data)[0]}, {decide}"
 
 
 def _describe_peaks(runs: Iterable[History]) -> str:
@@ -420,8 +442,7 @@ def _describe_check(data: ReportData, check: Ratios) -> tuple[float, list[str]]:
     fails = f", passed only with {check.needed}" if check.needed else ""
     fails = fails or ", which it fails" * (check.least < 1.0)
     fails = fails or ", which it fails with one weight a body" * check.by_split
-    bound = ", an upper bound: motions of this spectrum under which it stands would show it"
-    fails = fails or bound * check.bounded
+    fails = fails or f", an upper bound: {_say_test(data)}" * check.bounded
     ends = f"{Ends((check.least, check.most)):.3g}"
     texts = [f"{ends}{over}{check.beside}, {by}{fails}"]
     if check.moved is not None:

@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from archfem._files import read_sealed_json
-from archfem.cases.answers import RESULTS, Ratios, read_numbers
-from archfem.cases.report.motion_rules import note_checks
+from archfem.cases.answers import MATCHED, RESULTS, Ratios, read_numbers
+from archfem.cases.report.motion_rules import check_motions, note_checks
 from archfem.cases.report.report_data import ReportData
 from archfem.cases.report.study_findings import list_studied, read_study
 from archfem.dynamics.collapse_state import COLLAPSE_STATES, FALLEN_STATES, RANGE_REMEDY
@@ -22,6 +22,9 @@ from archfem.units import STANDARD_GRAVITY
 # Ratio of the peaks of motions and spectrum beyond which they are different demands: those of
 # matched motions exceed the target by a tenth
 MAX_RATIO_OF_PEAKS = 1.25
+
+# Fewest motions that test a spectrum, in both norms of the rules
+MIN_MOTIONS = 3
 
 # Results of runs: histories, and their variations
 HISTORIES, VARIATIONS = "time histories", "variations"
@@ -92,6 +95,33 @@ def list_decisive_doubts(data: ReportData, doubts: Iterable[tuple[str, Doubt]]) 
     bounds = [doubt for _, doubt in doubts if failed and UPPER_BOUND in doubt.values]
     listed = (result for result, doubt in doubts if result != own or doubt not in bounds)
     return list(dict.fromkeys(listed))
+
+
+def object_to_motions(data: ReportData) -> str:
+    """Say why the runs are no test of the spectrum of an assessment; "" if they are one."""
+    suite, spectrum = data.case.suite or {}, read_spectrum(data)
+    own = data.case.settings.get("suite", {}).get("target")
+    matched = suite.get("matched", False) and own == spectrum
+    size = (suite.get("scale", 1.0) if matched else 1.0) / suite.get("reduction", 1.0)
+    rules = [x.met or x.required.startswith("no rule") for x in check_motions(data)] or [False]
+    outcomes = {x.verdict.outcome for x in data.runs.values()}
+    reasons = {
+        "their displacements are small": data.case.analysis.displacements != "large",
+        "outcomes are unknown": not outcomes <= {*COLLAPSE_STATES},
+        f"{join_words(data.missing)} were not run": bool(data.missing),
+    }
+    if spectrum:  # else the motions are the demand
+        notes = data.statements["assessment"].notes
+        reasons |= {
+            "their target is another spectrum": own not in (None, spectrum),
+            f"{MIN_MOTIONS} at least are needed": len(data.runs) < MIN_MOTIONS,
+            f"they have {size:.3g} of its size": size < 1.0,
+            "they end before the period of the check": any(MATCHED in x for x in notes),
+            "they are not matched to it, and no rules of a norm are met": not (
+                matched or all(rules)
+            ),
+        }
+    return next((reason for reason, holds in reasons.items() if holds), "")
 
 
 def _doubt_displacement(data: ReportData, found: VerdictRange) -> Iterator[Doubt]:
