@@ -12,6 +12,7 @@ from archfem.cases.result_text import PushFactors, Remark, ResultTable
 from archfem.dynamics.motion_scaling import CollapseScale, MechanismScales
 from archfem.limit.fill_range import FillRange
 from archfem.limit.rating import Rating
+from archfem.masonry.structure import join_words
 from archfem.models.model import Doubt, Ends, read_doubts, write_doubts
 from archfem.motion.hazard import DESIGN_PERIOD, MEASURES
 from archfem.motion.matching import DEFAULT_BAND
@@ -186,13 +187,23 @@ def state_scale(
     return {**stated.as_file("scale"), **files}
 
 
-def state_ratings(rated: Sequence[tuple[Rating, Sequence[Remark]]]) -> Statement:
-    """State the factor of each vehicle, by codes too, least first; sentences are of the first."""
+def state_ratings(
+    rated: Sequence[tuple[Rating, Sequence[Remark]]], varied: ResultTable | None = None
+) -> Statement:
+    """State the factor of each vehicle, by codes too, least first; sentences are of the first.
+
+    `varied` has the factors of one of them with other properties.
+    """
     rows, first = list[tuple[float, Row]](), rated[0][0]
     for found, _ in rated:
         for code, each in {"": found, **found.by_codes}.items():
             demand, words = f"{found.vehicle.name} {code}".strip(), each.short_outcome
-            at = f", {each.place}" if each is found else ""
+            at, flips = f", {each.place}" if each is found else "", ""
+            own = varied is not None and varied.head[0] == f"{found.label} with"
+            if varied and own and each.passes and "CS 454" not in code:  # on one axle, no multiple
+                flips = _say_flips(each.factor / found.factor, varied)
+            if not np.isnan(each.factor):
+                at += "".join(f"; {x}" for x in (each.say_range(), flips) if x)
             factor = "-" if np.isnan(each.factor) else f"{each.factor:.4g}"
             row = Row("rating", demand, f"{words}{at}", factor, {"outcome": words})
             rows.append((each.factor, row))
@@ -207,6 +218,17 @@ def state_ratings(rated: Sequence[tuple[Rating, Sequence[Remark]]]) -> Statement
     least_first = [row for _, row in sorted(rows, key=lambda each: each[0])]
     stated = Statement(sentences, least_first)
     return stated.with_remarks([each for _, own in rated for each in own])
+
+
+def _say_flips(share: float, varied: ResultTable) -> str:
+    """Say with which properties a bridge that passes fails, by a multiple of their factors."""
+    factors = {
+        name: share * float(cell.replace("does not stand", "0"))
+        for name, cell in varied.rows
+        if cell not in ("-", "not computed")
+    }
+    fails = [f"{name} ({x:.3g})" for name, x in factors.items() if x < 1.0]
+    return f"fails with {join_words(fails)}" * bool(fails)
 
 
 def state_assessments(

@@ -68,6 +68,10 @@ def mark_remarks(remarks: Iterable[Remark]) -> list[str]:
     return [*dict.fromkeys(lines)]
 
 
+# Note on abutments, which a rating varies
+IMMOVABLE = "abutments are taken as immovable"
+
+
 class ResultTable(NamedTuple):
     """Titles of the columns, and rows of as many cells; "-" is an empty cell."""
 
@@ -412,8 +416,8 @@ def doubt_rating(found: Rating, limit: LimitAnalysis) -> list[Remark]:
     lines += note_lower_crowns(structure, found.fill)
     rings = [joint for joint in structure.joints if joint.role == "ring"]
     if any(structure.blocks[number].fixed for joint in rings for number in joint.blocks):
-        words = 'abutments are taken as immovable: state = "free" tests them, of [structure.'
-        lines.append(f"{NOTE_MARK}{words}sidewalls]")
+        words = 'state = "free" tests them, of [structure.sidewalls]'
+        lines.append(f"{NOTE_MARK}{IMMOVABLE}: {words}")
     left_out = ["a second lorry that meets the vehicle", "all that spandrel walls carry"]
     if not found.parapets:
         left_out.append('parapets (their weight is parapets = "… kN/m" of [rating])')

@@ -311,6 +311,9 @@ def rate(options: argparse.Namespace) -> int:
         if sentences and len(rated) > 1:
             words = f"only {found.vehicle.name} was varied, whose factor is nearest to 1: "
             sentences.append(f"{words}others by --vehicle, each alone")
+        if any(name == "abutments free" and cell != "not computed" for name, cell in varied.rows):
+            lines[:] = [x for x in lines if result_text.IMMOVABLE not in str(x)]
+        stated = state_ratings(ratings, varied)
         lines[:0] = [*sentences, *doubts]
         stated = stated._replace(sentences=[*stated.sentences, *sentences]).with_remarks(doubts)
     text, files = result_text.describe_ratings(case, ratings, varied)

@@ -161,7 +161,7 @@ class Rating(ResultDisplay):
             most = f" if {codes} is at most {self.factor:.4g}"
             words += most if self.passes else f" even without {codes}"
         left = f"left out: {self.vehicle.left_out}" if self.vehicle.left_out else ""
-        return [*filter(None, [words, self._say_range(), left, self._rule_text()])]
+        return [*filter(None, [words, self.say_range(), left, self._rule_text()])]
 
     @property
     def label(self) -> str:
@@ -228,7 +228,7 @@ class Rating(ResultDisplay):
         several = [" or ".join(cut) for cut in cuts if len(cut) > 1]
         return ", and ".join(filter(None, [" and ".join(single), *several]))
 
-    def _say_range(self) -> str:
+    def say_range(self) -> str:
         """Return the least and the greatest factor over all that is assumed, in words."""
         factors = [self.factor, *self._list_states().values()]
         if not np.isnan(self.full_pressure):

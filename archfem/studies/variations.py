@@ -493,7 +493,7 @@ def vary_rating(
     rows = [[name, "does not stand" if cell == "0" else cell] for name, cell in rows]
     name = found.vehicle.name
     words = _say_spreads(name, listed, known, len(late))
-    return ResultTable([f"{name} with", "factor"], rows), words, len(late)
+    return ResultTable([f"{found.label} with", "factor"], rows), words, len(late)
 
 
 def _merge_worst(listed: Sequence[Change], known: Mapping[str, float]) -> dict[str, Any]:

@@ -570,6 +570,35 @@ def test_the_head_of_a_push_says_when_it_begins_to_move(case):
     assert dict(conclusion.list_facts(data))["verdict"].startswith(begins)
 
 
+@pytest.mark.parametrize(
+    ("norm", "first"),
+    [
+        ("Eurocodes", ["by Eurocodes on a fair road", "by CS 454"]),
+        ("EN 1991-2", ["by Eurocodes on a fair road", "by CS 454"]),
+        ("CS 454", ["by CS 454", "by Eurocodes on a fair road"]),
+        ("", ["by CS 454"]),
+    ],
+)
+def test_a_rating_is_stated_by_the_norm_of_the_report_before_others(case, norm, first):
+    codes = {"by CS 454": "0.8", "by Eurocodes on a fair road": "1.4", "by Eurocodes": "1.6"}
+    rows = [answers.Row("rating", f"lorry {by}", "passes", x, {}) for by, x in codes.items()]
+    said = [f"lorry {by}: factor {factor}, passes" for by, factor in codes.items()]
+    settings = {key: value for key, value in case.settings.items() if key != "motion"}
+    data = ReportData(af.Case.of(settings | ({"report": {"norm": norm}} if norm else {})), {})
+    vars(data)["statements"] = {"rating": answers.Statement(said, rows)}
+    verdict = dict(conclusion.list_facts(data))["verdict"]
+    needed = ", 1 is required" * bool(norm)
+    assert verdict.startswith(f"Rating for lorry {first[0]}: factor {codes[first[0]]}{needed}, ")
+    places = [verdict.index(by) for by in first]
+    assert places == sorted(places)
+    assert verdict.count("factor") == len(first)
+    pieces = conclusion.build_conclusion(data).pieces
+    assert pieces[0].text.startswith(f"Lorry {first[0][:12]}")
+    (table,) = (piece for piece in pieces if getattr(piece, "caption", "").startswith("Demand"))
+    assert table.caption.endswith("multiple of the demand at which a load makes a mechanism")
+    assert first[0] in table.rows[0][1]
+
+
 @pytest.mark.parametrize(("ag", "overturns"), [(0.1, False), (0.2, True)])
 def test_a_demand_that_overturns_it_across_its_plane_is_in_the_conclusion(ag, overturns):
     """An arch on piers that overturns across its plane at 0.15 g; a site of 1.2 ag."""

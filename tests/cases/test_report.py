@@ -932,8 +932,8 @@ def test_of_several_vehicles_a_table_has_the_factors(small, undrawn):
     assert every.caption == "Factor of each vehicle over its place."
     assert places.caption == "Each vehicle at its worst place."
     assert varied.rows == [["rings a tenth thinner", "1.3"]]
-    alone = "of LM71 alone, whose factor is nearest to 1"
-    assert varied.caption == f"Factor with one property changed at a time, {alone}"
+    alone = ", alone, as its factor is nearest to 1"
+    assert varied.caption == f"Factor of LM71 with one property changed at a time{alone}"
     assert varied.head == ["LM71 with", "factor"]
     assert figure.caption.endswith("mechanism at the worst place, LM71")
     assert data.read_table("rating") == {"vehicle": "LM71, LM1"}

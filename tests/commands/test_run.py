@@ -899,7 +899,7 @@ def test_the_vehicle_that_decides_is_varied(tmp_path, unplotted, monkeypatch):
     assert only in json.loads((out / "rating.json").read_text())["sentences"]
     assert af.commands.main(["report", str(out)]) == 0
     title = (
-        "Factor with one property changed at a time, of light alone, whose factor is nearest to 1"
+        "Factor of light with one property changed at a time, alone, as its factor is nearest to 1"
     )
     assert title in (out / "report.html").read_text()
 

@@ -10,7 +10,7 @@ from backfilled import arch_bridge
 import archfem as af
 from archfem.cases.analysis_keys import LimitAnalysis, parse_limit
 from archfem.cases.answers import state_ratings
-from archfem.cases.result_text import doubt_rating, tabulate_ratings
+from archfem.cases.result_text import ResultTable, doubt_rating, tabulate_ratings
 from archfem.limit import VEHICLES, Vehicle, rating
 from archfem.limit.rating import _places_along as places_along
 from archfem.view.collapse import draw_ratings
@@ -731,13 +731,26 @@ def test_factors_of_codes_are_stated_with_outcome_and_range():
     first = f"rating for lorry: factor {given.factor:.4g}, {outcome}"
     expected = [first, *others, f"worst {given.place}", factors, *lines]
     assert sentences[: len(expected)] == expected
-    # the worst first
+    # the worst first, each with its range over fill and stones
     stated = [("lorry", given, f"{given.short_outcome}, {given.place}")]
     stated += [(f"lorry {name}", x, x.short_outcome) for name, x in codes]
+    stated = [(name, x, f"{words}; {x.say_range()}") for name, x, words in stated]
+    assert f"{ends}{given.by_cs454['full_pressure']:.4g} over" in str(rows)
     assert [row[:4] for row in rows] == [
         ("rating", name, words, f"{x.factor:.4g}")
         for name, x, words in sorted(stated, key=lambda each: each[1].factor)
     ]
+    # a property that takes a third of the factor away takes it from each multiple
+    weak = (
+        ["abutments free", f"{given.factor / 1.5:.6g}"],
+        ["stronger", f"{9.0 * given.factor:.6g}"],
+    )
+    varied = ResultTable(["lorry with", "factor"], [*weak, ["on a pier", "-"]])
+    for row in state_ratings([(given, [])], varied).rows:
+        x = next(x for name, x, _ in stated if name == row.demand)
+        flips = 1.0 <= x.factor < 1.5 and "CS 454" not in row.demand
+        fails = f"; fails with abutments free ({x.factor / 1.5:.3g})"
+        assert ("fails with" in row.outcome) == row.outcome.endswith(fails) == flips
     # the impact is not on a distributed load, so that no multiple of the factor is that of a code
     assert [*replace(given, area_load=1e3).by_codes] == [code]
     assert not replace(given, vehicle=VEHICLES["LM2"], by_cs454={}).by_codes

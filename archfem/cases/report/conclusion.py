@@ -9,7 +9,7 @@ import numpy as np
 
 from archfem._files import group_of, read_file_list
 from archfem.cases import result_text
-from archfem.cases.answers import RESULTS, Ratios, Row, read_numbers
+from archfem.cases.answers import RESULTS, Ratios, Row, Statement, read_numbers
 from archfem.cases.case import REPORT_KEYS
 from archfem.cases.report.doubts import (
     HISTORIES,
@@ -83,11 +83,13 @@ NO_PROOF = "may begin at any less, as no lower bound is known"
 # Project in the templates of new cases
 PLACEHOLDER = "Name of the project"
 
-_FACTORS = (
-    "; factor: the multiple of the demand at which a check is just passed or a load makes a "
-    "mechanism, up to which a scaled motion neither fells nor dislocates it, or at which a fall "
-    "has a probability of one half"
-)
+# What the factors of results are, as multiples of their demands
+_FACTORS = {
+    "assessment": "at which a check is just passed",
+    **dict.fromkeys(("limit", "pushover", "rating"), "at which a load makes a mechanism"),
+    "scale": "up to which a scaled motion neither fells nor dislocates it",
+    "risk": "at which a fall has a probability of one half",
+}
 
 
 def list_facts(data: ReportData) -> list[tuple[str, str]]:
@@ -124,15 +126,32 @@ def _say_plainly(data: ReportData, doubtful: Sequence[str]) -> Iterator[str]:
     for name, stated in data.statements.items():
         pushes = [x for x in read_numbers(PushFactors, stated) if x.site and not data.runs]
         yield from (next(_describe_push(data, name, push)) for push in pushes)
-        for row in [] if pushes or name in ("assessment", "scale") else stated.rows[:1]:
-            times = f", at {row.factor} times {row.demand}" * (name != "risk" and row.factor != "-")
-            if not data.runs or name in ("rating", "risk"):
-                yield f"{row.result}: {row.outcome}{times}"
+        if name == "rating":
+            yield from _say_ratings(data, stated)
+        elif name == "risk" or not (data.runs or pushes or name in ("assessment", "scale")):
+            for row in stated.rows[:1]:
+                times = f", at {row.factor} times {row.demand}"
+                yield f"{row.result}: {row.outcome}{times * (name != 'risk' and row.factor != '-')}"
     yield from (f"it first falls at {text}" for x, text in sorted(_say_across(data))[:1] if x <= 1)
     if not data.falls_across and _build_transverse(data):
         push, demand = data.case.structure.transverse_push[0], _largest_demand(data)
         falls = f", where it may overturn from {push:.2g} g on" * (push < demand)
         yield f"across the plane of the drawing it was not checked{falls}"
+
+
+def _say_ratings(data: ReportData, stated: Statement) -> Iterator[str]:
+    """Yield the least rating by the norm of the report, and the least of others."""
+    own = [row for row in stated.rows if _is_of_norm(data, row.demand)]
+    others = [row for row in stated.rows if row not in own]
+    for row, needed in [*((x, ", 1 is required") for x in own[:1]), *((x, "") for x in others[:1])]:
+        yield f"rating for {row.demand}: factor {row.factor}{needed}, {row.outcome}"
+
+
+def _is_of_norm(data: ReportData, text: str) -> bool:
+    """Return whether a text on a rating is of the norm of the report."""
+    norm = data.case.report.get("norm", "").upper().replace(" ", "")
+    codes = {"EUROCODE": "by Eurocodes", "EN199": "by Eurocodes", "CS454": "by CS 454"}
+    return any(key in norm and words in text for key, words in codes.items())
 
 
 def _say_survival(data: ReportData, doubtful: Sequence[str]) -> Iterator[str]:
@@ -255,7 +274,8 @@ def build_conclusion(data: ReportData) -> Section:
         blocks.append(TextBlock(f"Note, {result}: {' '.join(map(sentence, notes))}", "missing"))
     if rows:
         head = ("", "demand", "capacity or outcome", "factor")
-        factors = _FACTORS if any(row[3] != "-" for row in rows) else ""
+        named = dict.fromkeys(_FACTORS[name] for name in _FACTORS if name in data.statements)
+        factors = f"; factor: the multiple of the demand {', or '.join(named)}" * bool(named)
         blocks.append(Grid(head, rows, f"Demand and capacity{factors}", "words"))
     blocks += map(TextBlock, _list_outdated(data))
     return Section("Conclusion", [*blocks, _build_signatures(data.case.report)])
@@ -343,6 +363,7 @@ def _build_paragraphs(data: ReportData, doubtful: Sequence[str]) -> dict[str, li
     if not data.runs:
         # an assessment is stated by the margin; a result that stands alone states all of itself
         stated = [each.sentences for name, each in data.statements.items() if name != "assessment"]
+        stated = [sorted(each, key=lambda x: not _is_of_norm(data, x)) for each in stated]
         answer += [*stated[0]] if len(data.statements) == 1 and stated else [x for x, *_ in stated]
     answer += [*_describe_ends(data), *_describe_ranges(data.verdict_ranges)]
     changes = [*_say_causes(data.verdict_ranges)]
@@ -477,7 +498,7 @@ def name_spectrum(data: ReportData) -> str:
 def _build_signatures(report: Mapping[str, str]) -> Grid:
     """Build the lines to be signed, with the names and the date that are given."""
     rows = [
-        (who.replace("_", " "), report.get(who, ""), report.get("date", ""), "")
+        (who.replace("_", " "), report.get(who, ""), report.get("date", "") * (who == "author"), "")
         for who in ("author", "checked_by")
     ]
     return Grid(("", "name", "place, date", "signature"), rows, "", "form")
@@ -510,7 +531,7 @@ def _capacity_rows(data: ReportData) -> Iterator[tuple[str, Row]]:
         yield "", Row(f"across the plane, {key}", demand, outcome, factor, {})
     for result, statement in data.statements.items():
         of = f" of {name_spectrum(data)}" if result == "assessment" else ""
-        for row in statement.rows:
+        for row in sorted(statement.rows, key=lambda x: not _is_of_norm(data, x.demand)):
             yield RESULTS[result], row._replace(demand=f"{row.demand}{of}")
 
 

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from archfem._display import NOTE_MARK
 from archfem._files import read_listed
 from archfem.cases.answers import Ratios, read_numbers
 from archfem.cases.defaults import describe_friction_margin
@@ -289,12 +290,15 @@ def _build_rating(data: ReportData) -> list[Any]:
         return []
     # of several vehicles the text begins with the same table
     texts = text.text.split("\n\n")[1:] if grids else [text.text]
+    if data.statements.keys() == {"rating"}:  # all of which the conclusion has
+        stated = {*data.statements["rating"].sentences, *data.statements["rating"].notes}
+        lines = [each.splitlines() for each in texts]
+        kept = [[x for x in each if x.removeprefix(NOTE_MARK) not in stated] for each in lines]
+        texts = ["\n".join(each) for each in kept]
     if (varied := data.read_text("rating_variations.csv")) is not None:
         head, *rows = reader(varied.splitlines())
-        title = "Factor with one property changed at a time"
-        title += f", of {head[0].removesuffix(' with')} alone, whose factor is nearest to 1" * bool(
-            grids
-        )
+        title = f"Factor of {head[0]} one property changed at a time"
+        title += ", alone, as its factor is nearest to 1" * bool(grids)
         figures.insert(0, Grid(head, rows, title, "words"))
     return [*grids, *(TextBlock(each, "lines") for each in texts), *figures]
 
