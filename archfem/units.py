@@ -147,6 +147,12 @@ def format_mm(length: float) -> str:
     return f"{length / mm:.3g} mm" if abs(length) < 0.9995 else f"{length / mm:.0f} mm"
 
 
+def format_ratio(ratio: float, digits: int = 3) -> str:
+    """Return a ratio with some digits, and more where it would be rounded to or across 1."""
+    texts = [f"{ratio:.{count}g}" for count in range(digits, 18)]
+    return next(x for x in texts if (float(x) > 1.0, float(x) < 1.0) == (ratio > 1.0, ratio < 1.0))
+
+
 def _check_text(text: str, unit: str, key: str) -> None:
     """Refuse commas, and long text and high powers, which pint would evaluate for hours."""
     power_pattern = re.compile(r"(?:\*\*|\^)\s*\(?\s*[-+]?\s*(\d{1,2}(?![\deE]))?")

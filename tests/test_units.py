@@ -5,6 +5,8 @@ import pint
 import pytest
 
 import archfem as af
+from archfem.models.model import Ends
+from archfem.units import format_ratio
 
 
 @pytest.fixture(scope="module")
@@ -154,3 +156,12 @@ def test_quantities_of_one_unit_are_numbers_and_other_values_stay(values, number
     found, found_unit = af.units.in_si_unit(values)
     assert found == pytest.approx(numbers) if unit else found == numbers
     assert found_unit == unit
+
+
+@pytest.mark.parametrize(
+    ("ratio", "text"),
+    [(1.0122, "1.01"), (1.0004, "1.0004"), (0.99996, "0.99996"), (1.0, "1"), (1.6466, "1.65")],
+)
+def test_a_ratio_is_not_rounded_to_one_or_across_it(ratio, text):
+    assert format_ratio(ratio) == text
+    assert f"{Ends((0.5, ratio)):ratio}" == f"0.5 to {text}"

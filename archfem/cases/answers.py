@@ -19,7 +19,7 @@ from archfem.motion.matching import DEFAULT_BAND
 from archfem.motion.motion import Motion
 from archfem.statics.assessment_checks import AssessmentCheck
 from archfem.statics.mechanism_assessment import KinematicAssessment
-from archfem.units import STANDARD_GRAVITY
+from archfem.units import STANDARD_GRAVITY, format_ratio
 
 # Results by the names of their files
 RESULTS = {
@@ -87,12 +87,14 @@ class Ratios(NamedTuple):
     def beside(self) -> str:
         """The other ratios, in brackets."""
         texts = {"by displacements": self.moved, "with one weight a body": self.bodies}
-        each = "; ".join(f"{x:.3g} {words}" for words, x in texts.items() if x is not None)
+        each = "; ".join(
+            f"{format_ratio(x)} {words}" for words, x in texts.items() if x is not None
+        )
         return f" ({each})" if each else ""
 
     def __str__(self) -> str:
         """Return all ratios in words."""
-        return f"{Ends.of((self.least, self.most)):.3g}{self.beside}"
+        return f"{Ends.of((self.least, self.most)):ratio}{self.beside}"
 
 
 class Scales(NamedTuple):
@@ -204,7 +206,7 @@ def state_ratings(
                 flips = _say_flips(each.factor / found.factor, varied)
             if not np.isnan(each.factor):
                 at += "".join(f"; {x}" for x in (each.say_range(), flips) if x)
-            factor = "-" if np.isnan(each.factor) else f"{each.factor:.4g}"
+            factor = "-" if np.isnan(each.factor) else format_ratio(each.factor, 4)
             row = Row("rating", demand, f"{words}{at}", factor, {"outcome": words})
             rows.append((each.factor, row))
     sentences = [repr(first)]

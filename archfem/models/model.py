@@ -21,7 +21,7 @@ from archfem.errors import InvalidInput, filter_log
 from archfem.joints.operator import JointOperator
 from archfem.masonry.loads import Action, BodyForce, Settlement
 from archfem.masonry.structure import Structure
-from archfem.units import format_mm
+from archfem.units import format_mm, format_ratio
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,7 +184,7 @@ class Doubt:
 
 
 class Ends(tuple[float, ...]):
-    """Least and largest of a number, which have one format; "mm" is that of lengths [m]."""
+    """Least and largest of a number, of one format; "mm" is that of lengths, "ratio" of ratios."""
 
     @classmethod
     def of(cls, numbers: Iterable[float]) -> Self:
@@ -197,7 +197,8 @@ class Ends(tuple[float, ...]):
         if spec == "mm":
             texts = (format_mm(end).removesuffix(" mm") for end in self)
             return f"{' to '.join(dict.fromkeys(texts))} mm"
-        return " to ".join(dict.fromkeys(format(end, spec) for end in self))
+        texts = (format_ratio(end) if spec == "ratio" else format(end, spec) for end in self)
+        return " to ".join(dict.fromkeys(texts))
 
 
 def list_ends(value: Any) -> tuple[float, ...]:

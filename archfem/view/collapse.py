@@ -297,7 +297,6 @@ def _draw_factors(
     style_axes(upper, "middle of the vehicle, x [m]", "factor [-]")
     upper.tick_params(labelbottom=True)
     set_title(upper, title)
-    upper.legend(frameon=False, fontsize=Size.LABEL)
     draw_structure(structure, axes=lower)
     _draw_mechanism(lower, structure, worst, factors)
     if np.isfinite(worst.factor):
@@ -305,7 +304,8 @@ def _draw_factors(
     _mark_strips(lower, structure, strips)
     # below both panels: arrows may stand anywhere in the lower one
     lower.get_legend().remove()
-    add_legend_below(figure, handles=lower.get_legend_handles_labels()[0])
+    handles = [axes.get_legend_handles_labels()[0] for axes in (upper, lower)]
+    add_legend_below(figure, handles=[*handles[0], *handles[1]])
     margin = 0.03 * np.ptp(ends)
     lower.set_xlim(ends.min() - margin, ends.max() + margin)
     return figure

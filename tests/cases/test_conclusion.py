@@ -201,7 +201,7 @@ def test_the_margin_of_scales_ends_where_it_is_dislocated(case):
     vars(data)["pairs"] = ("a", "b", "c", "d")
     assert say_margin(data, scale=state("scale", *every)) == [
         "the least margin is 1.38 on 'a', PGA 0.20 g, of 2 motions",
-        "of the scales that were run it first moves as a mechanism at 0.850 × or less, is "
+        "of the scales that were run it first moves as a verified mechanism at 0.850 × or less, is "
         "dislocated at 1.41 × and falls at 4.50 ×",
         "no scale is known up to which it stands under 'c'",
         "'d' was not scaled",
@@ -247,7 +247,10 @@ def test_what_fails_under_a_motion_that_was_not_scaled_has_a_margin_below_one(ca
     plain = dict(conclusion.list_facts(data))["verdict"]
     assert plain.startswith("It survives with damage: it is dislocated but stands under 1 of 3 mot")
     # 2 m/s² are 0.204 g
-    assert "It is first dislocated at 0.2 g and first falls at 0.8 g." in plain
+    some = "(of 1 of 3 motions scaled)"
+    said = f"It is first dislocated at 0.204 g under 'b' {some} and first falls at "
+    said += f"0.8 g under 'a' {some}."
+    assert said in plain
 
 
 def test_a_motion_that_fells_it_at_a_smaller_scale_is_not_robust(case):
@@ -313,8 +316,9 @@ def test_the_answer_has_displacements_the_first_fall_and_the_checks(case):
     facts = dict(conclusion.list_facts(data))
     assert facts["verdict"] == (
         "It survives: it stands under all 2 motions of PGA 0.20 g, and moves by 60 to 80 mm. It "
-        "first falls at 0.26 g. No property was varied. By the kinematic assessment it does not "
-        "withstand the spectrum of the motion. Across the plane of the drawing it was not checked."
+        "first falls at 0.26 g under 'a'. No property was varied. By the kinematic assessment it "
+        "does not withstand the spectrum of the motion. Across the plane of the drawing it was not "
+        "checked."
     )
     assert facts["in doubt"] == "scale of the motion"
     pieces = conclusion.build_conclusion(data).pieces
@@ -624,9 +628,9 @@ def test_a_demand_that_overturns_it_across_its_plane_is_in_the_conclusion(ag, ov
     (block,) = conclusion._build_transverse(data)
     assert block.text.startswith("Nothing is checked across the plane of the drawing: held by")
     assert (block.manner == "doubt") is overturns
-    words = f"; the largest demand, {1.2 * ag:.3g} g, is {1.2 * ag / push:.2g} times that"
+    words = f"; the largest demand, {1.2 * ag:.3g} g, exceeds it ({1.2 * ag / push:.3g} ×)"
     assert (words in block.text) is overturns
-    words = f"it was not checked, where it may overturn from {push:.2g} g on."
+    words = f"it was not checked, where it may overturn from {push:.3g} g on."
     assert (words in dict(conclusion.list_facts(data))["verdict"]) is overturns
     # a vehicle is no earthquake
     vars(data)["statements"] = {"rating": answers.Statement([], [])}

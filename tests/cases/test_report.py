@@ -217,7 +217,7 @@ def test_demand_and_capacity_stand_beside_their_doubts(kept, undrawn):
     failed = "By the kinematic assessment it does not withstand the spectrum of the motion."
     rate = "Annual rate: median PGA 6 m/s², falls at 0.002 a year."
     unchecked = "Across the plane of the drawing it was not checked."
-    rest = "Rating: passes without all, with 2 axles at -0.1, 1.1 m, at 1.25 times LM1. "
+    rest = "Rating for LM1: factor 1.25, passes without all, with 2 axles at -0.1, 1.1 m. "
     assert facts["verdict"].startswith("It survives: it forms no mechanism under all 2 motions")
     assert facts["verdict"].endswith(f"No property was varied. {failed} {rest}{rate} {unchecked}")
     alone = report_data.ReportData(case, {}, found.folder)
@@ -552,7 +552,7 @@ def test_every_input_has_its_mark():
         "scale of the motions": ("1.0", "default"),
         "fidelity": ("rigid", "given"),
         "displacements": ("small", "default"),
-        "time step": ("by an error of 0.005 in |e|", "inferred"),
+        "time step": ("by an error of 0.005 in |e|", "default"),
         "damping": ("5 % of critical", "default"),
         "damping, joints": ("closed", "default"),
         "damping, kind": ("stiffness", "default"),

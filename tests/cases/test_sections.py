@@ -1,5 +1,6 @@
 """Numbers of a report and of its tables: those of structure, dead load and runs."""
 
+import re
 from dataclasses import replace
 from itertools import pairwise
 from types import SimpleNamespace
@@ -12,6 +13,7 @@ from matplotlib.figure import Figure
 import archfem as af
 from archfem._files import replace_results
 from archfem.cases.case import case_of
+from archfem.cases.defaults import list_finish_ranges
 from archfem.cases.report import conclusion, report_data, response, sections
 from archfem.cases.report.response import _check_row, supported_weight_ratio
 from archfem.cases.result_text import tabulate_joints, tabulate_motions, tabulate_runs
@@ -134,10 +136,22 @@ def test_falls_by_property_are_a_table_whose_cells_wrap(piers, tmp_path):
     found = VerdictRange(xr.Dataset(columns, attrs=attrs))
     path = tmp_path / "verdict_range.txt"
     path.write_text(str(found), encoding="utf-8")
-    case = SimpleNamespace(structure=piers, suite=None)
+    name = piers.joints[0].contact.name
+    settings = {"contacts": {name: {"finish": "dressed"}}}
+    case = SimpleNamespace(structure=piers, suite=None, settings=settings)
     data = report_data.ReportData(case, {})
     vars(data).update(files={path.name: path, "verdict_range.nc": path}, verdict_ranges=(found,))
-    text, table = sections._build_range(data)[:2]
+    text, varied, table = sections._build_range(data)[:3]
+    # of 2 MPa/mm, beside the range that the inputs state
+    ranges = list_finish_ranges(piers, piers.joints[0].contact, "dressed")
+    low, high = map(
+        float, re.findall(r"[(]([\d.]+) to ([\d.]+)[)]", ranges["normal_stiffness"][1])[0]
+    )
+    assert low < 0.6 or high > 6.0
+    wider = f"{low:.2g} to {high:.2g} MPa/mm, wider than was varied"
+    assert varied.rows == [("k_n", "0.6 to 6 MPa/mm", wider)]
+    settings["contacts"] = {}
+    assert sections._build_range(data)[1].rows == [("k_n", "0.6 to 6 MPa/mm", "")]
     assert found.sentence in text.text
     assert "explains" not in text.text
     assert table.head == ["property", "explains, of the variance of the outcome", "falls"]

@@ -20,6 +20,7 @@ from archfem.cases.report.doubts import (
     list_doubts,
     list_elastic_fill,
     list_notes,
+    list_ranges,
     list_unvaried,
     object_to_motions,
     peak_of_ground,
@@ -42,7 +43,7 @@ from archfem.dynamics.rigid_body.rocking_body import describe_first_fall
 from archfem.dynamics.verdict_range import HALF_STEP, UNVARIED, VerdictRange
 from archfem.masonry.structure import Structure, join_names, join_words
 from archfem.models.model import Doubt, Ends
-from archfem.units import STANDARD_GRAVITY, format_mm
+from archfem.units import STANDARD_GRAVITY, format_mm, format_ratio
 from archfem.view.pages.document import Grid, Section, TextBlock
 
 # Outcomes of runs as verbs and in plain words, the worst first; small displacements end where
@@ -115,7 +116,7 @@ def _say_plainly(data: ReportData, doubtful: Sequence[str]) -> Iterator[str]:
     """Yield the answer for a client: whether it survives, from where on not, and what decides."""
     if data.runs:
         yield from _say_survival(data, doubtful)
-        if failures := [f"{does} at {p[0]:.2g} g" for does, p, _ in find_first_failures(data)]:
+        if failures := [words for words, _ in find_first_failures(data)]:
             yield f"it {join_words(failures[::-1])}"  # the least first
         elif "scale" not in data.statements:
             yield "from which acceleration on it falls was not computed"
@@ -135,7 +136,7 @@ def _say_plainly(data: ReportData, doubtful: Sequence[str]) -> Iterator[str]:
     yield from (f"it first falls at {text}" for x, text in sorted(_say_across(data))[:1] if x <= 1)
     if not data.falls_across and _build_transverse(data):
         push, demand = data.case.structure.transverse_push[0], _largest_demand(data)
-        falls = f", where it may overturn from {push:.2g} g on" * (push < demand)
+        falls = f", where it may overturn from {push:.3g} g on" * (push < demand)
         yield f"across the plane of the drawing it was not checked{falls}"
 
 
@@ -193,8 +194,8 @@ def _say_what_decides(ranges: Sequence[VerdictRange]) -> str:
 
 def _judge_checks(data: ReportData) -> Iterator[str]:
     """Yield whether the structure withstands the spectrum, by each check of an assessment."""
-    of = name_spectrum(data)
     for check in list_checks(data):
+        of = name_spectrum(data)
         if check.needed:
             yield f"it does not withstand under some assumptions on the fill {of}"
         elif check.least < 1.0:
@@ -202,7 +203,7 @@ def _judge_checks(data: ReportData) -> Iterator[str]:
         elif check.by_split:
             yield f"it withstands or not, by the split of weights, {of}"
         elif check.bounded:
-            bound = f"as its ratio, {check.least:.3g}, is an upper bound"
+            bound = f"as its ratio, {format_ratio(check.least)}, is an upper bound"
             yield f"alone it is not shown to withstand {of}, {bound}: {_say_test(data)}"
         elif check.moved and _say_motion(data, check.least, peak_of_spectrum(data.case)):
             yield f"it withstands at rest alone, and moves in the runs, {of}"
@@ -320,7 +321,9 @@ def _build_transverse(data: ReportData) -> list[TextBlock]:
     text, (push, _) = data.case.structure.transverse_remark, data.case.structure.transverse_push
     demand = _largest_demand(data)
     if push < demand:
-        text += f"; the largest demand, {demand:.3g} g, is {demand / push:.2g} times that"
+        text += (
+            f"; the largest demand, {demand:.3g} g, exceeds it ({format_ratio(demand / push)} ×)"
+        )
     if data.falls_across:
         text = text.removeprefix("nothing is checked across the plane of the drawing: ")
     manner = "doubt" if push < demand else "plain"
@@ -358,7 +361,7 @@ def _list_outdated(data: ReportData) -> Iterator[str]:
 
 def _build_paragraphs(data: ReportData, doubtful: Sequence[str]) -> dict[str, list[str]]:
     """Return the sentences of the answer by their leads: outcomes, margin, what may change it."""
-    failures = [words for *_, words in find_first_failures(data)]
+    failures = [words for _, words in find_first_failures(data)]
     answer = [f"it {join_words(failures)}"] if failures else []
     if not data.runs:
         # an assessment is stated by the margin; a result that stands alone states all of itself
@@ -374,6 +377,8 @@ def _build_paragraphs(data: ReportData, doubtful: Sequence[str]) -> dict[str, li
     changes += ["the checks of the numbers raise no doubt"] * (bool(data.runs) and not doubtful)
     if doubtful:
         changes.append(f"the doubts below, on {join_names(doubtful)}, may change this")
+    ranges = dict.fromkeys(row for x in data.verdict_ranges for row in list_ranges(data, x))
+    changes += [f"by its finish {name} is {wider}" for name, _, wider in ranges if wider]
     if single := list_unvaried(data):
         none = ", and displacements have no range" * (bool(data.runs) and not data.verdict_ranges)
         changes.append(f"{join_words(single)} were not varied{none}")
@@ -439,11 +444,15 @@ def _describe_push(data: ReportData, name: str, push: PushFactors) -> Iterator[s
     bounded = push.proved is not None  # the least found, without proof that none is less
     of = " with elastic joints" if elastic else " as rigid blocks" * bounded
     over = " over what is assumed of the fill" * (push.most > push.least)
-    size = f"{Ends((push.least, push.most)):.3g} times {push.site}{over}"
+    size = f"{Ends((push.least, push.most)):ratio} times {push.site}{over}"
     text = f"pushed sideways{of} it begins to move at {size}"
     if bounded:
         text += ", the least that a search found, and "
-        text += f"is proved to stand up to {push.proved:.3g} times" if push.proved else NO_PROOF
+        text += (
+            f"is proved to stand up to {format_ratio(push.proved)} times"
+            if push.proved
+            else NO_PROOF
+        )
     if moves and push.least >= 1.0:  # shaken it moves before
         yield f"{text}; that is no margin: {moves}"
         return
@@ -464,7 +473,7 @@ def _describe_check(data: ReportData, check: Ratios) -> tuple[float, list[str]]:
     fails = fails or ", which it fails" * (check.least < 1.0)
     fails = fails or ", which it fails with one weight a body" * check.by_split
     fails = fails or f", an upper bound: {_say_test(data)}" * check.bounded
-    ends = f"{Ends((check.least, check.most)):.3g}"
+    ends = f"{Ends((check.least, check.most)):ratio}"
     texts = [f"{ends}{over}{check.beside}, {by}{fails}"]
     if check.moved is not None:
         texts.append(f"{ends} times the spectrum begins to move it")

@@ -12,10 +12,15 @@ from archfem.cases.report.report_data import ReportData
 from archfem.cases.report.study_findings import list_studied, read_study
 from archfem.dynamics.collapse_state import COLLAPSE_STATES, FALLEN_STATES, RANGE_REMEDY
 from archfem.dynamics.history import History
-from archfem.dynamics.verdict_range import MAX_RATIO_OF_DISPLACEMENTS, VerdictRange
+from archfem.dynamics.verdict_range import (
+    MAX_RATIO_OF_DISPLACEMENTS,
+    VerdictRange,
+    property_text,
+)
+from archfem.masonry.joint_closing import finish_range
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import join_words
-from archfem.models.model import Doubt, group_doubts, merge_doubts
+from archfem.models.model import Doubt, Ends, group_doubts, merge_doubts
 from archfem.statics.assessment_checks import UPPER_BOUND
 from archfem.units import STANDARD_GRAVITY
 
@@ -148,6 +153,31 @@ def list_notes(data: ReportData) -> dict[str, list[str]]:
     notes = {RESULTS[name]: [*each.notes] for name, each in data.statements.items() if each.notes}
     notes |= {HISTORIES: missed} if (missed := note_checks(data)) else {}
     return notes
+
+
+def list_ranges(data: ReportData, found: VerdictRange) -> list[tuple[str, str, str]]:
+    """Return each varied property, its range, and a stated one that is wider."""
+    rows, stated = list[tuple[str, str, str]](), dict[str, tuple[float, float, float]]()
+    structure, contacts = data.case.structure, data.case.settings.get("contacts", {})
+    for joint in structure.joints:
+        if finish := contacts.get(joint.contact.name, {}).get("finish"):
+            law = finish_range(structure, joint, finish)
+            stated = {"k_n": law.initial, "k_s": law.shear} | stated  # of the first, as inputs
+    for name in found.properties:
+        values, wider = found.dataset[name].values, ""
+        if values.dtype.kind != "f":
+            rows.append((property_text(name), ", ".join(dict.fromkeys(map(str, values))), ""))
+            continue
+        ends, unit = Ends.of(values), " × that of the case"
+        if name in found.dataset.attrs:
+            given = found.dataset.attrs[name] / 1e9
+            ends, unit = Ends(given * end for end in ends), " MPa/mm"
+            low, *_, high = sorted(end / 1e9 for end in stated.get(name, (1e9 * x for x in ends)))
+            if low < 0.99 * ends[0] or high > 1.01 * ends[1]:
+                wider = f"{low:.2g} to {high:.2g} MPa/mm, wider than was varied"
+        unit = " added to that of the case" if name == "friction" else unit
+        rows.append((property_text(name), f"{ends:.3g}{unit}", wider))
+    return rows
 
 
 def list_elastic_fill(data: ReportData) -> list[str]:

@@ -92,6 +92,8 @@ def tabulate_inputs(data: ReportData) -> Grid:
     rows += [*_property_rows(data), *_command_rows(data)]
     if not data.is_static:
         rows += [*_motion_rows(data), *_model_rows(data), *_criteria_rows(data)]
+    elif data.case.target is not None and data.statements.keys() & {"limit", "assessment"}:
+        rows += _target_rows(data)
     return Grid((), rows, _CAPTION)
 
 
@@ -120,6 +122,9 @@ def _structure_rows(data: ReportData) -> Iterator[Row]:
             yield key, _list_left_out(parts[key], given), "default"
     if table["shape"] in ("blocks", "outlines"):
         yield from _measure_rows(structure)
+    elif "measured" in kinds:  # lengths to an inner face are not those to the springing
+        for part, words in describe_piers(structure).items():
+            yield part or "pier", words, "inferred"
     yield "structure", _list_left_out(list_shapes()[table["shape"]], {*table}), "default"
     yield "width", f"{structure.width:g} m", _mark("width" in table)
     yield "gravity", f"{structure.gravity:g} m/s²", _mark("gravity" in table)
@@ -296,18 +301,24 @@ def _motion_rows(data: ReportData) -> Iterator[Row]:
         before = ", before matching" if suite.get("matched") else ""
         for part, values, mark in _source_rows(list(suite["pairs"].values())):
             yield f"{part}{before}", values, mark
-        target = suite.get("target")
-        yield "target spectrum", describe_value(target) if target else "none", _mark(bool(target))
-        yield from _spectrum_rows("target spectrum", data.case.target)
-        band = "from {:g} to {:g} s".format(*DEFAULT_BAND)
-        matched = f"matched to the target {band}" if suite.get("matched") else "as they are"
+        yield from _target_rows(data)
+        matched = "matched to the target" if suite.get("matched") else "as they are"
         yield "motions are", matched, _mark("matched" in suite)
+        if suite.get("matched"):
+            yield "motions are matched", "from {:g} to {:g} s".format(*DEFAULT_BAND), "default"
         for key, name in (("scale", "scale of the motions"), ("reduction", "reduction factor R")):
             yield name, str(suite.get(key, 1.0)), _mark(key in suite)
     elif motion is not None:
         own = {key: value for key, value in motion.items() if key != "scale"}
         yield from _source_rows([own])
         yield "scale of the motion", str(motion.get("scale", 1.0)), _mark("scale" in motion)
+
+
+def _target_rows(data: ReportData) -> Iterator[Row]:
+    """Yield the target spectrum of a suite, which may be the demand of static analyses alone."""
+    target = data.case.settings.get("suite", {}).get("target")
+    yield "target spectrum", describe_value(target) if target else "none", _mark(bool(target))
+    yield from _spectrum_rows("target spectrum", data.case.target)
 
 
 def _spectrum_rows(name: str, spectrum: Any) -> Iterator[Row]:
@@ -372,7 +383,8 @@ def _model_rows(data: ReportData) -> Iterator[Row]:
     scheme = type(analysis.scheme).__name__.lower()
     yield "scheme", scheme, _mark("scheme" in own)
     if analysis.dt is None:
-        yield "time step", f"by an error of {analysis.tolerance:g} in |e|", "inferred"
+        error = f"by an error of {analysis.tolerance:g} in |e|"
+        yield "time step", error, _mark("tolerance" in own)
     else:
         yield "time step", f"{1e3 * analysis.dt:g} ms", "given"
     yield from _damping_rows(data, own.get("damping"))

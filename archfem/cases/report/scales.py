@@ -16,7 +16,7 @@ from archfem.models.model import Ends
 # States that a search of scales finds, in the words of margin and answer
 _STATES = {
     "tension": (f"is {PULLED},", ""),
-    "moves": ("moves as a mechanism", ""),
+    "moves": ("moves as a verified mechanism", ""),
     "dislocated": ("is dislocated", "is first dislocated"),
     "falls": ("falls", "first falls"),
     "mechanism": ("forms a mechanism", "first forms a mechanism"),
@@ -44,10 +44,12 @@ def _list_unscaled(data: ReportData) -> dict[str, tuple[str, float]]:
     return {name: (_FAILURES[x.verdict.outcome], peak_of_ground(x)) for name, x in failed.items()}
 
 
-def find_first_failures(data: ReportData) -> Iterator[tuple[str, Ends, str]]:
-    """Yield each first failure over all motions: verb, peaks [g], and all in words."""
+def find_first_failures(data: ReportData) -> Iterator[tuple[str, str]]:
+    """Yield each first failure over all motions: in a few words, and with all that is known."""
     searches, unscaled, least = list_scales(data), _list_unscaled(data), np.inf
-    several = len(searches) + len(unscaled) > 1
+    several, count = len(searches) + len(unscaled) > 1, len(data.runs)
+    some = [f"of {len(searches)} of {count} motions scaled"] * (len(searches) < count)
+    some += [UNFINISHED] * any(x.unfinished for x in searches)
     for state in ("falls", "dislocated", "mechanism"):
         first = {x.motion: (x.states[state], x.pga) for x in searches if state in x.states}
         first |= {name: (1.0, peak) for name, (found, peak) in unscaled.items() if found == state}
@@ -60,12 +62,13 @@ def find_first_failures(data: ReportData) -> Iterator[tuple[str, Ends, str]]:
         over = " and ".join(["motions"] * several + ["time steps"])
         notes = ["or less"] * (name in unscaled)
         notes += [f"{ends:#.3g} × over {over}"] * (f"{ends[0]:#.3g}" != f"{ends[1]:#.3g}")
-        notes += [UNFINISHED] * any(x.unfinished for x in searches)
-        motion = f"'{name}'" if several else "the motion"
+        notes += some[-1:] * (UNFINISHED in some)
+        motion = f"'{name}'" if several or count > 1 else "the motion"
         peaks = Ends.of(scale * peak for scale, peak in first.values())
         beside = f" ({', '.join(notes)})" * bool(notes)
         words = f"{_STATES[state][1]} at {least:#.3g} × {motion}, {peaks:.3g} g{beside}"
-        yield _STATES[state][1], peaks, words
+        short = f"{_STATES[state][1]} at {peaks[0]:.3g} g under {motion}"
+        yield short + f" ({', '.join(some)})" * bool(some), words
 
 
 def say_fragile(data: ReportData) -> Iterator[str]:
