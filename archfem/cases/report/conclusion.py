@@ -116,10 +116,15 @@ def _say_plainly(data: ReportData, doubtful: Sequence[str]) -> Iterator[str]:
     """Yield the answer for a client: whether it survives, from where on not, and what decides."""
     if data.runs:
         yield from _say_survival(data, doubtful)
+        across = sorted(_say_across(data))[:1]
+        plane = "in its plane " * bool(across)
+        for scale, at, body in across:
+            falls = f"{'first ' * (scale > 1.0)}falls at {at}: {body} as one rigid body"
+            yield f"across its plane, held by nothing else, it {falls}"
         if failures := [words for words, _ in find_first_failures(data)]:
-            yield f"it {join_words(failures[::-1])}"  # the least first
-        elif "scale" not in data.statements:
-            yield "from which acceleration on it falls was not computed"
+            yield f"{plane}it {join_words(failures[::-1])}"  # the least first
+        elif "scale" not in data.statements and all(scale > 1.0 for scale, *_ in across):
+            yield f"from which acceleration on it falls {plane}was not computed"
         yield from say_fragile(data)
         yield _say_what_decides(data.verdict_ranges)
     for found in dict.fromkeys(_judge_checks(data)):  # of each direction
@@ -133,7 +138,6 @@ def _say_plainly(data: ReportData, doubtful: Sequence[str]) -> Iterator[str]:
             for row in stated.rows[:1]:
                 times = f", at {row.factor} times {row.demand}"
                 yield f"{row.result}: {row.outcome}{times * (name != 'risk' and row.factor != '-')}"
-    yield from (f"it first falls at {text}" for x, text in sorted(_say_across(data))[:1] if x <= 1)
     if not data.falls_across and _build_transverse(data):
         push, demand = data.case.structure.transverse_push[0], _largest_demand(data)
         falls = f", where it may overturn from {push:.3g} g on" * (push < demand)
@@ -162,7 +166,9 @@ def _say_survival(data: ReportData, doubtful: Sequence[str]) -> Iterator[str]:
     sizes = [x.displacement for x in verdicts if x.outcome in COLLAPSE_STATES[:2]]
     known = bool(sizes) and np.isfinite(sizes).all()
     moved = f", and moves by {Ends.of(sizes):mm}" if known else ""
-    yield f"it {answer}{in_doubt}: it {'; it '.join(_describe_outcomes(data))}{moved}"
+    beside = any(scale <= 1.0 for scale, *_ in _say_across(data))
+    lead = f"in its plane{in_doubt} it" if beside else f"it {answer}{in_doubt}: it"
+    yield f"{lead} {'; it '.join(_describe_outcomes(data))}{moved}"
     ranges = sorted(data.verdict_ranges, key=lambda x: (x.falls.sum(), x.dislocated.sum()))
     for found in ranges[-1:]:
         motion = found.dataset.attrs.get("motion")
@@ -419,7 +425,9 @@ def _describe_margin(data: ReportData) -> Iterator[str]:
     """Yield the least factor on the demand of an earthquake, maybe as a range, and the others."""
     checks = read_numbers(Ratios, data.statements.get("assessment"))
     margins = [*sorted(_describe_check(data, each) for each in checks)[:1], *describe_scales(data)]
-    margins += [(least, [f"below {text}"]) for least, text in sorted(_say_across(data))[:1]]
+    for least, at, body in sorted(_say_across(data))[:1]:
+        text = f"below {at}: {body} across the plane as one rigid body, held by nothing else"
+        margins.append((least, [text]))
     for k, (_, (first, *others)) in enumerate(sorted(margins)):
         rank = ("the least margin is", "the next is", "then follows")[min(k, 2)]
         yield from [f"{rank} {first}", *others]
@@ -428,13 +436,12 @@ def _describe_margin(data: ReportData) -> Iterator[str]:
             yield from _describe_push(data, name, push) if push.site else ()
 
 
-def _say_across(data: ReportData) -> Iterator[tuple[float, str]]:
-    """Yield the scale at which each body across the plane first falls, if any, and in words."""
+def _say_across(data: ReportData) -> Iterator[tuple[float, str, str]]:
+    """Yield the scale at which each body across the plane first falls, in words, and the body."""
     for key, (first, name) in data.falls_across.items():
         if first.scale < np.inf:
             peak = f"PGA {data.motions[name].pga / STANDARD_GRAVITY:.2f} g"
-            body = f"the {key} across the plane as one rigid body, held by nothing else"
-            yield first.scale, f"{first.scale:#.3g} × '{name}', {peak}: {body}"
+            yield first.scale, f"{first.scale:#.3g} × '{name}', {peak}", f"the {key}"
 
 
 def _describe_push(data: ReportData, name: str, push: PushFactors) -> Iterator[str]:
