@@ -42,12 +42,14 @@ from archfem.cases.toml_file import format_tables, parse_change
 from archfem.commands.cli import ExitCode
 from archfem.commands.tools import print_motions, show_both_senses
 from archfem.dynamics.history import Ending, History
+from archfem.dynamics.walls_across import describe_falls_across, find_falls_across
 from archfem.errors import ArchfemError, DidNotConverge, InvalidInput, keep_warnings, logger
 from archfem.limit.collapse import Collapse, describe_fill
 from archfem.limit.rating import Rating
 from archfem.masonry.ring_thickness import find_ring
 from archfem.masonry.structure import Structure
 from archfem.models.model import Doubt
+from archfem.motion.motion import Motion
 from archfem.motion.suite import Suite
 from archfem.statics.equilibrium import structure_doubts
 from archfem.statics.mechanism_assessment import KinematicAssessment
@@ -467,7 +469,7 @@ def compile_steps(options: argparse.Namespace) -> None:
 def print_results(case: Case, found: Iterable[Result], folder: Path) -> tuple[str, bool]:
     """Print results, write their files, and return the verdict and whether any is in doubt."""
     # `carry_out` yields dead load, pushover, suite, runs and limit analysis in this order.
-    runs: dict[str, History] = {}
+    runs, motions = dict[str, History](), dict[str, Motion]()
     of_limit = False
     if (survey := read_survey(case.settings, case.folder)) is not None:
         print(survey)
@@ -500,11 +502,23 @@ def print_results(case: Case, found: Iterable[Result], folder: Path) -> tuple[st
                 print(f"{result.motion.name}: {result.history.outcome}", file=sys.stderr)
                 _print_run(result, at_rest)
                 runs[result.motion.name] = result.history
+                motions[result.motion.name] = result.motion
             del doubts[supports:]  # they are not of the next result
     if case.suite is not None:
         _print_pairs(suite, runs, at_rest, folder)
     verdict = result_text.describe_verdicts(runs.values()) if runs else ""
+    if motions and case.structure.heads.any():
+        verdict += _print_falls_across(case.structure, motions)
     return verdict, any([of_limit, at_rest.doubts, *(run.doubts for run in runs.values())])
+
+
+def _print_falls_across(structure: Structure, motions: Mapping[str, Motion]) -> str:
+    """Print at which scales a wall falls across its plane; return the least below 1 in words."""
+    if not (found := find_falls_across(structure, motions)):
+        return ""
+    print(describe_falls_across(found))
+    least = min(first.scale for first, _ in found.values())
+    return f"; across its plane it falls at {least:#.3g} ×" * (least <= 1.0)
 
 
 def _print_limit(

@@ -24,6 +24,7 @@
     verdict           outcome, doubts, displacements and mechanisms of a run
     verdict_range     verdicts over uncertain properties
     warm_up           compilation of all kernels ahead of time
+    walls_across      walls across their plane as one rigid body
 
 Imports `motion`, `statics` and the rooms before them. Start reading at `analysis`.
 """

@@ -692,6 +692,31 @@ def test_a_report_of_a_wall_has_its_falls_across_the_plane_as_one_rigid_body():
     assert column.falls_across == {}
 
 
+@pytest.mark.parametrize(("share", "falls"), [(0.8, True), (1.25, False), (2.5, None)])
+def test_a_run_of_a_wall_says_at_which_scale_it_falls_across_its_plane(
+    share, falls, tmp_path, capsys
+):
+    """The half sine above over the share: it falls at the share, in the headline only below 1."""
+    pulse = sine(1.0, 0.33033 / share, 1, 1e-3)
+    rows = np.column_stack([pulse.dt * np.arange(len(pulse.horizontal)), pulse.horizontal])
+    np.savetxt(tmp_path / "pulse.csv", rows, delimiter=",", header="Time (s),Acc (m/s2)")
+    given = wall_in_bond().settings
+    model = {"fidelity": "rigid", "displacements": "large"}
+    motion = {"file": "pulse.csv"}
+    case = {**given, "model": model, "motion": motion}
+    (tmp_path / "wall.toml").write_text(format_tables(case), encoding="utf-8")
+    folder = tmp_path / "out"
+    af.commands.main(["run", str(tmp_path / "wall.toml"), "--out", str(folder)])
+    headline, *lines = capsys.readouterr().out.splitlines()
+    (line,) = [line for line in lines if line.startswith("across its plane, as one rigid body")]
+    of = "the strip falls at none; " if falls is None else "the strip first falls at "
+    assert of in line
+    if falls is not None:
+        assert share <= float(line.rpartition("first falls at ")[2].split()[0]) <= 1.01 * share
+    assert ("; across its plane it falls at 0.80" in headline) is bool(falls)
+    assert ("across its plane it" in headline) is bool(falls)
+
+
 @pytest.mark.parametrize("demand", [None, "0.2 g"])
 def test_a_push_is_compared_with_a_demand_in_numbers_and_words_are_not_read(demand, tmp_path):
     """A stone 0.5 m broad and 1 m high, which a push of 0.5 g overturns."""

@@ -27,7 +27,7 @@ from archfem.cases.report.doubts import (
     read_spectrum,
 )
 from archfem.cases.report.motion_rules import check_motions
-from archfem.cases.report.report_data import SCALES_ACROSS, SHOWN_RESULTS, ReportData
+from archfem.cases.report.report_data import SHOWN_RESULTS, ReportData
 from archfem.cases.report.scales import describe_scales, find_first_failures, say_fragile
 from archfem.cases.report.study_findings import read_study, say_what_changes
 from archfem.cases.result_text import PushFactors, peak_of_spectrum, site_acceleration
@@ -41,6 +41,7 @@ from archfem.dynamics.collapse_state import (
 from archfem.dynamics.history import History
 from archfem.dynamics.rigid_body.rocking_body import describe_first_fall
 from archfem.dynamics.verdict_range import HALF_STEP, UNVARIED, VerdictRange
+from archfem.dynamics.walls_across import SCALES_ACROSS
 from archfem.masonry.structure import Structure, join_names, join_words
 from archfem.models.model import Doubt, Ends
 from archfem.units import STANDARD_GRAVITY, format_mm, format_ratio

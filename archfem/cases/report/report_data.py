@@ -16,10 +16,10 @@ from archfem.cases.case import Case
 from archfem.cases.run import CASE_FILE, MOTION_VARIABLE, RATING_FILE
 from archfem.cases.toml_file import Table, parse_tables
 from archfem.dynamics.history import History
-from archfem.dynamics.rigid_body.rocking_body import FirstFall, find_first_fall
+from archfem.dynamics.rigid_body.rocking_body import FirstFall
 from archfem.dynamics.verdict_range import VerdictRange
+from archfem.dynamics.walls_across import find_falls_across
 from archfem.errors import ArchfemError
-from archfem.masonry.shapes.rings import columns_across
 from archfem.models.builder import build
 from archfem.models.discretisation import Discretisation
 from archfem.models.model import Model
@@ -31,9 +31,6 @@ from archfem.view.pages.player_data import MAX_PACKED_BYTES, Scene
 
 # Results that the report shows, and does not state
 SHOWN_RESULTS = ("modes", "accuracy", "verdict_range")
-
-# Multiples of a motion at which a wall may fall across its plane [-]
-SCALES_ACROSS = 0.1, 2.0
 
 # Results of limit analysis, for which blocks are rigid
 STATIC_RESULTS = ("limit", "thickness", "rating", "assessment")
@@ -63,18 +60,9 @@ class ReportData:
 
     @cached_property
     def falls_across(self) -> dict[str, tuple[FirstFall, str]]:
-        """Least first fall of strip and whole of a wall in bond across its plane, and its motion.
-
-        Each is one rigid body, held by nothing else.
-        """
-        structure, found = self.case.structure, dict[str, tuple[FirstFall, str]]()
-        columns = columns_across(structure) if self.runs and structure.heads.any() else {}
-        for key, column in columns.items():
-            for name, motion in self.motions.items():
-                first = find_first_fall(column, motion, SCALES_ACROSS)
-                if first and (key not in found or first.scale < found[key][0].scale):
-                    found[key] = first, name
-        return found
+        """Least first falls of a wall in bond across its plane under the motions of the runs."""
+        structure = self.case.structure
+        return find_falls_across(structure, self.motions) if structure.heads.any() else {}
 
     @cached_property
     def fidelity(self) -> str:
