@@ -183,7 +183,8 @@ def state_scale(
         scales = scales._replace(moves_in_all=found.moves_in_all)
     else:
         words += "; a fall was not computed"
-    factor = f"{held:#.3g}" if held else "-"
+    one = scales.as_one or np.inf  # at which it falls
+    factor = (f"{held:#.3g}" if held < one else f"< {one:#.3g}") if held else "-"
     row = Row(result, f"'{motion.name}', PGA {pga:.2f} g", words, factor, scales._asdict())
     stated = Statement([f"{result}: {words}"], [row], found.doubts).with_remarks(doubts)
     return {**stated.as_file("scale"), **files}

@@ -162,8 +162,8 @@ def describe_defaults(case: Case) -> str:
     texts: list[str] = []
     # values of one material or contact stand together behind its name
     for subject, group in groupby(list_defaults(case), lambda each: each.subject):
-        words = [each.words for each in group]
-        texts += [f"'{subject}' {', '.join(words)}"] if subject else words
+        words = dict.fromkeys(each.words for each in group)
+        texts += [f"'{subject}' {', '.join(words)}"] if subject else [*words]
     return f"defaults, where the case gives no value: {'; '.join(texts)}" if texts else ""
 
 

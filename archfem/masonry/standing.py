@@ -19,7 +19,7 @@ from archfem._validation import check_between, check_fields, check_numbers, vali
 from archfem.errors import InvalidInput
 from archfem.masonry.assembly import name_joints, touching
 from archfem.masonry.block import Block, as_point
-from archfem.masonry.materials import SOIL_TO_STONE, Contact, Material
+from archfem.masonry.materials import COURSE_LENGTH, SOIL_TO_STONE, Contact, Material
 from archfem.masonry.structure import CONTACT_TOLERANCE, Joint, Structure, join_names
 from archfem.units import GPa
 
@@ -151,7 +151,7 @@ def find_bodies(structure: Structure) -> list[str]:
 
 def describe_carried(structure: Structure) -> str:
     """Describe masses that count at the middle of blocks which stand for them; empty for none."""
-    own = {*find_bodies(structure)}
+    own = {*find_bodies(structure), COURSE_LENGTH}
     words = (structure.blocks[number].material.stands_for for number in structure.free)
     carried = sorted({each for each in words if each is not None and each not in own})
     if not carried:

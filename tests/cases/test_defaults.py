@@ -13,6 +13,7 @@ from archfem.cases.defaults import (
     list_default_keys,
     list_defaults,
 )
+from archfem.cases.report.sections import _describe_extent
 from archfem.cases.result_text import describe_dead_load
 
 COLUMN = {"shape": "column", "breadth": 0.6, "heights": [1.2, 1.2]}
@@ -181,3 +182,19 @@ def test_check_explains_a_finish_with_its_range_in_place_of_defaults():
         low, usual, high = (f"{value / unit:.2g}" for value in sorted(values))
         assert f"{usual} ({low} to {high})" in line
     assert "Bandis" in line
+
+
+def test_courses_of_other_weights_state_equal_defaults_once(tmp_path):
+    """A wall of courses 4, 3 and 2 m long across its plane: three materials of one stone."""
+    blocks = [af.Block(((0, -1), (4, -1), (4, 0), (0, 0)), af.STONE, "ground", fixed=True)]
+    for level, left in enumerate((0.0, 0.5, 1.0)):
+        corners = ((left, level), (4 - left, level), (4 - left, level + 1), (left, level + 1))
+        blocks.append(af.Block(corners, af.STONE, f"{level}", part="wall", role="pier"))
+    wall = af.masonry.assembled(blocks, af.Contact(1e9, 4e8, friction=0.6), width=0.5)
+    whole = af.masonry.columns_across(wall)["whole"]
+    assert [x.material.unit_weight for x in whole.blocks[1:]] == [20e3, 15e3, 10e3]
+    case = af.Case.read(af.Analysis(whole, fidelity="rigid").write(tmp_path / "whole.toml"))
+    values = "'stone' E 30 GPa, weight 20 kN/m³, strength 56 MPa;"
+    assert describe_defaults(case).startswith(f"defaults, where the case gives no value: {values}")
+    assert describe_defaults(case).count("E 30 GPa") == 1
+    assert "stand" not in _describe_extent(case.structure)

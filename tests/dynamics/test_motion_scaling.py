@@ -422,6 +422,22 @@ def test_collapse_is_between_a_stable_and_a_falling_run_at_every_step():
         stated = answers.Statement.read(files["scale.json"])
         (read,) = answers.read_numbers(answers.Scales, stated)
         assert (read.all_steps, read.as_one, read.moves_in_all, read.again, read.states) == expected
+    # the worse of courses and of one body is stated first, and is the factor
+    for one, begins, factor in (
+        (
+            0.95,
+            "as one rigid body it first falls at 0.950 ×; in courses it stands at 1.00 ×",
+            "< 0.950",
+        ),
+        (1.8, "stands at 1.00 × the motion, falls at 2.00 ×", "1.00"),
+        (inf, "stands at 1.00 × the motion, falls at 2.00 ×", "1.00"),
+    ):
+        searched = replace(found, as_one=FirstFall(one, None))
+        assert searched.sentence.startswith(begins)
+        (row,) = answers.Statement.read(
+            answers.state_scale(searched, af.Motion(np.ones(9), 0.01), [])["scale.json"]
+        ).rows
+        assert row.factor == factor
     never = CollapseScale({0.01: fallen(1.0, -2.0), 0.005: fallen(1.0, 2.0)})
     assert (never.lower, never.upper, never.above) == (1.0, inf, ())
     assert str(never) == (

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import archfem as af
+from archfem.masonry.standing import describe_carried
 from archfem.masonry.structure import find_clear_spans
 
 SQUARE = ((0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (0.0, 1.0))
@@ -266,6 +267,35 @@ def test_a_wall_across_its_plane_is_a_strip_and_the_whole_less_its_openings():
         [0.6 / 3.0, 0.3 / ((3 * 0.5 + 3 * 1.5 + 4 * 2.5) / 10)], rel=2e-3
     )
     assert wall.transverse_push == (pytest.approx(min(pushes)), "all of it")
+
+
+def test_the_tip_of_a_gable_is_one_block_with_the_course_below_it_across_the_plane():
+    """A triangle of eight courses: the upper ones weigh 1, 3, 5 and 7, the lower ones 9 to 15."""
+    half, height, thick = 2.0, 4.0, 0.5
+    blocks = [af.Block(((-3, -1), (3, -1), (3, 0), (-3, 0)), af.STONE, "ground", fixed=True)]
+    for low in np.arange(0.0, height, 0.5):
+        a, b = (half * (1.0 - y / height) for y in (low, low + 0.5))
+        for left, right in (((-a, 0), (-b, 0)), ((0, a), (0, b))):
+            (p, q), (r, s) = left, right
+            outline = [*dict.fromkeys([(p, low), (q, low), (s, low + 0.5), (r, low + 0.5)])]
+            name = f"{low} {p}"
+            blocks.append(af.Block(outline, af.STONE, name, part="wall", role="pier"))
+    gable = af.masonry.assembled(blocks, af.Contact(1e9, 4e8, friction=0.7), width=thick)
+    columns = af.masonry.columns_across(gable)
+    # a fifth of the median, 8, is more than 1, and less than 3 + 1
+    assert [len(each.free) for each in columns.values()] == [7, 7]
+    whole = columns["whole"]
+    weights = np.array([x.area * x.material.unit_weight for x in whole.blocks[1:]])
+    assert weights / weights.sum() == pytest.approx(np.array([15, 13, 11, 9, 7, 5, 4]) / 64)
+    assert np.ptp(whole.blocks[-1].points[:, 1]) == pytest.approx(1.0)
+    # half the thickness over the height of the centre, a hundredth below that of the triangle
+    found = af.collapse_factor(whole, live=af.BodyForce(1.0), friction=None).factor
+    middles = np.array([0.25, 0.75, 1.25, 1.75, 2.25, 2.75, 3.5])
+    centre = middles @ [15, 13, 11, 9, 7, 5, 4] / 64
+    assert found == pytest.approx(0.5 * thick / centre, rel=2e-3)
+    assert 0.98 < found / (1.5 * thick / height) < 1.0
+    # its weight is no load, which would act higher
+    assert not describe_carried(whole)
 
 
 def test_a_clear_span_ends_at_the_piers_below_springers():

@@ -38,6 +38,7 @@ from archfem.errors import InvalidInput
 from archfem.joints.criteria import assessed_joints
 from archfem.masonry.block import Block
 from archfem.masonry.joint_closing import describe_closing
+from archfem.masonry.materials import COURSE_LENGTH
 from archfem.masonry.structure import Structure, join_names
 from archfem.statics.assessment_checks import LIMIT_STATES, LimitState
 from archfem.units import MPa, format_mm, kN
@@ -208,8 +209,8 @@ def _describe_extent(structure: Structure) -> str:
         f"blocks that can move, weighing {structure.weight / kN:.4g} kN, and "
         f"{len(structure.joints)} joints."
     )
-    loads = Counter(filter(None, (block.material.stands_for for block in moving)))
-    for load, count in loads.items():
+    loads = Counter(block.material.stands_for for block in moving)
+    for load, count in ((x, k) for x, k in loads.items() if x not in (None, COURSE_LENGTH)):
         text += (
             f" {count} block{'s' * (count > 1)} also stand{'s' * (count == 1)} for '{load}', which "
             "counts by its weight, at the middle of each block, and not in these lengths."

@@ -23,9 +23,13 @@ from archfem._validation import (
 )
 from archfem.errors import InvalidStructure
 from archfem.masonry.block import Block, Point, as_point, check_points, measure_path
-from archfem.masonry.materials import STONE, STONE_TO_STONE, Contact, Material
+from archfem.masonry.materials import COURSE_LENGTH, STONE, STONE_TO_STONE, Contact, Material
 from archfem.masonry.structure import Joint, Structure, record_origin
 from archfem.units import G, in_degrees
+
+# Weight of a course across the plane, over the median, below which it is one block with the course
+# below it: on a joint as stiff as those of whole courses, the tip of a gable would decide the step
+LIGHT_COURSE = 0.2
 
 # Intrados and extrados of a stone, each from left to right (n, 2) [m]
 Faces = tuple[Array, Array]
@@ -217,7 +221,8 @@ def columns_across(wall: Structure) -> dict[str, Structure]:
 
     Both are as broad as the wall is thick, and have its courses, one at each bed of a stone. A
     course of the whole weighs as much as that of the wall, less its openings; its joints are as
-    long as the wall.
+    long as the wall. A course of less than a fifth of the median weight, as the tip of a gable, is
+    one block with the course below it.
 
     Args:
         wall: structure in its plane; its width is the thickness of the wall.
@@ -235,16 +240,21 @@ def columns_across(wall: Structure) -> dict[str, Structure]:
     levels, length = np.unique(np.round([low, high], 6)), float(np.ptp(ends[:, :, 0]))
     covered = np.clip(high, levels[:-1], levels[1:]) - np.clip(low, levels[:-1], levels[1:])
     weights = np.array([[block.area * block.material.unit_weight] for block in blocks])
+    courses = (weights / (high - low) * covered).sum(axis=0)
+    while courses.min() < LIGHT_COURSE * np.median(courses):
+        k = max(int(courses.argmin()), 1)  # the upper one of two that become one
+        courses[k - 1] += courses[k]
+        courses, levels = np.delete(courses, k), np.delete(levels, k)
     heights, material = np.diff(levels), blocks[0].material
     contact = wall.joints[int(wall.heads.argmin())].contact
     given: Any = {"material": material, "contact": contact, "gravity": wall.gravity}
     strip = column(breadth=wall.width, heights=heights.tolist(), **given)
-    unit_weights = (weights / (high - low) * covered).sum(axis=0) / (length * heights)
-    courses = [
-        replace(block, material=replace(material, unit_weight=weight, stands_for="its length"))
+    unit_weights = (courses / (length * heights)).round(3)  # equal ones share a material
+    stones = [
+        replace(block, material=replace(material, unit_weight=weight, stands_for=COURSE_LENGTH))
         for block, weight in zip(strip.blocks[1:], unit_weights.tolist(), strict=True)
     ]
-    whole = replace(strip, blocks=(strip.blocks[0], *courses), width=length)
+    whole = replace(strip, blocks=(strip.blocks[0], *stones), width=length)
     return {"strip": strip, "whole": whole}
 
 
