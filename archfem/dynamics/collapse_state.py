@@ -14,6 +14,7 @@ from archfem._validation import validate_arguments
 from archfem.dynamics.rigid_body.bodies import LooseBlocks
 from archfem.errors import InvalidInput
 from archfem.masonry.block import rotate
+from archfem.masonry.standing import list_own_stones
 from archfem.masonry.stiffness_ratio import find_soft_blocks, list_stones
 from archfem.masonry.structure import Structure, join_names
 from archfem.models.model import Doubt
@@ -37,7 +38,8 @@ class CollapseState:
     """State of collapse at the end of a run.
 
     A block is *lost* once its centroid sinks by more than half the root of its area, or the block
-    turns by more than 45°. Its place of rest does not matter. Fill does not count. The structure
+    turns by more than 45°. Its place of rest does not matter. Fill does not count, and the bodies
+    that stand on the structure are not displaced with it. The structure
 
     - *stands*: no block is lost, and none is displaced by more than a tenth of the median joint
       depth of the shallowest ring or pier;
@@ -55,7 +57,7 @@ class CollapseState:
         kind: "stands", "dislocated", "partly fallen" or "fallen".
         time: time of the first frame with a lost block, None without [s].
         blocks: names of the lost blocks, in the order of the structure.
-        displacement: largest displacement of any corner of a free block, see `Verdict` [m].
+        displacement: largest displacement of any corner of a free stone, see `Verdict` [m].
         residual: the same at the end [m].
         resting: whether all blocks were at rest at the end, or vibrated too weakly to overturn; if
             not, more may fall.
@@ -97,7 +99,7 @@ def classify_collapse(
     """
     free = list_stones(structure)
     start = np.zeros((len(structure.blocks), 3)) if start is None else start
-    corners = _place_corners(structure, free)
+    corners = _place_corners(structure, list_own_stones(structure))
     origin, farthest, residual = corners(start), 0.0, 0.0
     find_lost = mark_lost(structure)
     lost, time, last = np.zeros(len(free), dtype=bool), None, None

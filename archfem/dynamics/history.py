@@ -24,6 +24,7 @@ from archfem.dynamics.verdict import (
     detect_mechanisms,
     doubt_unassessed_joints,
     extremes_remark,
+    find_farthest,
     total_duration_remark,
 )
 from archfem.errors import DidNotConverge, InvalidInput
@@ -273,7 +274,8 @@ class History(ResultDisplay):
         remarks = [] if self.ending is Ending.FINISHED else [f"the run {self.outcome}"]
         if self.structure is not None and self.fall is not None and self.fall.time is None:
             remarks.append(describe_dislocation(self.structure))
-        remarks += extremes_remark(self.dataset)
+        farthest, standing = find_farthest(self.dataset, self.structure)
+        remarks += [*standing, *extremes_remark(self.dataset)]
         if (tension := attrs.get("fill_tension")) is not None:
             when = f"at {attrs['fill_tension_time']:.3f} s"
             remarks.append(
@@ -292,6 +294,7 @@ class History(ResultDisplay):
             mechanisms=mechanisms,
             fall=self.fall,
             assessed=describe_assessed_joints(joints),
+            farthest=farthest,
             incomplete="" if self.ending.is_complete else self.outcome.partition(":")[0],
             remarks=tuple(remarks),
         )

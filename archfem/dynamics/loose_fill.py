@@ -26,8 +26,9 @@ from archfem.dynamics.rigid_body.bodies import (
 )
 from archfem.masonry.backfill import TILE_AREA, cut_block, stiffen
 from archfem.masonry.block import Block, measure_polygon, rotate
-from archfem.masonry.stiffness_ratio import list_stones
+from archfem.masonry.stiffness_ratio import find_yielding_blocks, list_stones
 from archfem.masonry.structure import Structure
+from archfem.models.model import Doubt
 
 # Function from points as built (k, 2) to their places (k, 2) [m] and velocities (k, 2) [m/s]
 Field = Callable[[Array], tuple[Array, Array]]
@@ -141,6 +142,24 @@ def loosen_fill(structure: Structure, start: LooseBlocks, fields: Mapping[int, F
         np.array([*stones, *(grain.block for grain in kept)]),
         start,
     )
+
+
+def doubt_fallen_fill(structure: Structure, moved: Array) -> Iterator[Doubt]:
+    """Yield a doubt for each end out of which pieces fell, by displacements of blocks (b,) [m]."""
+    blocks, fill = structure.blocks, find_yielding_blocks(structure)
+    gone = [number for number in fill if moved[number] > sqrt(blocks[number].area)]
+    if not gone:
+        return
+    x = np.concatenate([blocks[number].points for number in fill])[:, 0]
+    places, middle = structure.centroids[gone, 0], 0.5 * (x.min() + x.max())
+    for end, count in ((x.min(), (places < middle).sum()), (x.max(), (places >= middle).sum())):
+        if count:
+            yield Doubt(
+                "pieces of the fill fell out of its free end at x = {:.4g} m, {} of {}",
+                "retain the end: in a case give the sidewalls setback = 0, and `above` up to just "
+                "below the road",
+                (float(end), int(count), len(fill)),
+            )
 
 
 def interpolate_field(places: Array, displacements: Array, velocities: Array) -> Field:

@@ -15,6 +15,7 @@ The checks do not depend on how many steps a solver takes at a time: bounds are 
 step of a batch.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import cos, radians, sin
 
@@ -26,6 +27,7 @@ from archfem._typing import Array
 from archfem.dynamics.separation import MeetingMonitor
 from archfem.dynamics.state import Batch, State
 from archfem.errors import DidNotConverge, logger
+from archfem.masonry.standing import list_own_stones
 from archfem.models.model import Doubt, Model, Observer
 from archfem.statics.equilibrium import SOIL_ANGLE, SOIL_COHESION
 from archfem.statics.stress import observe_fill_tension
@@ -103,14 +105,15 @@ class EnergyBalance:
 class CornerDisplacements:
     """Largest and present displacement of each free block's corners, from the start of a run."""
 
-    def __init__(self, observer: Observer, start: State) -> None:
+    def __init__(self, observer: Observer, start: State, stones: Sequence[int]) -> None:
         self._observer = observer
         self._start = observer.corners(observer.read(start.q))
         self.blocks, self._first = np.unique(observer.corner_blocks, return_index=True)
+        self.stones = np.isin(self.blocks, stones)  # those of the structure
         self.time = np.full(len(self.blocks), start.time)  # of the largest displacement [s]
         # displacement of the farthest corner of each block, of all steps and of the last (b,) [m]
         self.largest, self.residual = np.zeros((2, len(self.blocks)))
-        # time of the largest displacement of all [s], and displacements of corners then (c, 2) [m]
+        # time of the largest displacement of a stone [s], and those of corners then (c, 2) [m]
         self.peak = start.time, observer.corners(observer.read(start.q))
 
     def add(self, times: Array, readings: Array) -> None:
@@ -118,8 +121,9 @@ class CornerDisplacements:
         moved = np.linalg.norm(self._observer.corners(readings) - self._start, axis=2)
         farthest = np.maximum.reduceat(moved, self._first, axis=1)
         largest, self.residual = farthest.max(axis=0), farthest[-1]
-        if largest.max() > self.largest.max():
-            step = int(farthest.max(axis=1).argmax())
+        of_stones = farthest[:, self.stones]
+        if of_stones.max() > self.largest[self.stones].max():
+            step = int(of_stones.max(axis=1).argmax())
             # a copy, for the readings are a part of the memory of all steps
             self.peak = float(times[step]), self._observer.corners(readings[step]).copy()
         self.time = np.where(largest > self.largest, times[farthest.argmax(axis=0)], self.time)
@@ -135,7 +139,9 @@ class RunMonitor:
         self.model = model
         # largest drift at any step, relative to the largest exchange until then [-]
         self.worst_drift, self._worst_time = 0.0, 0.0
-        self.displacements = CornerDisplacements(model.observer(), start.state(0))
+        self.displacements = CornerDisplacements(
+            model.observer(), start.state(0), list_own_stones(model.structure)
+        )
         self.largest_turn = 0.0  # of any joint at any step [rad]
         self._balance = EnergyBalance(*start.energy[0, :2])
         self._damps = damps  # whether the scheme has numerical damping, so that losses are expected

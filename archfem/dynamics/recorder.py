@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 from archfem._typing import Array
 from archfem._validation import check_integer
 from archfem.dynamics.history import SIGN_CONVENTION, Ending, History
+from archfem.dynamics.loose_fill import doubt_fallen_fill
 from archfem.dynamics.monitor import RunMonitor
 from archfem.dynamics.solvers.integrator import Stepper
 from archfem.dynamics.state import Batch, State
 from archfem.joints.criteria import Criteria
 from archfem.joints.resultants import joint_variables
-from archfem.masonry.stiffness_ratio import list_stones
 from archfem.models.model import Doubt, Model
 from archfem.motion.motion import Motion
 
@@ -155,7 +155,9 @@ class Recorder:
         attributes |= self._attributes(motion, ending, outcome)
         dataset = xr.Dataset(variables, coordinates, attributes)
         history = History(dataset, structure)
-        return history.with_doubts((*self.monitor.doubts, *self._doubt_mass_damping(dataset)))
+        doubts = *self.monitor.doubts, *self._doubt_mass_damping(dataset)
+        fallen = doubt_fallen_fill(structure, dataset["residual_displacement"].values)
+        return history.with_doubts((*doubts, *fallen))
 
     def _block_displacements(self) -> dict[str, Any]:
         """Return displacements of all blocks as variables of a dataset; zero for fixed blocks."""
@@ -170,7 +172,7 @@ class Recorder:
             of_all[moved.blocks] = values
             variables[name] = "block", of_all, {"units": units, "long_name": text}
         time, corners = moved.peak
-        subject = "largest displacement of all: that of the corners of free blocks then, by block"
+        subject = "displacement of the corners of free blocks, when that of a stone is largest"
         attributes = {"units": "m", "long_name": subject, "time": time}
         return variables | {"peak_displacement": (("corner", "axis"), corners, attributes)}
 
@@ -189,7 +191,7 @@ class Recorder:
         """Return the scalar results and settings of the run."""
         structure, monitor = self.model.structure, self.monitor
         smallest = self._rows_of("smallest_step")
-        stones = np.isin(monitor.displacements.blocks, list_stones(structure))
+        moved = monitor.displacements
         attributes = {
             "title": f"{structure.name}: {motion.name or 'time history'}",
             "motion": motion.name,
@@ -202,8 +204,8 @@ class Recorder:
             "last_time": self.state.time,
             "energy_drift": monitor.worst_drift,
             "displacements": "large" if self.model.large_displacements else "small",
-            "displacement": float(monitor.displacements.largest[stones].max()),
-            "residual": float(monitor.displacements.residual[stones].max()),
+            "displacement": float(moved.largest[moved.stones].max()),
+            "residual": float(moved.residual[moved.stones].max()),
             "largest_turn": monitor.largest_turn,
             # halved steps are dt/2 or shorter; 0.75 lies clear of round-off
             "halved_steps": int(np.sum(smallest < 0.75 * self.dt)) if self.dt else 0,

@@ -29,6 +29,7 @@ from archfem.limit.mechanism_count import (
 )
 from archfem.limit.mechanism_kinematics import first_verified_mechanism
 from archfem.masonry.parts import find_directions, is_on_back
+from archfem.masonry.standing import find_bodies, list_own_stones
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import Structure, join_names
 from archfem.models.model import Doubt
@@ -62,9 +63,10 @@ class Verdict:
             mechanism" with small ones, by any of the definitions.
         doubts: reasons why the result may be wrong, each with its remedy.
         displacement: largest displacement of any corner of a block relative to the ground, from its
-            place at the start of the run, under dead load [m]. Backfill does not count. NaN of
-            a record of joints alone.
+            place at the start of the run, under dead load [m]. Backfill and bodies that stand on
+            the structure do not count. NaN of a record of joints alone.
         residual: the same at the end of the run [m].
+        farthest: blocks of both; none where blocks came loose.
         mechanisms: first mechanism, or None, by each definition of `MECHANISM_DEFINITIONS` that
             applies, and by the criterion of Demirel and Aldemir; "verified" only where the
             structure is known.
@@ -83,6 +85,7 @@ class Verdict:
     fall: CollapseState | None = None
     incomplete: str = ""
     assessed: str = ""
+    farthest: tuple[str, ...] = ()
     remarks: tuple[str, ...] = ()
 
     @property
@@ -122,10 +125,12 @@ class Verdict:
         if not np.isnan(self.displacement):
             # what still rocks has no residual displacement
             moves = self.fall is not None and not self.fall.resting
-            end = format_mm(self.residual) + " at the end, while blocks still move" * moves
+            most, left = [f" ({name})" for name in self.farthest] or ("", "")
+            end = f"{format_mm(self.residual)}{left}"
+            end = f"{end} at the end, while blocks still move" if moves else f"residual {end}"
             lines.append(
-                f"largest displacement of a corner {format_mm(self.displacement)}, "
-                f"{'' if moves else 'residual '}{end}; not varied"
+                f"largest displacement of a corner {format_mm(self.displacement)}{most}, {end}; "
+                "not varied"
             )
         # definitions with the same mechanism share a line
         groups: dict[str, list[str]] = {}
@@ -239,6 +244,23 @@ def doubt_unassessed_joints(joints: xr.Dataset, structure: Structure) -> list[Do
         cause += f"; with them counted, {total_duration_remark(counted)}"
     parts = join_names([f"'{part}'" for part in dict.fromkeys(own["part"].values.astype(str))])
     return [Doubt(cause, f"give the blocks of part {parts} role='pier' or 'ring', and they count")]
+
+
+def find_farthest(
+    dataset: xr.Dataset, structure: Structure | None
+) -> tuple[tuple[str, ...], list[str]]:
+    """Return the stones of the largest and last displacement, and a sentence on each body."""
+    if structure is None or "largest_displacement" not in dataset or "fall_pose" in dataset:
+        return (), []
+    most, left = (dataset[f"{key}_displacement"].values for key in ("largest", "residual"))
+    stones, bodies = list_own_stones(structure), find_bodies(structure)
+    names = [structure.blocks[stones[each[stones].argmax()]].name for each in (most, left)]
+    moved = {name: structure.block_number(name) for name in bodies}
+    return tuple(names), [
+        f"'{name}', which stands on it, was displaced by up to {format_mm(most[number])}, "
+        f"{format_mm(left[number])} at the end"
+        for name, number in moved.items()
+    ]
 
 
 def extremes_remark(dataset: xr.Dataset) -> list[str]:

@@ -20,6 +20,7 @@ from archfem.errors import InvalidInput
 from archfem.masonry.assembly import name_joints, touching
 from archfem.masonry.block import Block, as_point
 from archfem.masonry.materials import COURSE_LENGTH, SOIL_TO_STONE, Contact, Material
+from archfem.masonry.stiffness_ratio import list_stones
 from archfem.masonry.structure import CONTACT_TOLERANCE, Joint, Structure, join_names
 from archfem.units import GPa
 
@@ -147,6 +148,12 @@ class StandingBody:
 def find_bodies(structure: Structure) -> list[str]:
     """Return the names of the bodies that stand on a structure."""
     return [block.name for block in structure.blocks if block.material.stands_for == block.name]
+
+
+def list_own_stones(structure: Structure) -> list[int]:
+    """Return the stones of a structure without the bodies on it, or all where there are no more."""
+    stones, bodies = list_stones(structure), find_bodies(structure)
+    return [number for number in stones if structure.blocks[number].name not in bodies] or stones
 
 
 def describe_carried(structure: Structure) -> str:

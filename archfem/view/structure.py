@@ -19,6 +19,8 @@ from archfem.joints.resultants import check_instant
 from archfem.limit.mechanism_count import counted_mechanism, leave_out_walls
 from archfem.limit.mechanism_kinematics import verified_mechanism
 from archfem.masonry.loads import BodyForce, PointLoad, Settlement
+from archfem.masonry.standing import list_own_stones
+from archfem.masonry.stiffness_ratio import list_stones
 from archfem.masonry.structure import Joint, Structure
 from archfem.models.model import Model
 from archfem.statics.equilibrium import Equilibrium
@@ -480,8 +482,18 @@ def draw_displaced(
     add_note(cast(Figure, axes.figure), {"": describe_assessed_joints(joints)})
     scale = "" if magnification == 1.0 else f", displacements × {magnification:g}"
     set_title(axes, title_at_instant(structure.name, joints) + scale)
-    axes.autoscale_view()
+    _clip_to_stones(axes, structure, places, cells.block)
     return cast(Figure, axes.figure)
+
+
+def _clip_to_stones(axes: Axes, structure: Structure, places: Array, block: Array) -> None:
+    """Fit axes to a structure and its displaced stones: fill may have fallen out of sight."""
+    axes.autoscale_view()
+    stones = places[np.isin(block, list_stones(structure))]
+    seen, room = np.concatenate([stones, outline_bounds(structure)]), 0.1 * structure.size
+    (left, low), (right, high) = seen.min(axis=0) - room, seen.max(axis=0) + room
+    axes.set_xlim(np.clip(axes.get_xlim(), left, right))
+    axes.set_ylim(np.clip(axes.get_ylim(), low, high))
 
 
 def draw_critical(structure: Structure, run: History, model: Model | None = None) -> Figure:
@@ -513,14 +525,15 @@ def _draw_peak(axes: Axes, structure: Structure, run: History, joints: xr.Datase
     block = np.repeat(np.arange(len(outlines)), [len(outline) for outline in outlines])
     places = np.concatenate(outlines)
     moved = peak_displacements(structure, run, places, block)
-    by = round_magnification(float(np.abs(moved).max()) / structure.size)
+    stones = np.isin(block, list_own_stones(structure))
+    by = round_magnification(float(np.abs(moved[stones]).max()) / structure.size)
     displaced = np.split(places + by * moved, np.flatnonzero(np.diff(block)) + 1)
     add_polygons(axes, outlines, "none", edge=Colour.UNDEFORMED, width=0.6, zorder=0)
     add_polygons(axes, displaced, block_colours(structure), gid="blocks")
     draw_marks(axes, joint_marks(structure, joints, shift=by * peak_joint_ends(structure, run)))
     scale = "" if by == 1.0 else f", displacements × {by:g}"
     set_title(axes, title_at_instant("largest displacement", joints) + scale)
-    axes.autoscale_view()
+    _clip_to_stones(axes, structure, places + by * moved, block)
 
 
 def draw_during(

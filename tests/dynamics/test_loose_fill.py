@@ -11,7 +11,12 @@ import archfem as af
 from archfem.dynamics.analysis import with_one_facet
 from archfem.dynamics.collapse_state import doubt_soft_blocks
 from archfem.dynamics.history import History
-from archfem.dynamics.loose_fill import _cut_off, interpolate_field, loosen_fill
+from archfem.dynamics.loose_fill import (
+    _cut_off,
+    doubt_fallen_fill,
+    interpolate_field,
+    loosen_fill,
+)
 from archfem.dynamics.recorder import Record
 from archfem.dynamics.rigid_body.bodies import LooseBlocks
 from archfem.masonry.block import rotate
@@ -276,3 +281,20 @@ def test_film_and_player_show_grains_from_the_fall_on(footbridge):
     own = model.cells.block == number
     assert np.ptp(frame.places[own], axis=0) == pytest.approx(0.0)
     assert len(frame.grains) == len(lengths)
+
+
+def test_pieces_that_fell_out_of_the_ends_of_the_fill_are_in_doubt_by_end(footbridge):
+    pieces = af.masonry.jointed_fill(footbridge, 0.5, friction_angle=35.0)
+    fill = find_yielding_blocks(pieces)
+    x = pieces.centroids[:, 0]
+    outlines = [pieces.blocks[number].points[:, 0] for number in fill]
+    ends = min(each.min() for each in outlines), max(each.max() for each in outlines)
+    order = sorted(fill, key=lambda number: x[number])
+    moved = np.zeros(len(pieces.blocks))
+    moved[pieces.free[0]] = 2.0  # a stone
+    moved[fill[len(fill) // 2]] = 0.02  # less than its size
+    assert not [*doubt_fallen_fill(pieces, moved)]
+    moved[order[:3]], moved[order[-1]] = 200.0, 1.0
+    said = [str(doubt) for doubt in doubt_fallen_fill(pieces, moved)]
+    for text, end, count in zip(said, ends, (3, 1), strict=True):
+        assert f"free end at x = {end:.4g} m, {count} of {len(fill)}; retain" in text

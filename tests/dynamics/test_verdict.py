@@ -29,9 +29,13 @@ def test_the_words_are_written_from_the_fields(run):
     assert first.startswith("mechanism by any joints at once, ")
     assert first.endswith(f"; {len(verdict.doubts)} doubts")
     assert lines[: len(verdict.doubts)] == [f"in doubt: {doubt}" for doubt in verdict.doubts]
+    names = [block.name for block in run.structure.blocks]
+    most, left = (
+        names[run.dataset[f"{key}_displacement"].values.argmax()] for key in ("largest", "residual")
+    )
     assert (
-        f"largest displacement of a corner {1e3 * verdict.displacement:.3g} mm, residual "
-        f"{1e3 * verdict.residual:.3g} mm; not varied"
+        f"largest displacement of a corner {1e3 * verdict.displacement:.3g} mm ({most}), residual "
+        f"{1e3 * verdict.residual:.3g} mm ({left}); not varied"
     ) in lines
     for name, found in verdict.mechanisms.items():
         (line,) = [text for text in lines if name in text.split(":")[0]]

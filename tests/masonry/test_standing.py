@@ -272,3 +272,29 @@ def test_axles_do_not_drive_over_a_body_nor_is_it_plastic_fill():
     plastic = af.limit.PlasticFill(friction_angle=35.0, cohesion=5e3)
     with pytest.raises(af.errors.InvalidInput, match=r"\['lorry'\] on a plastic fill"):
         af.collapse_factor(loaded, live=af.BodyForce(1.0), fill=plastic)
+
+
+def test_a_body_that_slides_has_a_line_of_its_own_and_the_structure_stands():
+    """Closed form: pushed by a on friction μ it slides by (a - μ g) t² / 2."""
+    push, friction, time = 2.0, 0.1, 0.5
+    body = StandingBody(
+        x=-0.2,
+        length=0.3,
+        weight=1e3,
+        centre_of_gravity=0.1,
+        contact=replace(af.masonry.STONE_TO_STONE, friction=friction),
+        name="box",
+    )
+    loaded = carrying(af.column(breadth=1.0, heights=[0.5]), [body])
+    motion = af.Motion(np.full(round(time / 0.005) + 1, push), 0.005)
+    run = af.Analysis(loaded, fidelity="rigid", displacements="large", dt=1e-3).run(motion)
+    moved = 0.5 * (push - friction * 9.81) * time**2
+    at = [block.name for block in loaded.blocks].index("box")
+    assert run.dataset["largest_displacement"].values[at] == pytest.approx(moved, rel=0.03)
+    assert run.verdict.outcome == "stands"  # though the box moves by more than a tenth of 1 m
+    assert moved > 0.1
+    assert run.verdict.displacement < 1e-3
+    assert set(run.verdict.farthest) == {loaded.blocks[1].name}
+    largest = 1e3 * run.dataset["largest_displacement"].values[at]
+    said = f"'box', which stands on it, was displaced by up to {largest:.3g} mm, "
+    assert said in str(run.verdict)
