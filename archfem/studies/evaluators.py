@@ -183,20 +183,22 @@ def scales_of(result: DeadLoadResult, motion: Motion, **options: Any) -> Finding
 
 
 def evaluate_limit(case: Case) -> Findings:
-    """Return the collapse factor of a case by limit analysis, and the size of its mechanism."""
+    """Return the collapse factor of a case by limit analysis, and the size of its mechanism.
+
+    An infinite factor never makes a mechanism; NaN is that of a case which does not stand.
+    """
     collapse = case.limit.solve(case.structure)
     findings: Findings = {
         "factor": float(collapse.factor),
-        "outcome": str(collapse.outcome.name).lower(),
         "hinges": len(collapse.hinges),
         "slides": len(collapse.sliding),
     }
     if collapse.push:
-        push, site = float(collapse.factor) * abs(collapse.push), site_acceleration(case)
-        findings["push"] = push
+        site = site_acceleration(case)
+        findings["push"] = least = float(collapse.factor) * abs(collapse.push)
         if collapse.over_fill is not None:
-            findings["least_push"] = abs(collapse.push) * float(collapse.range[0])
-        findings |= {"push_over_site": push / site} if site > 0.0 else {}
+            findings["least_push"] = least = abs(collapse.push) * float(collapse.range[0])
+        findings |= {"least_push_over_site": least / site} if site > 0.0 else {}
     return findings
 
 

@@ -6,6 +6,7 @@ import xarray as xr
 
 import archfem as af
 from archfem.cases.report import study_findings
+from archfem.studies.evaluators import evaluate_limit
 from archfem.view import draw_findings
 
 
@@ -152,7 +153,7 @@ def test_of_factors_the_least_is_the_worst():
     assert text == "in the study none lowers the factor of 'a', 0.6"
     pushed = table.assign(
         push=("case", [0.25, 0.3, 0.4, 0.2], {"units": "g"}),
-        push_over_site=("case", [1.16, 1.4, 1.9, 0.926]),
+        least_push_over_site=("case", [1.16, 1.4, 1.9, 0.926]),
     )
     found = study_findings.collect_findings("", "", pushed)
     assert [*study_findings.say_what_changes(found)] == [
@@ -185,3 +186,15 @@ def test_the_table_of_a_study_names_what_it_varies(tmp_path):
     assert table.attrs["varied"] == "contacts.stone to stone.friction; structure.breadth"
     found = study_findings.collect_findings("", "", table)
     assert study_findings.list_studied(found) == {"lengths", "friction"}
+
+
+def test_a_push_over_the_acceleration_of_the_site_is_the_least_over_the_fill():
+    wall = {"length": 1.0, "height": 0.5, "above": 0.5, "state": "fixed"}
+    ring = {"span": 6.0, "rise": 1.5, "thickness": 0.4, "voussoirs": 15}
+    bridge = {"shape": "bridge", "width": 3.0, "arches": {"arch": ring}}
+    bridge |= {"sidewalls": {"left": wall, "right": wall}, "backfill": {"cover": 0.3}}
+    limit = {"horizontal": 1.0, "demand": "0.6 g", "fill": {"friction_angle": 35.0}}
+    found = evaluate_limit(af.Case.of({"structure": bridge, "limit": limit}))
+    assert found["least_push"] < 0.6 < found["push"]  # what the favourable end hides
+    assert found["least_push_over_site"] == pytest.approx(found["least_push"] / 0.6)
+    assert "outcome" not in found  # that of any finite factor: it reads as if it fell

@@ -103,8 +103,8 @@ def read_study(data: ReportData) -> StudyFindings | None:
 def collect_findings(title: str, text: str, table: xr.Dataset) -> StudyFindings:
     """Return the worst point of each case of the table of a study."""
     table = table.drop_dims("entry", errors="ignore")
-    if "push_over_site" in table:
-        table = table.rename(push_over_site=OVER_SITE)
+    if "least_push_over_site" in table:
+        table = table.rename(least_push_over_site=OVER_SITE)
     frame = table.to_dataframe().reset_index()
     differing = [str(name) for name in table.coords if frame[name].nunique() > 1]
     keys = [name for name in differing if name not in _NO_CASE] or differing
