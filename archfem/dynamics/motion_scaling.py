@@ -22,7 +22,7 @@ from archfem.dynamics.collapse_state import FALLEN_STATES, CollapseState, doubt_
 from archfem.dynamics.events import EveryMechanism, applicable_definitions
 from archfem.dynamics.fall import state_rigid_falls
 from archfem.dynamics.history import Ending, History, first_mechanisms, partial_history
-from archfem.dynamics.monitor import FILL_TENSION, PULLED
+from archfem.dynamics.monitor import FILL_TENSION, PULLED, SOIL_TENSION
 from archfem.dynamics.recorder import Record
 from archfem.dynamics.rigid_body.rocking_body import FirstFall, describe_first_fall, find_first_fall
 from archfem.dynamics.schemes import EffectiveDamping, Viscous
@@ -37,7 +37,8 @@ from archfem.masonry.structure import Structure, join_names
 from archfem.models.model import Doubt, Ends, Model, group_doubts, log_doubts_once, merge_doubts
 from archfem.motion.motion import Motion, admissible_range
 from archfem.statics.equilibrium import Equilibrium, dead_load
-from archfem.units import STANDARD_GRAVITY
+from archfem.statics.stress import observe_fill_tension
+from archfem.units import STANDARD_GRAVITY, kPa
 
 # Limit state of large displacements, in place of a definition of mechanisms
 COLLAPSE_DEFINITION = "collapse"
@@ -744,7 +745,8 @@ def collapse_scale(
         All runs, with the scales between which the structure falls by each step.
 
     Raises:
-        InvalidInput: displacements are small, or precision, steps or scales are out of range.
+        InvalidInput: displacements are small; precision, steps or scales are out of range; or
+            elastic fill bears more tension at rest than soil, so that no scale would count.
         DidNotConverge: the structure does not stand under dead load.
     """
     begin = start or dead_load(model)
@@ -752,6 +754,13 @@ def collapse_scale(
         raise InvalidInput(
             f"model '{begin.model.fidelity}' has small displacements: build it with "
             "displacements='large'"
+        )
+    observe = observe_fill_tension(begin.model)
+    if observe is not None and (tension := observe(begin.q)) > SOIL_TENSION:
+        raise InvalidInput(
+            f"elastic fill bears {tension / kPa:.3g} kPa of tension under dead load alone, and "
+            f"soil at most {SOIL_TENSION / kPa:.2g} kPa, so that no scale would count: cut the fill "
+            'into pieces, jointed_fill (law = "jointed" in [structure.fill] of a case)'
         )
     dt, shortens = OWN_STEP if dt is None else dt, dt is None
     steps = [dt, 0.5 * dt] if isinstance(dt, int | float) else [*dt]

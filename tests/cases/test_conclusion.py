@@ -253,6 +253,21 @@ def test_what_fails_under_a_motion_that_was_not_scaled_has_a_margin_below_one(ca
     assert said in plain
 
 
+def test_the_box_has_the_push_and_no_scale_of_a_fill_in_tension_at_all(case):
+    data = data_of(case, a=verdict_of())
+    push = PushFactors(0.737, 1.65, "the demand of 0.15 g")
+    for held, tension, box in ((0.0, 0.1, False), (0.9, 1.0, True)):
+        found = scales("a", held, tension=tension, dislocated=7.34)
+        vars(data)["statements"] = {"scale": state("scale", found), "limit": state("limit", push)}
+        said = dict(conclusion.list_facts(data))["verdict"]
+        assert ("first dislocated at 1.5 g" in said) == box  # 7.34 × 2 m/s²
+        assert "Pushed steadily it may begin to move at 0.74 times the demand of 0.15 g." in said
+    vars(data)["statements"] = {
+        "limit": state("limit", PushFactors(1.2, 1.65, "the demand of 0.15 g"))
+    }
+    assert "Pushed" not in dict(conclusion.list_facts(data))["verdict"]
+
+
 def test_a_motion_that_fells_it_at_a_smaller_scale_is_not_robust(case):
     """As shaken it stands, or is dislocated; what is as weak only above 1 × says nothing."""
     data = data_of(case, a=verdict_of(), b=verdict_of("dislocated"), c=verdict_of())

@@ -298,3 +298,22 @@ def test_pieces_that_fell_out_of_the_ends_of_the_fill_are_in_doubt_by_end(footbr
     said = [str(doubt) for doubt in doubt_fallen_fill(pieces, moved)]
     for text, end, count in zip(said, ends, (3, 1), strict=True):
         assert f"free end at x = {end:.4g} m, {count} of {len(fill)}; retain" in text
+
+
+def test_no_scale_is_searched_where_the_fill_bears_tension_at_rest(footbridge):
+    """In proportion to its weight: twice as heavy it bears twice the tension."""
+    analysis = af.Analysis(
+        footbridge, fidelity={"backfill": "full", "rest": "rigid"}, displacements="large"
+    )
+    motion = af.Motion.synthetic(duration=0.5, pga=2.0, seed=1)
+    tension = {}
+    for heavy in (4.0, 8.0):
+        blocks = [
+            replace(x, material=replace(x.material, unit_weight=heavy * x.material.unit_weight))
+            for x in footbridge.blocks
+        ]
+        model = replace(analysis, structure=replace(footbridge, blocks=tuple(blocks)))
+        with pytest.raises(af.errors.InvalidInput, match="under dead load alone") as error:
+            af.collapse_scale(model, motion)
+        tension[heavy] = float(str(error.value).split(" bears ")[1].split()[0])
+    assert tension[8.0] == pytest.approx(2.0 * tension[4.0], rel=0.1)

@@ -131,8 +131,7 @@ def _say_plainly(data: ReportData, doubtful: Sequence[str]) -> Iterator[str]:
     for found in dict.fromkeys(_judge_checks(data)):  # of each direction
         yield f"by the kinematic assessment {found}"
     for name, stated in data.statements.items():
-        pushes = [x for x in read_numbers(PushFactors, stated) if x.site and not data.runs]
-        yield from (next(_describe_push(data, name, push)) for push in pushes)
+        yield from (pushes := [*_say_pushes(data, name, stated)])
         if name == "rating":
             yield from _say_ratings(data, stated)
         elif name == "risk" or not (data.runs or pushes or name in ("assessment", "scale")):
@@ -143,6 +142,15 @@ def _say_plainly(data: ReportData, doubtful: Sequence[str]) -> Iterator[str]:
         push, demand = data.case.structure.transverse_push[0], _largest_demand(data)
         falls = f", where it may overturn from {push:.3g} g on" * (push < demand)
         yield f"across the plane of the drawing it was not checked{falls}"
+
+
+def _say_pushes(data: ReportData, name: str, stated: Statement) -> Iterator[str]:
+    """Yield where a push begins to move it: beside runs only at less than the site's."""
+    for push in read_numbers(PushFactors, stated):
+        if push.site and not data.runs:
+            yield next(_describe_push(data, name, push))
+        elif push.site and push.least < 1.0:
+            yield f"pushed steadily it may begin to move at {push.least:.2g} times {push.site}"
 
 
 def _say_ratings(data: ReportData, stated: Statement) -> Iterator[str]:

@@ -46,7 +46,9 @@ def _list_unscaled(data: ReportData) -> dict[str, tuple[str, float]]:
 
 def find_first_failures(data: ReportData) -> Iterator[tuple[str, str]]:
     """Yield each first failure over all motions: in a few words, and with all that is known."""
-    searches, unscaled, least = list_scales(data), _list_unscaled(data), np.inf
+    # without a scale that holds, a fill bears tension at all of them
+    searches = [x for x in list_scales(data) if x.held or "tension" not in x.states]
+    unscaled, least = _list_unscaled(data), np.inf
     several, count = len(searches) + len(unscaled) > 1, len(data.runs)
     some = [f"of {len(searches)} of {count} motions scaled"] * (len(searches) < count)
     some += [UNFINISHED] * any(x.unfinished for x in searches)
