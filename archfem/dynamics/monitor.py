@@ -26,10 +26,10 @@ from scipy.integrate import trapezoid
 from archfem._typing import Array
 from archfem.dynamics.separation import MeetingMonitor
 from archfem.dynamics.state import Batch, State
-from archfem.errors import DidNotConverge, logger
+from archfem.errors import DidNotConverge, InvalidInput, logger
 from archfem.masonry.standing import list_own_stones
 from archfem.models.model import Doubt, Model, Observer
-from archfem.statics.equilibrium import SOIL_ANGLE, SOIL_COHESION
+from archfem.statics.equilibrium import SOIL_ANGLE, SOIL_COHESION, Equilibrium
 from archfem.statics.stress import observe_fill_tension
 from archfem.units import kPa
 
@@ -45,6 +45,17 @@ FILL_TENSION = (
 
 # What leaves the results of such a fill in doubt
 PULLED = f"in doubt, as the elastic fill bears tension of over {SOIL_TENSION / kPa:.2g} kPa"
+
+
+def refuse_fill_in_tension(start: Equilibrium) -> None:
+    """Refuse a search of scales where elastic fill bears more tension at rest than soil."""
+    observe = observe_fill_tension(start.model)
+    if observe is not None and (tension := observe(start.q)) > SOIL_TENSION:
+        raise InvalidInput(
+            f"elastic fill bears {tension / kPa:.3g} kPa of tension under dead load alone, and "
+            f"soil at most {SOIL_TENSION / kPa:.2g} kPa, so that no scale would count: cut the "
+            'fill into pieces, jointed_fill (law = "jointed" in [structure.fill] of a case)'
+        )
 
 
 @dataclass(frozen=True, eq=False)

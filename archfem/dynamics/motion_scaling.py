@@ -22,7 +22,7 @@ from archfem.dynamics.collapse_state import FALLEN_STATES, CollapseState, doubt_
 from archfem.dynamics.events import EveryMechanism, applicable_definitions
 from archfem.dynamics.fall import state_rigid_falls
 from archfem.dynamics.history import Ending, History, first_mechanisms, partial_history
-from archfem.dynamics.monitor import FILL_TENSION, PULLED, SOIL_TENSION
+from archfem.dynamics.monitor import FILL_TENSION, PULLED, refuse_fill_in_tension
 from archfem.dynamics.recorder import Record
 from archfem.dynamics.rigid_body.rocking_body import FirstFall, describe_first_fall, find_first_fall
 from archfem.dynamics.schemes import EffectiveDamping, Viscous
@@ -37,8 +37,7 @@ from archfem.masonry.structure import Structure, join_names
 from archfem.models.model import Doubt, Ends, Model, group_doubts, log_doubts_once, merge_doubts
 from archfem.motion.motion import Motion, admissible_range
 from archfem.statics.equilibrium import Equilibrium, dead_load
-from archfem.statics.stress import observe_fill_tension
-from archfem.units import STANDARD_GRAVITY, kPa
+from archfem.units import STANDARD_GRAVITY
 
 # Limit state of large displacements, in place of a definition of mechanisms
 COLLAPSE_DEFINITION = "collapse"
@@ -755,13 +754,7 @@ def collapse_scale(
             f"model '{begin.model.fidelity}' has small displacements: build it with "
             "displacements='large'"
         )
-    observe = observe_fill_tension(begin.model)
-    if observe is not None and (tension := observe(begin.q)) > SOIL_TENSION:
-        raise InvalidInput(
-            f"elastic fill bears {tension / kPa:.3g} kPa of tension under dead load alone, and "
-            f"soil at most {SOIL_TENSION / kPa:.2g} kPa, so that no scale would count: cut the fill "
-            'into pieces, jointed_fill (law = "jointed" in [structure.fill] of a case)'
-        )
+    refuse_fill_in_tension(begin)
     dt, shortens = OWN_STEP if dt is None else dt, dt is None
     steps = [dt, 0.5 * dt] if isinstance(dt, int | float) else [*dt]
     check_search(precision, between)
