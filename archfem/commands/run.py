@@ -514,7 +514,12 @@ def print_results(case: Case, found: Iterable[Result], folder: Path) -> tuple[st
 
 def _print_falls_across(structure: Structure, motions: Mapping[str, Motion]) -> str:
     """Print at which scales a wall falls across its plane; return the least below 1 in words."""
-    if not (found := find_falls_across(structure, motions)):
+    try:
+        found = find_falls_across(structure, motions)
+    except ArchfemError as error:  # what was run is kept
+        logger.warning("the wall was not checked against the motions across its plane: %s", error)
+        return ""
+    if not found:
         return ""
     print(describe_falls_across(found))
     least = min(first.scale for first, _ in found.values())

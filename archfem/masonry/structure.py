@@ -26,7 +26,7 @@ from archfem.errors import InvalidInput, InvalidStructure
 from archfem.masonry.block import Block, Point, as_point, check_overlaps, say_place
 from archfem.masonry.materials import Contact
 from archfem.masonry.parts import assign_roles, find_misplaced, select_assessed_parts
-from archfem.units import G
+from archfem.units import G, format_mm
 
 
 def find_number(kind: str, names: Sequence[str], requested: str | int) -> int:
@@ -51,6 +51,18 @@ def suggest_name(word: str, known: Iterable[str], likeness: float = 0.6) -> str:
     folded = {name.casefold(): name for name in known}
     near = difflib.get_close_matches(word.casefold(), folded, 1, likeness)
     return f"did you mean '{folded[near[0]]}'?" if near else ""
+
+
+def merge_levels(ends: Array) -> Array:
+    """Return lower and upper ends of stones (n, 2), those of one bed at the lowest of them [m]."""
+    # beds of a survey are level within its noise only; a stone keeps its height
+    near = min(LEVEL_TOLERANCE * np.ptp(ends), 0.5 * np.diff(ends, axis=1).min())
+    merged, rest = ends.copy(), ends >= ends.min()
+    while rest.any():
+        level = ends[rest].min()
+        merged[rest & (ends <= level + near)] = level
+        rest &= ends > level + near
+    return merged
 
 
 def join_names(names: Sequence[str], comma: str = ", ") -> str:
@@ -127,6 +139,9 @@ LARGE_STONE = 3.0  # median diagonal above which the unit is probably wrong [m]
 
 # Distance of two coincident points, relative to the size of the structure
 CONTACT_TOLERANCE = 1e-6
+
+# Distance of the ends of stones at one bed, relative to the height of the structure
+LEVEL_TOLERANCE = 0.005
 
 
 @dataclass(frozen=True)
@@ -455,7 +470,8 @@ class Structure(ResultDisplay):
         """
         blocks = [self.blocks[number] for number in self.free]
         ends = np.array([[block.points.min(axis=0), block.points.max(axis=0)] for block in blocks])
-        bottom, ground = ends[:, 0, 1], ends[:, 0, 1].min()
+        bottom = merge_levels(ends[..., 1])[:, 0]
+        ground = bottom.min()
         if ends[:, 0, 0].max() < ends[:, 1, 0].min():
             return np.nan, ""
         weights = np.array([block.area * block.material.unit_weight for block in blocks])
@@ -464,7 +480,9 @@ class Structure(ResultDisplay):
         for level in np.unique(bottom):
             above = bottom >= level
             arm = np.average(heights[above], weights=weights[above]) - level
-            words = "all of it" if level == ground else f"all above {level - ground:.3g} m"
+            up = level - ground
+            above_level = f"all above {up:.3g} m" if up >= 1.0 else f"all above {format_mm(up)}"
+            words = above_level if up else "all of it"
             pushes[words] = 0.5 * self.width / float(arm)
         if self.heads.any():
             pushes["a strip from bottom to top"] = self.width / float(np.ptp(ends[:, :, 1]))

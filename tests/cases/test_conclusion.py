@@ -3,6 +3,7 @@
 from dataclasses import replace
 from itertools import pairwise
 from types import SimpleNamespace
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -11,12 +12,13 @@ from loose_blocks import BREADTH, HEIGHT, G, overturns, sine
 
 import archfem as af
 from archfem.cases import answers
-from archfem.cases.report import conclusion, doubts, sections
+from archfem.cases.report import conclusion, doubts, report_data, sections
 from archfem.cases.report.report_data import ReportData
 from archfem.cases.result_text import PushFactors, site_acceleration
 from archfem.cases.toml_file import format_tables
 from archfem.dynamics import VerdictRange
 from archfem.dynamics.collapse_state import RANGE_REMEDY
+from archfem.errors import InvalidInput
 from archfem.models.model import Doubt, read_doubts, write_doubts
 from archfem.statics.assessment_checks import UPPER_BOUND
 
@@ -666,7 +668,7 @@ def wall_in_bond(**section):
     return af.Case.of({"structure": structure, **section})
 
 
-def test_a_report_of_a_wall_has_its_falls_across_the_plane_as_one_rigid_body():
+def test_a_report_of_a_wall_has_its_falls_across_the_plane_as_one_rigid_body(monkeypatch):
     """The least half sine of frequency p that overturns it, integrated from impact to impact."""
     edge = 0.33033
     assert overturns(1.0, 1.002 * edge, 1)
@@ -702,6 +704,11 @@ def test_a_report_of_a_wall_has_its_falls_across_the_plane_as_one_rigid_body():
     at = f"{scale} × 'weak', PGA {edge / 1.25 * G / 9.80665:.2f} g: the strip as one rigid body"
     assert f"Across its plane, held by nothing else, it first falls at {at}. From which" in verdict
     assert "acceleration on it falls in its plane was not computed." in verdict
+    # a failure of the columns is a clause, and stops no report
+    data = data_of(data.case, weak=verdict_of())
+    monkeypatch.setattr(report_data, "find_falls_across", Mock(side_effect=InvalidInput("no face")))
+    (text,) = conclusion._build_transverse(data)
+    assert text.text.endswith("; not checked against the motions across: no face.")
     # a column is no wall in bond, and may be drawn across its plane
     column = data_of(af.Case.of({"structure": {"shape": "column", "breadth": 1, "heights": [2]}}))
     assert column.falls_across == {}

@@ -8,7 +8,7 @@ import pytest
 
 import archfem as af
 from archfem.masonry.standing import describe_carried
-from archfem.masonry.structure import find_clear_spans
+from archfem.masonry.structure import find_clear_spans, merge_levels
 
 SQUARE = ((0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (0.0, 1.0))
 
@@ -218,7 +218,7 @@ def test_a_push_across_the_plane_overturns_all_from_the_ground_on():
     assert stand(2).transverse_push == (pytest.approx(0.25 / middle), "all of it")
     # on low and heavy columns the wall overturns alone
     heavy = stand(0.2, unit_weight=1e6, stands_for="ballast")
-    assert heavy.transverse_push == (pytest.approx(0.25 / 0.5), "all above 0.2 m")
+    assert heavy.transverse_push == (pytest.approx(0.25 / 0.5), "all above 200 mm")
     assert "begins to overturn at 0.5 g or less, by the width" in heavy.transverse_remark
     # of a strip of a wall in bond the height counts, of a single stack nothing is known
     column = af.column(breadth=0.5, heights=[2.0, 1.0])
@@ -296,6 +296,31 @@ def test_the_tip_of_a_gable_is_one_block_with_the_course_below_it_across_the_pla
     assert 0.98 < found / (1.5 * thick / height) < 1.0
     # its weight is no load, which would act higher
     assert not describe_carried(whole)
+
+
+def test_a_portal_on_feet_of_uneven_height_turns_across_the_plane_from_the_ground():
+    """Two piers in bond 0.5 mm apart in height, below a lintel, as snapped surveys have them."""
+    blocks = [af.Block(((0, -1), (4, -1), (4, 0.0005), (3, 0.0005), (3, 0), (0, 0)), af.STONE, "g")]
+    blocks[0] = replace(blocks[0], fixed=True)
+    for x, low in ((0, 0.0), (3, 0.0005)):
+        rows = [(low, 1.0, (0, 1)), (1.0, 2.0, (0, 0.5, 1)), (2.0, 3.0, (0, 1))]
+        for y, top, cuts in rows:
+            for a, b in pairwise(cuts):
+                outline = ((x + a, y), (x + b, y), (x + b, top), (x + a, top))
+                blocks.append(af.Block(outline, af.STONE, f"{x} {y} {a}", part="p", role="pier"))
+    lintel = ((0, 3), (4, 3), (4, 4), (0, 4))
+    blocks.append(af.Block(lintel, af.STONE, "lintel", part="p", role="pier"))
+    portal = af.masonry.assembled(blocks, af.Contact(1e9, 4e8), width=0.6)
+    # areas 6 and 4 m², centres at 1.5 and 3.5 m
+    centre = (6 * 1.5 + 4 * 3.5) / 10
+    assert portal.transverse_push == (pytest.approx(0.3 / centre, rel=1e-3), "all of it")
+    columns = af.masonry.columns_across(portal)
+    assert [len(each.free) for each in columns.values()] == [4, 4]
+    assert columns["whole"].weight == pytest.approx(portal.weight)
+    # the beds of thin stones are as far apart as these are high, and remain
+    stones = [(5.0, 0.01), (5.01, 0.02)]
+    ends = np.array([(0.0, 5.0), *((y, y + h) for y, h in stones)])
+    assert merge_levels(ends).tolist() == ends.tolist()
 
 
 def test_a_clear_span_ends_at_the_piers_below_springers():

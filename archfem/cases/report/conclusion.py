@@ -341,6 +341,7 @@ def _build_transverse(data: ReportData) -> list[TextBlock]:
         )
     if data.falls_across:
         text = text.removeprefix("nothing is checked across the plane of the drawing: ")
+    text += data.across_fault
     manner = "doubt" if push < demand else "plain"
     return [TextBlock(sentence(text), manner, lead="Across its plane?")]
 

@@ -24,7 +24,7 @@ from archfem._validation import (
 from archfem.errors import InvalidStructure
 from archfem.masonry.block import Block, Point, as_point, check_points, measure_path
 from archfem.masonry.materials import COURSE_LENGTH, STONE, STONE_TO_STONE, Contact, Material
-from archfem.masonry.structure import Joint, Structure, record_origin
+from archfem.masonry.structure import Joint, Structure, merge_levels, record_origin
 from archfem.units import G, in_degrees
 
 # Weight of a course across the plane, over the median, below which it is one block with the course
@@ -236,8 +236,8 @@ def columns_across(wall: Structure) -> dict[str, Structure]:
     """
     blocks = [wall.blocks[number] for number in wall.free]
     ends = np.array([[block.points.min(axis=0), block.points.max(axis=0)] for block in blocks])
-    low, high = ends[:, 0, 1:], ends[:, 1, 1:]
-    levels, length = np.unique(np.round([low, high], 6)), float(np.ptp(ends[:, :, 0]))
+    merged, length = merge_levels(ends[..., 1]), float(np.ptp(ends[..., 0]))
+    levels, low, high = np.unique(merged), merged[:, :1], merged[:, 1:]
     covered = np.clip(high, levels[:-1], levels[1:]) - np.clip(low, levels[:-1], levels[1:])
     weights = np.array([[block.area * block.material.unit_weight] for block in blocks])
     courses = (weights / (high - low) * covered).sum(axis=0)
