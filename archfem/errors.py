@@ -1,9 +1,12 @@
 """Exception classes, one for each remedy; messages give the value, the reason and the remedy."""
 
 import logging
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
+
+# Where two outlines of a drawing do not fit: kind of the fault, both names, place [m]
+Fault = tuple[str, str, str, tuple[float, float]]
 
 # Receives the warnings of all rooms
 logger = logging.getLogger("archfem")
@@ -48,6 +51,10 @@ class InvalidInput(ArchfemError, ValueError):
 
 class InvalidStructure(ArchfemError, ValueError):
     """Blocks and joints that do not form a structure: correct the geometry."""
+
+    def __init__(self, message: str = "", faults: Sequence[Fault] = ()) -> None:
+        super().__init__(message)
+        self.faults = tuple(faults)
 
 
 class MeshError(ArchfemError):

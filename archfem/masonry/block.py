@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from archfem._typing import Array, Metres, Numbers
 from archfem._validation import check_fields, check_numbers, check_sequence, check_unmasked
-from archfem.errors import InvalidStructure
+from archfem.errors import Fault, InvalidStructure
 from archfem.masonry.materials import Material
 
 
@@ -359,19 +359,32 @@ def check_overlaps(
     pairs, common, depth = _find_overlaps(outlines, body)
     if not np.any(depth > near):
         return
-    worst = int(np.argmax(depth))
-    both, (first, second) = common[worst], pairs[worst]
-    one, other, where = names[first], names[second], place((both.centroid.x, both.centroid.y))
+    deepest = [k for k in np.argsort(-depth).tolist() if depth[k] > near]
+    middles = [(common[k].centroid.x, common[k].centroid.y) for k in deepest]
+    both, (first, second) = common[deepest[0]], pairs[deepest[0]]
+    one, other, where = names[first], names[second], place(middles[0])
     areas = [measure_polygon(outlines[k])[0] for k in (first, second)]
     if both.area > (1.0 - 1e-6) * max(areas):
         raise InvalidStructure(f"'{one}' and '{other}' at {where} are the same: leave one out")
-    count = np.count_nonzero(depth > near)
+    found = [
+        ("overlap", names[pairs[k][0]], names[pairs[k][1]], middle)
+        for k, middle in zip(deepest, middles, strict=True)
+    ]
     raise InvalidStructure(
         f"'{one}' and '{other}' overlap by {1e4 * both.area:.3g} cm², about "
-        f"{1e3 * depth[worst]:.3g} mm deep at {where}"
-        f"{f', the deepest of {count} overlaps' if count > 1 else ''}: correct their outlines"
-        f"{', or leave out the one drawn twice' if both.area > 0.5 * min(areas) else ''}"
+        f"{1e3 * depth[deepest[0]]:.3g} mm deep at {where}"
+        f"{say_others('the deepest', found, place)}: correct their outlines"
+        f"{', or leave out the one drawn twice' if both.area > 0.5 * min(areas) else ''}",
+        found,
     )
+
+
+def say_others(rank: str, found: Sequence[Fault], place: Callable[[Point], str]) -> str:
+    """Say how many faults of a drawing there are beside the first of them, and where."""
+    others = [f"'{a}' and '{b}' at {place(middle)}" for _, a, b, middle in found[1:]]
+    more = f" and {len(others) - 8} more" * (len(others) > 8)
+    listed = f" (also {'; '.join(others[:8])}{more})"
+    return f", {rank} of {len(found)} {found[0][0]}s{listed}" if others else ""
 
 
 def largest_overlap(outlines: Sequence[Array], body: Numbers) -> float:

@@ -9,6 +9,7 @@ import json
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import groupby, pairwise
 from math import dist
 from pathlib import Path
@@ -25,7 +26,14 @@ from archfem._typing import Array, Metres, MetresPerSecondSquared
 from archfem._validation import check_between, validate_arguments
 from archfem.errors import InvalidInput, InvalidStructure, logger
 from archfem.masonry.assembly import Touch, assembled, by_materials, touching
-from archfem.masonry.block import Block, as_point, check_overlaps, check_simple, measure_polygon
+from archfem.masonry.block import (
+    Block,
+    as_point,
+    check_overlaps,
+    check_simple,
+    measure_polygon,
+    say_others,
+)
 from archfem.masonry.materials import (
     CONTACT_PRESETS,
     MATERIAL_PRESETS,
@@ -436,19 +444,41 @@ def _close_gaps(outlines: list[Outline], snap: float) -> Closed:
             "correct the outlines there, leave out vertices that follow one another so closely"
         )
     found = [placed[boundary] for boundary in boundaries]
-    check_overlaps(found, names, place=place)
-    _check_gaps(placed, boundaries, outlines, AMBIGUOUS_GAP_RATIO * snap)
     blocks = [Block(tuple(map(as_point, points)), STONE, "") for points in found]
-    touches = touching(blocks)
-    least = AMBIGUOUS_GAP_RATIO * snap
-    for a, b, (start, end) in touches:
-        if (length := dist(start, end)) <= least:
-            raise InvalidStructure(
-                f"'{names[a]}' and '{names[b]}' touch along {1e3 * length:.3g} mm only at "
-                f"{place(start)}, within {frame.length(least)} = {AMBIGUOUS_GAP_RATIO:g} times "
-                "snap, taken for an error of the survey: draw its end at the corner nearby"
-            )
+    touches, least = touching(blocks), AMBIGUOUS_GAP_RATIO * snap
+    errors = list[InvalidStructure]()
+    for check in (
+        partial(check_overlaps, found, names, place=place),
+        partial(_check_gaps, placed, boundaries, outlines, least),
+        partial(_check_contacts, touches, names, frame, least),
+    ):
+        try:
+            check()
+        except InvalidStructure as error:
+            errors.append(error)
+    if errors:
+        kind = NarrowGap if any(isinstance(x, NarrowGap) for x in errors) else InvalidStructure
+        faults = [fault for error in errors for fault in error.faults]
+        raise kind("; besides, ".join(map(str, errors)), faults)
     return found, float(moved[worst]), touches
+
+
+def _check_contacts(
+    touches: Sequence[Touch], names: Sequence[str], frame: Frame, least: float
+) -> None:
+    """Refuse contacts no longer than a length, of outlines that lie beside one another."""
+    short = [touch for touch in touches if dist(*touch[2]) <= least]
+    found = [("short contact", names[a], names[b], as_point(ends[0])) for a, b, ends in short]
+    if not found:
+        return
+    _, one, other, start = found[0]
+    raise InvalidStructure(
+        f"'{one}' and '{other}' touch along {1e3 * dist(*short[0][2]):.3g} mm only at "
+        f"{frame.place(start)}{say_others('the first', found, frame.place)}, within "
+        f"{frame.length(least)} = {AMBIGUOUS_GAP_RATIO:g} times snap, taken for an error of the "
+        "survey: draw its end at the corner nearby",
+        found,
+    )
 
 
 def _edges(boundaries: Boundaries) -> Iterator[tuple[int, int, int]]:
@@ -580,12 +610,16 @@ def _check_gaps(
                 found[pair] = max(found.get(pair, gap), gap)
     if not found:
         return
-    (width, place), (one, other) = max((gap, sorted(pair)) for pair, gap in found.items())
-    frame = outlines[one].frame
-    more = f", the widest of {len(found)} gaps" if len(found) > 1 else ""
+    gaps = sorted(((gap, sorted(pair)) for pair, gap in found.items()), reverse=True)
+    faults = [
+        ("gap", outlines[one].name, outlines[other].name, as_point(places[place]))
+        for (_, place), (one, other) in gaps
+    ]
+    (_, one_name, other_name, point), frame = faults[0], outlines[0].frame
     raise NarrowGap(
-        f"the faces of '{outlines[one].name}' and '{outlines[other].name}' are "
-        f"{1e3 * width:.3g} mm apart at {frame.place(places[place])}{more}, within "
+        f"the faces of '{one_name}' and '{other_name}' are {1e3 * gaps[0][0][0]:.3g} mm apart at "
+        f"{frame.place(point)}{say_others('the widest', faults, frame.place)}, within "
         f"{frame.length(widest)} = {AMBIGUOUS_GAP_RATIO:g} times snap, taken for an error of the "
-        "survey: draw faces that touch"
+        "survey: draw faces that touch",
+        faults,
     )
