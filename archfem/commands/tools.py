@@ -38,15 +38,15 @@ def check(options: argparse.Namespace) -> int:
     """Check a case; where that fails, draw the drawing that it may have."""
     try:
         return _check_case(options)
-    except ArchfemError:
+    except ArchfemError as error:
         # without drawing, file or place for the picture the error is all
         with suppress(ArchfemError, OSError):
-            if (picture := _draw_as_read(options)) is not None:
+            if (picture := _draw_as_read(options, str(error))) is not None:
                 print(f"wrote {picture}: the drawing as it was read", file=sys.stderr)
         raise
 
 
-def _draw_as_read(options: argparse.Namespace) -> Path | None:
+def _draw_as_read(options: argparse.Namespace, error: str) -> Path | None:
     """Draw the drawing of a case in the current folder; None where it has none."""
     path = Path(options.case)
     given = find_drawing(read_settings(path, options.changes), path.parent)
@@ -55,7 +55,7 @@ def _draw_as_read(options: argparse.Namespace) -> Path | None:
     from archfem.view.sketch import draw_outlines
     from archfem.view.style import save
 
-    return save(draw_outlines(**given), f"{path.stem}_drawing.png")
+    return save(draw_outlines(**given, error=error), f"{path.stem}_drawing.png")
 
 
 def _check_case(options: argparse.Namespace) -> int:

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from archfem._typing import Array, Metres
 from archfem._validation import validate_arguments
 from archfem.masonry.survey.drawings import Outline
-from archfem.masonry.survey.faults import find_faults, sketch_drawing
+from archfem.masonry.survey.faults import CLOSED_BY_SNAP, find_faults, sketch_drawing
 from archfem.view.style import (
     Colour,
     Size,
@@ -24,6 +24,14 @@ from archfem.view.style import (
     white_halo,
 )
 
+FAULT_COLOURS = {
+    "overlap": Colour.HINGE,
+    "gap": Colour.SLIDING,
+    "short contact": Colour.THRUST,
+    "face not joined": Colour.MECHANISM,
+    CLOSED_BY_SNAP: f"{Colour.HINGE}40",
+}
+
 
 @validate_arguments
 def draw_outlines(
@@ -32,18 +40,21 @@ def draw_outlines(
     unit: str | None = None,
     snap: Metres = 1e-3,
     ignored: Collection[str] = (),
+    error: str = "",
 ) -> Figure:
     """Draw the outlines of a drawing by layer, with their names or numbers.
 
-    Overlaps deeper than half of snap are red, gaps between one and five times snap are orange;
-    each has a ring around it. Polylines that are not closed are purple. The coordinates are those
-    of the drawing, y upwards.
+    Overlaps that are errors are red, gaps between one and five times snap are orange, contacts of
+    no more are blue; each has a ring around it. Overlaps that snap closes are pale.
+    Polylines that are not closed are purple. The coordinates are those of the drawing, y upwards.
 
     Args:
         path: drawing, as for `archfem.masonry.read_outlines`.
         unit: unit of the coordinates, as there.
         snap: tolerance of touching outlines, as there [m].
         ignored: layers that are left out.
+        error: message whose stones are marked where outlines fit: green are the nearest faces that
+            they do not touch.
 
     Returns:
         The figure; it needs no outlines that touch.
@@ -68,11 +79,11 @@ def draw_outlines(
         style = {"color": Colour.LOAD, "lw": 1.8, "zorder": 4}
         axes.plot(*line.drawn.T, "o-", ms=5.0, label="not closed", **style)
     counts = [f"{len(closed)} closed outlines"]
-    for kind, colour, found in zip(
-        ("overlap", "gap"), (Colour.HINGE, Colour.SLIDING), find_faults(closed, snap), strict=True
-    ):
-        counts += [f"{len(found)} {kind}{'s' * (len(found) > 1)}"] if found else []
-        _mark_faults(axes, found, kind, colour)
+    found = find_faults(closed, snap, error)
+    for kind, places in found.items():
+        _mark_faults(axes, places, kind)
+    faults = sum(len(places) for kind, places in found.items() if kind != CLOSED_BY_SNAP)
+    counts += [f"{faults} fault{'s' * (faults > 1)}"] if faults else []
     counts += [f"{len(lines)} not closed"] if lines else []
     axes.autoscale_view()
     set_title(axes, f"{Path(path).name} as read: {', '.join(counts)}")
@@ -99,9 +110,13 @@ def _draw_layers(axes: Axes, closed: Sequence[Outline], scale: float) -> None:
         annotate(axes, text, points.mean(axis=0), fontsize=Size.NOTE, **style)
 
 
-def _mark_faults(axes: Axes, faults: Sequence[Array], kind: str, colour: str) -> None:
+def _mark_faults(axes: Axes, faults: Sequence[Array], kind: str) -> None:
     """Fill faults, and draw a ring around each, which may be too narrow to be seen."""
     if not faults:
+        return
+    colour = FAULT_COLOURS[kind]
+    if kind == CLOSED_BY_SNAP:
+        add_polygons(axes, faults, colour, edge=colour, zorder=5, label=f"{kind} ({len(faults)})")
         return
     add_polygons(axes, faults, colour, edge=colour, width=1.5, zorder=5)
     places = np.array([fault.mean(axis=0) for fault in faults])

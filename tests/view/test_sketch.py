@@ -37,6 +37,7 @@ def legend(figure):
         (0.0009, []),  # within snap, which closes it
         (0.0012, ["gap (1)"]),
         (-0.0004, []),
+        (-0.0009, []),  # deeper than half of snap, which closes it nevertheless
         (-0.004, ["overlap (1)"]),
         (-0.3, ["overlap (1)"]),
     ],
@@ -44,7 +45,8 @@ def legend(figure):
 def test_overlaps_and_narrow_gaps_are_marked(tmp_path, gap, said):
     boxes = {"left": (0.0, 1.0), "right": (1.0 + gap, 2.0)}
     figure = draw_outlines(draw(tmp_path / "two.dxf", boxes))
-    assert legend(figure) == ["layer 'left' (1)", "layer 'right' (1)", *said]
+    healed = ["overlap that snap closes (1)"] * (gap == -0.0009)
+    assert legend(figure) == ["layer 'left' (1)", "layer 'right' (1)", *healed, *said]
     axes = figure.axes[0]
     rings = [line for line in axes.lines if line.get_marker() == "o"]
     assert len(rings) == len(said)
@@ -129,6 +131,82 @@ def test_a_failed_check_says_where_the_picture_is(tmp_path, capsys, monkeypatch)
     assert af.commands.main(["check", str(case)]) == 1
     assert "wrote" not in capsys.readouterr().err
     assert not picture.exists()
+
+
+def ring_of(figure, kind):
+    """Places of the rings of a kind of fault."""
+    (line,) = (x for x in figure.axes[0].lines if x.get_label().startswith(kind))
+    return line.get_xydata().tolist()
+
+
+def test_the_picture_marks_what_the_message_names(tmp_path):
+    """A bed 4 mm below the corner beside it, and an overlap of 0.9 mm that snap = 1 mm closes."""
+    stones = [
+        ((0, 0), (1, 0), (1, 1), (0, 1)),
+        ((1, -1), (2, -1), (2, 0.996), (1, 0.996)),
+        ((1, 0.996), (2, 0.996), (2, 2), (1, 2)),
+        ((1.9991, -1), (3, -1), (3, 2), (1.9991, 2)),
+        ((0, 1), (1, 1), (1, 2), (0, 2)),
+    ]
+    drawing = ezdxf.new(units=ezdxf.units.M)
+    for points in stones:
+        drawing.modelspace().add_lwpolyline(points, close=True, dxfattribs={"layer": "wall"})
+    drawing.saveas(path := tmp_path / "short.dxf")
+    with pytest.raises(af.InvalidStructure, match=r"'wall 1' and 'wall 3' touch along 4 mm only"):
+        af.masonry.read_outlines(path)
+    figure = draw_outlines(path)
+    assert legend(figure)[1:] == ["short contact (1)", "overlap that snap closes (2)"]
+    ((x, y),) = ring_of(figure, "short contact")
+    assert x == pytest.approx(1.0)
+    assert 0.996 <= y <= 1.0
+    assert figure.axes[0].get_title() == "short.dxf as read: 5 closed outlines, 1 fault"
+
+
+def test_all_faults_of_a_drawing_are_listed_in_one_pass(tmp_path):
+    """A line, a circle, an open stone, two overlaps of 6 mm and two gaps of 3 mm."""
+    drawing = ezdxf.new(units=ezdxf.units.M)
+    space, layer = drawing.modelspace(), {"dxfattribs": {"layer": "wall"}}
+    space.add_line((0, 0), (1, 0), **layer)
+    space.add_circle((0, 0), 1.0)
+    lefts = [0.0, 1.0, 1.994, 2.988, 3.991, 4.994]
+    for k, x in enumerate([*lefts, 5.994]):
+        right = x + 1.0
+        points = [(x, 0), (right, 0), (right, 1), (x, 1)]
+        space.add_lwpolyline(points, close=k < len(lefts), **layer)
+    drawing.saveas(path := tmp_path / "all.dxf")
+    with pytest.raises(af.InvalidInput) as caught:
+        af.masonry.read_outlines(path, layers={"wall": af.masonry.Layer(part="w", role="pier")})
+    said = str(caught.value)
+    for words in (
+        "layer 'wall' has a LINE beside its polylines",
+        "layer '0' has a CIRCLE, which would be left out",
+        "a polyline at (5.994, 0) on layer 'wall' is not closed",
+        "the deepest of 2 overlaps",
+        "the widest of 2 gaps",
+        *(f"'wall {k}' and 'wall {k + 1}'" for k in (2, 3, 4, 5)),
+    ):
+        assert said.count(words) == 1, words
+    figure = draw_outlines(path)
+    assert legend(figure)[1:] == ["not closed", "overlap (2)", "gap (2)"]
+    places = [2.988 + 0.003, 1.994 + 0.003]
+    assert sorted(x for x, _ in ring_of(figure, "overlap")) == pytest.approx(places[::-1])
+    assert sorted(x for x, _ in ring_of(figure, "gap")) == pytest.approx([3.9895, 4.9925])
+
+
+def test_the_nearest_faces_of_a_stone_without_support_are_marked(tmp_path):
+    """12 mm above the one below, which is no narrow gap; the other stone is 0.5 m away."""
+    drawing = ezdxf.new(units=ezdxf.units.M)
+    for y in (0.0, 1.012, 2.512):
+        points = [(0, y), (1, y), (1, y + 1), (0, y + 1)]
+        drawing.modelspace().add_lwpolyline(points, close=True, dxfattribs={"layer": "pier"})
+    drawing.saveas(path := tmp_path / "loose.dxf")
+    figure = draw_outlines(path, error="no compression in its joints can hold 'pier 2', however")
+    assert legend(figure)[1:] == ["face not joined (1)"]
+    assert ring_of(figure, "face") == [pytest.approx([0.5, 1.0], abs=0.02)]
+    # 0.5 m below the third there is no face: the stone itself is marked
+    figure = draw_outlines(path, error="no compression in its joints can hold 'pier 3', however")
+    assert ring_of(figure, "face")[0][1] == pytest.approx(3.0, abs=0.2)
+    assert legend(draw_outlines(path)) == ["layer 'pier' (3)"]
 
 
 def test_polylines_in_x_and_z_are_drawn_flat(tmp_path):

@@ -9,7 +9,7 @@ import json
 import re
 from cmath import rect
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
@@ -87,21 +87,31 @@ def read_drawing(
     unit: str | None = None,
     ignored: Counter[str] | None = None,
     snap: float = 1e-3,
+    faults: list[str] | None = None,
 ) -> list[Outline]:
     """Read the closed polygons of a drawing; arcs stray by half of snap.
 
     Outlines on the layers that are keys of `ignored` are left out, and counted there; so are those
-    that the drawing hides, under "layer (hidden)".
+    that the drawing hides, under "layer (hidden)". Entities of DXF files that are no outlines are
+    errors, or named in `faults`.
     """
     path, ignored = Path(path), Counter() if ignored is None else ignored
     readers = {".geojson": _read_geojson, ".json": _read_geojson, ".msh": _read_msh}
-    readers |= {".dxf": partial(_read_dxf, snap=snap), ".svg": partial(_read_svg, snap=snap)}
+    strays = list[str]()
+    readers |= {
+        ".dxf": partial(_read_dxf, snap=snap, faults=strays),
+        ".svg": partial(_read_svg, snap=snap),
+    }
     readers[".ifc"] = _read_ifc
     if (read := readers.get(path.suffix.lower())) is None:
         raise InvalidInput(f"{path} is no drawing: give a .geojson, .dxf, .svg, .ifc or .msh file")
     check_file(path, "drawing", max_bytes=2**25)
     try:
         outlines = list(read(path, unit, ignored))
+        if strays and (faults is None or not outlines):
+            raise InvalidInput("; ".join(strays))
+        if faults is not None:
+            faults += strays
         _check_sizes(outlines)
     except InvalidInput as error:
         raise InvalidInput(f"{path}: {error}") from error
@@ -278,25 +288,18 @@ def _check_properties(data: dict[str, Any], name: str) -> None:
 
 
 def _read_dxf(
-    path: Path, unit: str | None, ignored: Counter[str], snap: float
+    path: Path, unit: str | None, ignored: Counter[str], snap: float, faults: list[str]
 ) -> Iterator[Outline]:
-    """Read the closed polylines of a DXF file, named by the texts inside them."""
+    """Read the closed polylines of a DXF file, named by the texts inside them.
+
+    Other things on layers that are read are faults.
+    """
     with _foreign_reader("ezdxf", "DXF drawing"):
         read, stated = load_dxf(path, ignored)
     if len(read) > MAX_ENTITIES:
         raise InvalidInput(f"it has more than {MAX_ENTITIES} entities: leave out other things")
     polylines = [entity for entity in read if entity.kind in POLYLINES]
-    layers = {entity.layer for entity in polylines}
-    others = [each for each in read if each.kind not in (*POLYLINES, *ANNOTATIONS, "INSERT")]
-    if others and not polylines:
-        found = ", ".join(f"{n} {kind}" for kind, n in Counter(x.kind for x in others).items())
-        raise InvalidInput(f"it has no polylines, but {found}: make a closed one of each stone")
-    for kind, layer in ((each.kind, each.layer) for each in others):
-        beside = " beside its polylines" if layer in layers else ", which would be left out"
-        raise InvalidInput(
-            f"layer '{layer}' has a {kind}{beside}: make a closed polyline of each stone, and "
-            "ignore layers of other things"
-        )
+    faults += _find_strays(read, {entity.layer for entity in polylines})
     points = [complex(*point[:2]) for each in polylines for point in each.points]
     corners = np.array([point for point in points if abs(point) < 1e12])  # others are refused
     header = frame = Frame(*stated) if stated else None
@@ -311,7 +314,7 @@ def _read_dxf(
         size = _check_unit(known, frame, SMALLEST_BLOCK if unit is None else 0.02) / frame.factor
         if header and not SMALLEST_BLOCK <= size * header.factor <= LARGEST_BLOCK:
             frame = replace(frame, stated="")
-    outlines = [_read_polyline(entity, frame, snap, corners) for entity in polylines]
+    outlines = [_read_polyline(entity, frame, snap, corners, faults) for entity in polylines]
     texts = []
     for entity in read:
         if text := entity.text:
@@ -323,7 +326,22 @@ def _read_dxf(
     counts = Counter[str]()
     for outline in outlines:
         counts[outline.layer] += 1
-        yield replace(outline, name=_block_name(outline, texts, counts[outline.layer]))
+        if len(outline.points):
+            yield replace(outline, name=_block_name(outline, texts, counts[outline.layer]))
+
+
+def _find_strays(read: Sequence[Entity], layers: Collection[str]) -> Iterator[str]:
+    """Yield what is neither polyline nor annotation, beside layers of polylines, in words."""
+    others = [each for each in read if each.kind not in (*POLYLINES, *ANNOTATIONS, "INSERT")]
+    if others and not layers:
+        found = ", ".join(f"{n} {kind}" for kind, n in Counter(x.kind for x in others).items())
+        raise InvalidInput(f"it has no polylines, but {found}: make a closed one of each stone")
+    for kind, layer in dict.fromkeys((each.kind, each.layer) for each in others):
+        beside = " beside its polylines" if layer in layers else ", which would be left out"
+        yield (
+            f"layer '{layer}' has a {kind}{beside}: make a closed polyline of each stone, and "
+            "ignore layers of other things"
+        )
 
 
 def _draw_arcs(entity: Entity, corners: Array, snap: float) -> list[tuple[float, ...]]:
@@ -356,8 +374,13 @@ def _draw_arcs(entity: Entity, corners: Array, snap: float) -> list[tuple[float,
     return drawn
 
 
-def _read_polyline(entity: Entity, frame: Frame, snap: float, corners: Array) -> Outline:
-    """Return the outline of a closed polyline, whose ends may be apart by the tolerance."""
+def _read_polyline(
+    entity: Entity, frame: Frame, snap: float, corners: Array, faults: list[str]
+) -> Outline:
+    """Return the outline of a closed polyline, whose ends may be apart by the tolerance.
+
+    One that is not closed is a fault, and has no points.
+    """
     given, layer, factor = entity.points, entity.layer, frame.factor
     if not given:
         raise InvalidInput(f"a polyline on layer '{layer}' has no vertices: take it out")
@@ -367,10 +390,11 @@ def _read_polyline(entity: Entity, frame: Frame, snap: float, corners: Array) ->
     _check_coordinates(given, where, factor)
     if not entity.closed:
         if (gap := factor * dist(given[0], given[-1])) > snap:
-            raise InvalidInput(
+            faults.append(
                 f"{where} is not closed, its ends are {1e3 * gap:.3g} mm apart: close the outline "
                 "of a stone; put any other line on a layer with ignore = true"
             )
+            return Outline(np.zeros((0, 2)), where, layer, frame=frame)
         entity = replace(entity, points=given[:-1] if len(given) > 1 else given)
     points = _draw_arcs(entity, corners, snap / factor)
     return Outline(_check_polygon(points, where, factor), where, layer, frame=frame)

@@ -7,7 +7,7 @@ at most `snap` is made straight. Remaining overlaps and narrow gaps are ambiguou
 
 import json
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import groupby, pairwise
@@ -156,7 +156,14 @@ def read_outlines(
     """
     known = layers or {}
     ignored = Counter({name: 0 for name, layer in known.items() if layer.ignore})
-    outlines = read_drawing(path, unit, ignored, snap)
+    faults = list[str]()
+    outlines = read_drawing(path, unit, ignored, snap, faults)
+    if faults:
+        try:
+            _close_or_advise(outlines, snap)
+        except (InvalidInput, InvalidStructure) as error:
+            faults.append(f"besides, {error}")
+        raise InvalidInput(f"{path}: {'; '.join(faults)}")
     if layers is not None:
         _check_layers(outlines, layers, path, ignored)
     try:
@@ -367,7 +374,7 @@ def _close_or_advise(outlines: list[Outline], snap: float) -> Closed:
     for outline in outlines:
         check_simple(outline.points, outline.name, outline.frame.place)
     try:
-        return _close_gaps(outlines, snap)
+        return close_gaps(outlines, snap)
     except InvalidStructure as error:
         advice, is_gap = str(error), isinstance(error, NarrowGap)
     # a tolerance above a tenth of the smallest stone would distort it
@@ -407,13 +414,13 @@ def _question_unit(frame: Frame) -> str:
 def _closes_all(outlines: list[Outline], snap: float) -> bool:
     """Return whether a tolerance leaves no error, and no outline without a contact."""
     try:
-        touches = _close_gaps(outlines, snap)[2]
+        touches = close_gaps(outlines, snap)[2]
     except InvalidStructure:
         return False
     return len({number for touch in touches for number in touch[:2]}) == len(outlines)
 
 
-def _close_gaps(outlines: list[Outline], snap: float) -> Closed:
+def close_gaps(outlines: list[Outline], snap: float) -> Closed:
     """Close the gaps between outlines; refuse gaps that remain ambiguous."""
     names, frame = [outline.name for outline in outlines], outlines[0].frame
     place, near = frame.place, frame.length(snap)
@@ -446,12 +453,18 @@ def _close_gaps(outlines: list[Outline], snap: float) -> Closed:
     found = [placed[boundary] for boundary in boundaries]
     blocks = [Block(tuple(map(as_point, points)), STONE, "") for points in found]
     touches, least = touching(blocks), AMBIGUOUS_GAP_RATIO * snap
-    errors = list[InvalidStructure]()
-    for check in (
+    _run_checks(
         partial(check_overlaps, found, names, place=place),
         partial(_check_gaps, placed, boundaries, outlines, least),
         partial(_check_contacts, touches, names, frame, least),
-    ):
+    )
+    return found, float(moved[worst]), touches
+
+
+def _run_checks(*checks: Callable[[], None]) -> None:
+    """Run independent checks, and raise the errors of all in one."""
+    errors = list[InvalidStructure]()
+    for check in checks:
         try:
             check()
         except InvalidStructure as error:
@@ -460,7 +473,6 @@ def _close_gaps(outlines: list[Outline], snap: float) -> Closed:
         kind = NarrowGap if any(isinstance(x, NarrowGap) for x in errors) else InvalidStructure
         faults = [fault for error in errors for fault in error.faults]
         raise kind("; besides, ".join(map(str, errors)), faults)
-    return found, float(moved[worst]), touches
 
 
 def _check_contacts(
