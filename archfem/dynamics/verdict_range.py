@@ -172,29 +172,42 @@ class VerdictRange(ResultDisplay):
 
     @property
     def displacement_ends(self) -> str:
-        """Range of the largest displacements of the runs that do not fall; empty without such."""
-        sizes = self.answers["displacement"].values[~self.falls[self.answered]]
+        """Range of the largest displacements of the runs that do not fall; empty without such.
+
+        Runs with rigid joints are apart where these alone hardly move.
+        """
+        sizes, apart = self._held_displacements
         if not np.isfinite(sizes).any():
             return ""
+        others = ""
+        if apart.any():
+            ends = " to ".join(format_mm(x) for x in (sizes[apart].min(), sizes[apart].max()))
+            others, sizes = f"; with rigid joints {ends}", sizes[~apart]
         least, usual, largest = np.quantile(sizes, (0.0, 0.95, 1.0), method="inverted_cdf")
         ends = f"{format_mm(least)} to {format_mm(largest)}"
-        return f"{ends}, in 95 % of {len(sizes)} runs {format_mm(usual)} or less"
+        return f"{ends}, in 95 % of {len(sizes)} runs {format_mm(usual)} or less{others}"
+
+    @property
+    def _held_displacements(self) -> tuple[Array, NDArray[np.bool_]]:
+        """Displacements of the runs that do not fall, and whether it hardly moves as rigid ones."""
+        held = self.answers.isel(run=np.flatnonzero(~self.falls[self.answered]))
+        sizes = held["displacement"].values
+        hardly = sizes < sizes.max(initial=0.0) / 100
+        alike = "joint_rule" in held and bool((held["joint_rule"].values[hardly] == "rigid").all())
+        return sizes, hardly & alike
 
     @property
     def displacements(self) -> str:
         """Range of the largest displacements, with the number of runs that hardly move."""
         if not self.displacement_ends:
             return ""
-        text, rows = f"largest displacements {self.displacement_ends}", self.answers
-        sizes = rows["displacement"].values[~self.falls[self.answered]]
-        hardly = sizes < sizes.max() / 100
+        text = f"largest displacements {self.displacement_ends}"
+        sizes, apart = self._held_displacements
         # runs that rest, as under a joint rule without a mechanism, say little of the others
-        if not hardly.any():
+        hardly = (sizes < sizes.max() / 100).sum()
+        if not hardly or apart.any():
             return text
-        small = rows.isel(run=np.flatnonzero(~self.falls[self.answered])[hardly])
-        alike = "joint_rule" in small and bool((small["joint_rule"] == "rigid").all())
-        which = " with rigid joints" * alike
-        return f"{text}; {hardly.sum()} of them{which} moved by less than 1 % of the largest"
+        return f"{text}; {hardly} of them moved by less than 1 % of the largest"
 
     @property
     def single_changes(self) -> "list[SingleChange]":
@@ -255,7 +268,9 @@ class VerdictRange(ResultDisplay):
     def unanswered(self) -> str:
         """How many runs have no answer, for the end of a sentence; empty if all have one."""
         missing = int((~self.answered).sum())
-        return f"; {missing} of {len(self.answered)} have no answer" if missing else ""
+        reason = next((error for error in self.dataset["error"].values if error), "")
+        first = f", the first: {reason:.300}" * bool(reason)
+        return f"; {missing} of {len(self.answered)} have no answer{first}" if missing else ""
 
     @property
     def sentence(self) -> str:

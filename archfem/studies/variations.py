@@ -206,7 +206,8 @@ def doubt_steps_of_sliding(
         Doubt(
             f"in {{}} of {len(admissible)} {runs} the steps, {1e3 * dt:g} ms{half}, are long for "
             "sliding",
-            f"take {1e3 * min(steps):g} ms or less, `--set analysis.dt={min(steps):g}`",
+            f"take {1e3 * min(steps):g} ms or less, `--set analysis.dt={min(steps):g}`"
+            f"{'; without dt, a single run varies its steps, and has no such doubt' * bool(half)}",
             (len(steps),),
         )
     ]

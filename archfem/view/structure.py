@@ -355,7 +355,7 @@ def draw_names(structure: Structure) -> Figure:
     are too near to one another on a page, every second or third; long names are numbered. The name
     of a ring stands above it, or in its opening below a deck, that of another part below: "5" in
     "main arch" is "main arch, joint 5". The stones of a wall in bond are numbered instead, as in
-    `structure.blocks`.
+    `structure.blocks`, by "#5" where joints of other parts have numbers.
 
     Args:
         structure: the structure.
@@ -376,9 +376,11 @@ def draw_names(structure: Structure) -> Figure:
         axes.plot(*joint.ends.T, color=Colour.SLIDING, lw=1.0, zorder=4)
     heads = zip(structure.joints, structure.heads, strict=True)
     walls = {joint.part for joint, head in heads if head}
-    for part in dict.fromkeys(joint.part for joint in shown):
+    parts = dict.fromkeys(joint.part for joint in shown)
+    sign = "#" * (not walls.issuperset(parts))  # beside numbers of joints
+    for part in parts:
         if part in walls:
-            _number_stones(axes, structure, part, inch)
+            _number_stones(axes, structure, part, inch, sign)
         else:
             top = max(block.points[:, 1].max() for block in structure.blocks)
             _name_part(axes, [joint for joint in shown if joint.part == part], inch, float(top))
@@ -387,7 +389,7 @@ def draw_names(structure: Structure) -> Figure:
     if walls:
         number = structure.joints[len(structure.joints) // 2].blocks[1]
         stone = structure.blocks[number].name
-        title = f"{structure.name}: numbers of stones; {number} is '{stone}'"
+        title = f"{structure.name}: numbers of stones; {sign}{number} is '{stone}'"
     set_title(axes, title)
     numbers = [] if walls else list_numbers(structure)
     note = "; ".join(filter(None, [structure.assessment, *numbers]))
@@ -395,12 +397,12 @@ def draw_names(structure: Structure) -> Figure:
     return cast(Figure, axes.figure)
 
 
-def _number_stones(axes: Axes, structure: Structure, part: str, inch: float) -> None:
+def _number_stones(axes: Axes, structure: Structure, part: str, inch: float, sign: str) -> None:
     """Write the numbers of a wall's stones, as many as fit in legible type."""
     numbers = [k for k in structure.free if structure.blocks[k].part == part]
     boxes = np.array([np.ptp(structure.blocks[k].outline, axis=0) for k in numbers])
     # figures, without descenders, take 0.8 of the height, and 0.7 of their size with the space
-    sizes = np.minimum(0.8 * boxes[:, 1], boxes[:, 0] / (0.7 * len(str(numbers[-1]))))
+    sizes = np.minimum(0.8 * boxes[:, 1], boxes[:, 0] / (0.7 * len(f"{sign}{numbers[-1]}")))
     room = (points := 72.0 * sizes / inch) >= Size.NOTE
     if room.mean() > 0.5:  # smaller stones, as at a slope, have no number
         numbers, points = np.array(numbers)[room].tolist(), points[room]
@@ -409,7 +411,7 @@ def _number_stones(axes: Axes, structure: Structure, part: str, inch: float) -> 
     style: dict[str, Any] = {"ha": "center", "va": "center", "zorder": 8, "color": Colour.TEXT}
     style["fontsize"] = Size.NOTE
     for number in numbers[::every]:
-        annotate(axes, str(number), structure.centroids[number], (0.0, 0.0), **style)
+        annotate(axes, f"{sign}{number}", structure.centroids[number], (0.0, 0.0), **style)
 
 
 def _name_part(axes: Axes, joints: Sequence[Joint], inch: float, top: float) -> None:

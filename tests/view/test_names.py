@@ -130,6 +130,23 @@ def test_stones_of_a_wall_in_bond_are_numbered():
     assert "numbers of stones" in title.replace("\n", " ")
 
 
+def test_numbers_of_stones_beside_those_of_joints_are_marked():
+    """A column beside a wall in bond, whose joints are named 0, 1 and so on."""
+    wall = bonded()
+    stones = [
+        af.Block(((3.5, k), (3.9, k), (3.9, k + 1), (3.5, k + 1)), af.STONE, f"c{k}", part="c")
+        for k in range(2)
+    ]
+    stones = [replace(stone, role="pier") for stone in stones]
+    both = af.masonry.assembled([*wall.blocks, *stones], af.Contact(1.48e9, 0.3e9, friction=0.6))
+    figure = draw_names(both)
+    words = [word for word, _ in written(figure)]
+    marked = [word for word in words if word.startswith("#")]
+    assert marked == [f"#{k}" for k in wall.free]
+    assert len({*words}) == len(words)
+    assert "; #" in figure.axes[0].get_title()
+
+
 def test_small_stones_at_a_slope_have_no_number_and_all_others_do():
     wall = bonded(courses=6)
     tips = [
