@@ -117,15 +117,7 @@ def _say_plainly(data: ReportData, doubtful: Sequence[str]) -> Iterator[str]:
     """Yield the answer for a client: whether it survives, from where on not, and what decides."""
     if data.runs:
         yield from _say_survival(data, doubtful)
-        across = sorted(_say_across(data))[:1]
-        plane = "in its plane " * bool(across)
-        for scale, at, body in across:
-            falls = f"{'first ' * (scale > 1.0)}falls at {at}: {body} as one rigid body"
-            yield f"across its plane, held by nothing else, it {falls}"
-        if failures := [words for words, _ in find_first_failures(data)]:
-            yield f"{plane}it {join_words(failures[::-1])}"  # the least first
-        elif "scale" not in data.statements and all(scale > 1.0 for scale, *_ in across):
-            yield f"from which acceleration on it falls {plane}was not computed"
+        yield from _say_first_failures(data)
         yield from say_fragile(data)
         yield _say_what_decides(data.verdict_ranges)
     for found in dict.fromkeys(_judge_checks(data)):  # of each direction
@@ -142,6 +134,19 @@ def _say_plainly(data: ReportData, doubtful: Sequence[str]) -> Iterator[str]:
         push, demand = data.case.structure.transverse_push[0], _largest_demand(data)
         falls = f", where it may overturn from {push:.3g} g on" * (push < demand)
         yield f"across the plane of the drawing it was not checked{falls}"
+
+
+def _say_first_failures(data: ReportData) -> Iterator[str]:
+    """Yield where it first fails: across its plane as one rigid body, and in its plane."""
+    across = sorted(_say_across(data))[:1]
+    plane = "in its plane " * bool(across)
+    for scale, at, body in across:
+        falls = f"{'first ' * (scale > 1.0)}falls at {at}: {body} as one rigid body"
+        yield f"across its plane, held by nothing else, it {falls}"
+    if failures := [words for words, _ in find_first_failures(data)]:
+        yield f"{plane}it {join_words(failures[::-1])}"  # the least first
+    elif "scale" not in data.statements and all(scale > 1.0 for scale, *_ in across):
+        yield f"from which acceleration on it falls {plane}was not computed"
 
 
 def _say_pushes(data: ReportData, name: str, stated: Statement) -> Iterator[str]:
