@@ -468,12 +468,10 @@ class CollapseScale:
         if self.dislocated < inf:
             met = f"dislocated at {self.dislocated:#.3g} ×, {met}"
         if self.moves <= max(self._stood):
-            less = " or less" * self.moves_in_all
-            met = f"a mechanism at {self.moves:#.3g} ×{less}, {met}"
+            met = f"a mechanism at {self.moves:#.3g} ×{' or less' * self.moves_in_all}, {met}"
         said, one = _say_bracket("stands", self, met), describe_first_fall(self.as_one)
-        if self.as_one and self.as_one.scale <= self.held:  # the worse of both first
-            return f"{one.removeprefix('; ')}; in courses it {said}"
-        return f"{said}{one}"
+        worse = self.as_one is not None and self.as_one.scale <= self.held
+        return f"{one.removeprefix('; ')}; in courses it {said}" if worse else f"{said}{one}"
 
     def __repr__(self) -> str:
         """Return the sentence, how closely scales were run, and what was varied."""
