@@ -329,12 +329,13 @@ class RunMonitor:
         # of "backfill: full, rest: rigid" too
         coarse = any(name in self.model.fidelity for name in ("rigid", "faces"))
         coarser = "" if coarse else ", fidelity 'faces' or 'rigid' for stones"
+        fill = "; hold the fill's ends by sidewalls; or cut it with jointed_fill"
+        fill = "" if any(block.grain for block in self.model.structure.blocks) else fill
         doubt = Doubt(
             "by t = {:.4g} s the faces of '{}' had slid by {:.2g} of a facet, though they are "
             "paired as meshed",
             "take fewer cells, down to cells=(1, 1) of cell='triangle', one facet on each stone "
-            f"that is not slender{coarser}; hold the fill's ends by sidewalls; or cut it with "
-            "jointed_fill",
+            f"that is not slender{coarser}{fill}",
             (time, name, slip),
         )
         if slip > 1.0:

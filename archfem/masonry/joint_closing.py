@@ -391,12 +391,20 @@ def finish_range(structure: Structure, joint: Joint, finish: str) -> JointStiffn
 
 def describe_closing(structure: Structure) -> str:
     """Say in one sentence how joints of stones close, which decides whether thin arches fall."""
-    texts: dict[str, list[str]] = {}
-    for joint in structure.joints:
-        if _weaker_stone(structure, joint) is not None:
-            words = _describe_law(joint.contact, find_finish(structure, joint))
-            names = texts.setdefault(words, [])
-            names += [] if joint.contact.name in names else [joint.contact.name]
+    texts, linear = dict[str, list[str]](), dict[str, list[float]]()
+    joints = [each for each in structure.joints if _weaker_stone(structure, each) is not None]
+    for joint in joints:
+        contact, finish = joint.contact, find_finish(structure, joint)
+        if contact.law is None and contact.closure is None and not finish:
+            # pieces of a fill have a stiffness for each size of two neighbours
+            linear.setdefault(contact.name, []).append(contact.normal_stiffness / GPa)
+            continue
+        words = _describe_law(contact, finish)
+        names = texts.setdefault(words, [])
+        names += [] if contact.name in names else [contact.name]
+    for name, values in linear.items():
+        ends = dict.fromkeys(f"{each:.3g}" for each in (min(values), max(values)))
+        texts.setdefault(f"linearly with {' to '.join(ends)} MPa/mm", []).append(name)
     if len(texts) == 1:
         return f"joints close {next(iter(texts))}"
     laws = [f"'{join_names(names)}' {words}" for words, names in texts.items()]
@@ -409,7 +417,7 @@ def _describe_law(contact: Contact, finish: str | None) -> str:
         return "by a law of the user"
     stiffness = f"{contact.normal_stiffness / GPa:.3g} MPa/mm"
     if contact.closure is None:
-        return f"linearly with {stiffness}{', of a bed of mortar' if finish else ''}"
+        return f"linearly with {stiffness}, of a bed of mortar"
     law = f"the law of {finish} faces" if finish else "a law that stiffens"
     return f"by {law} ({stiffness} at first, {contact.closure / mm:.2g} mm at most)"
 

@@ -116,8 +116,15 @@ class StandingBody:
         """
         feet, mass = self.feet, self.centre_of_gravity
         places, lengths = feet.mean(axis=1), np.ptp(feet, axis=1)
-        tops = [block.top(x) for block in structure.blocks for x in places]
-        if not (tops := [top for top in tops if top is not None]):
+        below = [[block.top(x) for block in structure.blocks] for x in places]
+        tops = [top for each in below for top in each if top is not None]
+        beyond = [x for x, each in zip(places, below, strict=True) if each.count(None) == len(each)]
+        if tops and beyond:
+            raise InvalidInput(
+                f"'{self.name}': its axle at x = {beyond[0]:.4g} m is beyond the structure: give "
+                "only the axles on the bridge, with their spacings and x halfway between them"
+            )
+        if not tops:
             raise InvalidInput(
                 f"'{self.name}' stands at x = {self.x:.4g} m beside the structure: move it onto a "
                 "block"

@@ -963,6 +963,16 @@ def test_the_weight_of_a_fill_is_stated_as_given_and_with_spandrels(spandrels):
     assert rows["backfill: weight"] == (f"18 kN/m³{mixed}", "given")
 
 
+def test_the_modulus_of_a_fill_in_pieces_is_stated_as_given():
+    """Pieces are a thousand times stiffer, and their joints have the compliance."""
+    text = BRIDGE + '[structure.fill]\nlaw = "jointed"\nfriction_angle = 35.0\npiece_size = 1.0\n'
+    text += '[materials]\nbackfill = { young = "20 MPa" }\n'
+    data = report_data.ReportData(af.Case.of(tomllib.loads(text)), {})
+    rows = {row[0]: row[1:] for row in tabulate_inputs(data).rows}
+    assert rows["backfill: E"] == ("20 MPa", "given")
+    assert rows["backfill: E of its pieces"] == ("20 GPa", "inferred")
+
+
 def test_of_a_pier_the_foundation_is_fixed():
     text = BRIDGE.replace("[structure.sidewalls]", PIER + "[structure.sidewalls]")
     data = report_data.ReportData(af.Case.of(tomllib.loads(text)), {})

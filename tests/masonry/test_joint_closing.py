@@ -264,3 +264,7 @@ def test_the_law_of_joints_is_described_in_a_sentence():
     bed = describe_closing(af.masonry.with_finish(wall, "mortar"))
     assert bed == "joints close linearly with 31.6 MPa/mm, of a bed of mortar"
     assert describe_closing(wall_of(af.masonry.BACKFILL)) == ""
+    # of pieces each pair has its own stiffness
+    half = replace(wall.joints[0].contact, normal_stiffness=0.74e9)
+    uneven = replace(wall, joints=(replace(wall.joints[0], contact=half), *wall.joints[1:]))
+    assert describe_closing(uneven) == "joints close linearly with 0.74 to 1.48 MPa/mm"

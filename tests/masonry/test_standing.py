@@ -298,3 +298,14 @@ def test_a_body_that_slides_has_a_line_of_its_own_and_the_structure_stands():
     largest = 1e3 * run.dataset["largest_displacement"].values[at]
     said = f"'box', which stands on it, was displaced by up to {largest:.3g} mm, "
     assert said in str(run.verdict)
+
+
+def test_an_axle_beyond_the_end_of_a_bridge_is_named_with_its_place():
+    bridge = arch_bridge(width=2.0)
+    end = max(x for block in bridge.blocks for x, _ in block.points)
+    axles = {"axles": [90e3, 90e3, 70e3], "spacings": [1.0, 2.0], "width": 2.0}
+    lorry = StandingBody(x=end - 1.0, length=0.3, centre_of_gravity=1.2, name="lorry", **axles)
+    # halfway between axles 3 m apart is 1.5 m before the last
+    said = f"its axle at x = {end + 0.5:.4g} m is beyond the structure: give only the axles on"
+    with pytest.raises(af.errors.InvalidInput, match=said):
+        carrying(bridge, [lorry])

@@ -69,6 +69,7 @@ _SOURCES = {
 }
 
 _WEIGHT = DECIDING_VALUES["materials"]["unit_weight"][0]
+_YOUNG = DECIDING_VALUES["materials"]["young"][0]
 
 # Properties that may be left out: name in texts, and unit
 _FURTHER_PROPERTIES = {
@@ -183,7 +184,7 @@ def _property_rows(data: ReportData) -> Iterator[Row]:
     """Yield the values of materials and contacts, equal ones once."""
     groups = dict[Any, list[tuple[Material | Contact, list[Row]]]]()
     for item in list_materials_and_contacts(data.case):
-        rows, load = [*_list_properties(data, item)], getattr(item, "stands_for", None)
+        rows, load = [*_list_given(data, item)], getattr(item, "stands_for", None)
         # what carries more than itself may differ in weight alone from its neighbour
         same = tuple(row for row in rows if load is None or row[0] != _WEIGHT)
         groups.setdefault((type(item), load, same), []).append((item, rows))
@@ -198,6 +199,18 @@ def _property_rows(data: ReportData) -> Iterator[Row]:
                 ends = [value_text("materials", "unit_weight", x) for x in sorted(weights)]
                 text = " to ".join(dict.fromkeys([ends[0], ends[-1]]))
             yield f"{name}: {word}", text, mark
+
+
+def _list_given(data: ReportData, item: Material | Contact) -> Iterator[Row]:
+    """Yield the values of a material or contact; stiffer ones of pieces of fill are inferred."""
+    _, given = find_table(data.case.settings, item)
+    for word, text, mark in _list_properties(data, item):
+        if word == _YOUNG and mark == "given":
+            own = value_text("materials", "young", in_unit(given["young"], "Pa", "young"))
+            if own != text:  # the compliance of pieces is in their joints
+                yield word, own, mark
+                word, mark = f"{word} of its pieces", "inferred"
+        yield word, text, mark
 
 
 def _list_properties(data: ReportData, item: Material | Contact) -> Iterator[Row]:
