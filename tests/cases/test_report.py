@@ -540,7 +540,7 @@ def test_every_input_has_its_mark():
     }
     rows = tabulate_inputs(report_data.ReportData(af.Case.of(tables), {})).rows
     marks = {name: (value, mark) for name, value, mark in rows}
-    assert {mark for _, mark in marks.values()} == {"given", "default", "inferred"}
+    assert {mark for _, mark in marks.values()} == {"given", "default"}
     expected = {
         "breadth": ("1 m", "given"),
         "gravity": ("9.81 m/s²", "default"),
