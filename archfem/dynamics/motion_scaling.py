@@ -778,6 +778,5 @@ def collapse_scale(
         steps = [shorter, 0.5 * shorter]
         searches = _search_steps(search, steps)
     largest = max([limits[0], *(run.scale for x in searches.values() for run in x.runs)])
-    as_one = find_first_fall(begin.model.structure, motion, (limits[0], largest))
-    of_model = doubt_soft_blocks(begin.model.structure)
-    return CollapseScale(searches, motion.pga, of_model, longer, as_one)
+    as_one = find_first_fall(model.structure, motion, (limits[0], largest))
+    return CollapseScale(searches, motion.pga, doubt_soft_blocks(model.structure), longer, as_one)
