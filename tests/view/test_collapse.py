@@ -120,7 +120,8 @@ def test_an_assessment_shows_moved_blocks_curve_and_demand(coarse_ring):
     lines, check = lines_of(right), found.displacement
     curve = lines["capacity a*(d*), FC = 1.2"]
     np.testing.assert_allclose(curve[0], [0.0, found.a_0_star / 1.2])
-    np.testing.assert_allclose(curve[-1], [found.d_0_star, 0.0], atol=1e-12)
+    last = lines.get("the same, an upper bound", curve)[-1]
+    np.testing.assert_allclose(last, [found.d_0_star, 0.0], atol=1e-12)
     point = lines[f"demand {check.demand:.3f} m"][0]
     np.testing.assert_allclose(
         point, [check.demand, check.demand * (2 * np.pi / check.period) ** 2]
@@ -130,6 +131,13 @@ def test_an_assessment_shows_moved_blocks_curve_and_demand(coarse_ring):
     title = right.get_title().replace("\n", " ")
     assert title.endswith(f"ratio {rest:.2f}, at which it begins to move")
     figure.draw_without_rendering()
+    # what is an upper bound is dotted
+    bounded = replace(found, curve=found.curve.assign_attrs(holds=3))
+    drawn = lines_of(draw_kinematic_assessment(bounded).axes[1])
+    dotted = drawn["the same, an upper bound"]
+    assert len(drawn["capacity a*(d*), FC = 1.2"]) == 4
+    assert dotted[0][0] == pytest.approx(found.curve["d"].values[3])
+    np.testing.assert_allclose(dotted[-1], [found.d_0_star, 0.0], atol=1e-12)
     # the name of a structure may be wider than the panel
     assert left.get_title() == f"(a) alpha_0 = {found.alpha_0:.3f}, e* = {found.e_star:.2f}"
     piers = af.arch_on_piers(radius=3, thickness=0.6, voussoirs=7, pier_breadth=1.2, courses=[1.5])
