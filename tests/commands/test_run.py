@@ -348,7 +348,7 @@ def test_scales_of_the_pairs_of_a_suite_stand_side_by_side(searched, tmp_path, c
     least = f"The least margin is {factors['strong']} on 'strong', PGA "
     assert least in words
     assert (
-        ", of 2 motions. Of the scales that were run it first moves as a mechanism at "
+        ", of 2 motions. Of the scales that were run it first moves as a verified mechanism at "
         in words.partition(least)[2]
     )
     assert " 'middle' was not scaled." in words
