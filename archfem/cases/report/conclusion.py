@@ -11,9 +11,9 @@ from archfem._files import group_of, read_file_list
 from archfem.cases import result_text
 from archfem.cases.answers import RESULTS, Ratios, Row, Statement, read_numbers
 from archfem.cases.case import REPORT_KEYS
+from archfem.cases.report.demands import find_largest_demand, name_spectrum, tabulate_demands
 from archfem.cases.report.doubts import (
     HISTORIES,
-    MAX_RATIO_OF_PEAKS,
     VARIATIONS,
     list_checks,
     list_decisive_doubts,
@@ -24,7 +24,6 @@ from archfem.cases.report.doubts import (
     list_unvaried,
     object_to_motions,
     peak_of_ground,
-    read_spectrum,
 )
 from archfem.cases.report.motion_rules import check_motions
 from archfem.cases.report.report_data import SHOWN_RESULTS, ReportData
@@ -131,7 +130,7 @@ def _say_plainly(data: ReportData, doubtful: Sequence[str]) -> Iterator[str]:
                 times = f", at {row.factor} times {row.demand}"
                 yield f"{row.result}: {row.outcome}{times * (name != 'risk' and row.factor != '-')}"
     if not data.falls_across and _build_transverse(data):
-        push, demand = data.case.structure.transverse_push[0], _largest_demand(data)
+        push, demand = data.case.structure.transverse_push[0], find_largest_demand(data)
         falls = f", where it may overturn from {push:.3g} g on" * (push < demand)
         yield f"across the plane of the drawing it was not checked{falls}"
 
@@ -277,7 +276,7 @@ def build_conclusion(data: ReportData) -> Section:
         fails = row.numbers.get("most", 1.0) < 1.0
         in_doubt = " (in doubt)" * (result in (decisive if fails else doubtful))
         rows.append((*row[:2], f"{row.outcome}{in_doubt}", row.factor))
-    blocks: list[Any] = _tabulate_demands(data)
+    blocks: list[Any] = tabulate_demands(data)
     for lead, texts in _build_paragraphs(data, decisive).items():
         sentences = [*map(sentence, texts)]
         if data.statements.keys() != {"rating"}:  # of a result that stands alone each is one
@@ -302,44 +301,12 @@ def build_conclusion(data: ReportData) -> Section:
     return Section("Conclusion", [*blocks, _build_signatures(data.case.report)])
 
 
-def _list_demands(data: ReportData) -> Iterator[tuple[str, Ends, str, list[str]]]:
-    """Yield each demand of an earthquake: name, peaks [g], source in the case, and results."""
-    case, limit = data.case, data.case.limit.demand
-    pushes = [RESULTS[name] for name in ("limit", "pushover") if name in data.statements]
-    if data.runs:
-        vertical = max(np.abs(x.dataset["ground"][:, 1]).max().item() for x in data.runs.values())
-        vertical /= STANDARD_GRAVITY
-        also = f", with vertical ones of up to {vertical:.2g} g" * bool(vertical)
-        peaks, source = map(peak_of_ground, data.runs.values()), "[suite]"
-        used = ["time histories, and what varies or scales them"]
-        yield f"motions{also}", Ends.of(peaks), source if case.suite else "[motion]", used
-    if limit is not None:
-        yield "push", Ends.of([limit / STANDARD_GRAVITY]), "[limit]", pushes
-        pushes = []
-    if np.isfinite(spectrum := peak_of_spectrum(case)):
-        source = "[assessment]" if case.assessment.spectrum else "[suite], its target"
-        used = [*[RESULTS["assessment"]] * ("assessment" in data.statements), *pushes]
-        yield f"{read_spectrum(data)['code']} spectrum", Ends.of([spectrum]), source, used
-
-
-def _tabulate_demands(data: ReportData) -> list[Grid]:
-    """Tabulate the demands with their sources; none where the capacities have a single one."""
-    found, text = [each for each in _list_demands(data) if each[-1]], data.case.report.get("demand")
-    rows = [("as stated", text, "[report]", "none, for words are not compared")] if text else []
-    rows += [(name, f"PGA {p:.3g} g", source, join_words(x)) for name, p, source, x in found]
-    peaks = [peak for _, ends, *_ in found for peak in ends]
-    differ = bool(peaks) and max(peaks) > MAX_RATIO_OF_PEAKS * min(peaks)
-    caption = "Demands of an earthquake" + "; a margin on one is none on another" * differ
-    head = ("demand", "horizontal", "source in the case", "of which results")
-    return [Grid(head, rows, caption, "words")] if rows[1:] or text else []
-
-
 def _build_transverse(data: ReportData) -> list[TextBlock]:
     """Build the paragraph on what is not checked across the plane, for results of earthquakes."""
     if not data.runs and not data.statements.keys() - {"rating", "thickness"}:
         return []
     text, (push, _) = data.case.structure.transverse_remark, data.case.structure.transverse_push
-    demand = _largest_demand(data)
+    demand = find_largest_demand(data)
     if push < demand:
         text += (
             f"; the largest demand, {demand:.3g} g, exceeds it ({format_ratio(demand / push)} ×)"
@@ -349,11 +316,6 @@ def _build_transverse(data: ReportData) -> list[TextBlock]:
     text += data.across_fault
     manner = "doubt" if push < demand else "plain"
     return [TextBlock(sentence(text), manner, lead="Across its plane?")]
-
-
-def _largest_demand(data: ReportData) -> float:
-    """Return the largest peak acceleration of all demands [g]; 0 without any."""
-    return max((ends[-1] for _, ends, *_ in _list_demands(data)), default=0.0)
 
 
 def _list_outdated(data: ReportData) -> Iterator[str]:
@@ -516,14 +478,6 @@ def _say_motion(data: ReportData, factor: float, site: float) -> str:
     held = all(verdict.outcome in COLLAPSE_STATES[:2] for verdict in verdicts)
     of = f" of up to {push:.2f} g" * (len(runs) < len(data.runs))
     return f"in the runs{of} it moves{', and falls in none' * held}"
-
-
-def name_spectrum(data: ReportData) -> str:
-    """Name the demand of kinematic assessments, with its peak acceleration."""
-    code = read_spectrum(data).get("code")
-    if code is None:
-        return "the spectrum of the motion"
-    return f"the {code} spectrum of PGA {peak_of_spectrum(data.case):.3g} g"
 
 
 def _build_signatures(report: Mapping[str, str]) -> Grid:

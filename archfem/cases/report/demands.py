@@ -1,0 +1,59 @@
+"""Demands of an earthquake on a structure: motions, pushes and spectra, with their sources."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from archfem.cases.answers import RESULTS
+from archfem.cases.report.doubts import MAX_RATIO_OF_PEAKS, peak_of_ground, read_spectrum
+from archfem.cases.report.report_data import ReportData
+from archfem.cases.result_text import peak_of_spectrum
+from archfem.masonry.structure import join_words
+from archfem.models.model import Ends
+from archfem.units import STANDARD_GRAVITY
+from archfem.view.pages.document import Grid
+
+
+def list_demands(data: ReportData) -> Iterator[tuple[str, Ends, str, list[str]]]:
+    """Yield each demand of an earthquake: name, peaks [g], source in the case, and results."""
+    case, limit = data.case, data.case.limit.demand
+    pushes = [RESULTS[name] for name in ("limit", "pushover") if name in data.statements]
+    if data.runs:
+        vertical = max(np.abs(x.dataset["ground"][:, 1]).max().item() for x in data.runs.values())
+        vertical /= STANDARD_GRAVITY
+        also = f", with vertical ones of up to {vertical:.2g} g" * bool(vertical)
+        peaks, source = map(peak_of_ground, data.runs.values()), "[suite]"
+        used = ["time histories, and what varies or scales them"]
+        yield f"motions{also}", Ends.of(peaks), source if case.suite else "[motion]", used
+    if limit is not None:
+        yield "push", Ends.of([limit / STANDARD_GRAVITY]), "[limit]", pushes
+        pushes = []
+    if np.isfinite(spectrum := peak_of_spectrum(case)):
+        source = "[assessment]" if case.assessment.spectrum else "[suite], its target"
+        used = [*[RESULTS["assessment"]] * ("assessment" in data.statements), *pushes]
+        yield f"{read_spectrum(data)['code']} spectrum", Ends.of([spectrum]), source, used
+
+
+def tabulate_demands(data: ReportData) -> list[Grid]:
+    """Tabulate the demands with their sources; none where the capacities have a single one."""
+    found, text = [each for each in list_demands(data) if each[-1]], data.case.report.get("demand")
+    rows = [("as stated", text, "[report]", "none, for words are not compared")] if text else []
+    rows += [(name, f"PGA {p:.3g} g", source, join_words(x)) for name, p, source, x in found]
+    peaks = [peak for _, ends, *_ in found for peak in ends]
+    differ = bool(peaks) and max(peaks) > MAX_RATIO_OF_PEAKS * min(peaks)
+    caption = "Demands of an earthquake" + "; a margin on one is none on another" * differ
+    head = ("demand", "horizontal", "source in the case", "of which results")
+    return [Grid(head, rows, caption, "words")] if rows[1:] or text else []
+
+
+def find_largest_demand(data: ReportData) -> float:
+    """Return the largest peak acceleration of all demands [g]; 0 without any."""
+    return max((ends[-1] for _, ends, *_ in list_demands(data)), default=0.0)
+
+
+def name_spectrum(data: ReportData) -> str:
+    """Name the demand of kinematic assessments, with its peak acceleration."""
+    code = read_spectrum(data).get("code")
+    if code is None:
+        return "the spectrum of the motion"
+    return f"the {code} spectrum of PGA {peak_of_spectrum(data.case):.3g} g"
