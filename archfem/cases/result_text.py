@@ -293,9 +293,9 @@ def describe_collapse(
     structure: Structure, collapse: Collapse, limit: LimitAnalysis, parapets: float = 0.0
 ) -> str:
     """Describe the result of limit analysis: load, hinges, sliding, crushing, and the fill."""
-    joints = structure.joints
-    hinges = [f"{joints[number].name} at the {side}" for number, side in collapse.hinges]
-    sliding = [joints[number].name for number in collapse.sliding]
+    faces = structure.face_names
+    hinges = list(dict.fromkeys(f"{faces[k]} at the {side}" for k, side in collapse.hinges))
+    sliding = list(dict.fromkeys(faces[k] for k in collapse.sliding))
     lines = [f"limit analysis: {collapse.sentence}"]
     lines += [f"hinges, by the face in contact: {list_or_count(hinges)}"] if hinges else []
     lines += [f"sliding: {list_or_count(sliding)}"] if sliding else []

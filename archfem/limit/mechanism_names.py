@@ -90,6 +90,13 @@ class NamedMotion:
         """Whether each joint turns about an end."""
         return self.touching & (abs(self.gaps[1] - self.gaps[0]) > self.least)
 
+    @property
+    def main_hinges(self) -> Flags:
+        """Whether each joint is assessed, and turns by much of the largest turn of these."""
+        angles = abs(self.gaps[1] - self.gaps[0]) / self.structure.depths
+        angles *= self.turning & self.structure.judged
+        return angles > FAST * angles.max()
+
     @cached_property
     def sliding(self) -> Flags:
         """Whether each joint slides."""
@@ -211,7 +218,12 @@ class NamedMotion:
         # the slip of the toe over the motion of the centroid; and joints within a wedge
         if slip > 0.33 * reach or (is_low and self.slides_within):
             if is_low and len(self.moving) > 1 and not is_whole:
-                return f"toe wedge of {count(len(self.moving), 'stone')}, turning and sliding"
+                stones = f"{count(len(self.moving), 'stone')}, turning and sliding"
+                main = self.main_hinges
+                rings = [self.structure.joints[k].role == "ring" for k in np.flatnonzero(main)]
+                if sum(rings) > 2:  # no wedge has the hinges of an arch
+                    return f"mechanism of {stones}, with hinges at {self._list_joints(main)}"
+                return f"toe wedge of {stones}"
             return f"combined overturning and sliding of {subject}"
         about = f"about the toe of {self._label([mover])}"
         if is_low:

@@ -449,6 +449,15 @@ class Structure(ResultDisplay):
         parts = select_assessed_parts({joint.part: joint.role for joint in self.joints})
         return ~self.heads & np.array([joint.part in parts for joint in self.joints], dtype=bool)
 
+    @property
+    def face_names(self) -> list[str]:
+        """Names of joints; those along chords of one curved face have that of the face."""
+        pairs = Counter(joint.blocks for joint in self.joints)
+        return [
+            re.sub(r", \d+$", "", joint.name) if pairs[joint.blocks] > 1 else joint.name
+            for joint in self.joints
+        ]
+
     @cached_property
     def misplaced(self) -> dict[int, str]:
         """Stones that may be of another part than theirs, and why in words, by number."""

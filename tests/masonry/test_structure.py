@@ -323,6 +323,16 @@ def test_a_portal_on_feet_of_uneven_height_turns_across_the_plane_from_the_groun
     assert merge_levels(ends).tolist() == ends.tolist()
 
 
+def test_chords_of_one_face_have_one_name():
+    """A stone on a back of two chords, and one beside it on a bed."""
+    ring = af.Block(((0, 0), (2, 0), (2, 1), (1, 1.5), (0, 1)), af.STONE, "ring", fixed=True)
+    wall = af.Block(((0, 1), (1, 1.5), (2, 1), (2, 2), (0, 2)), af.STONE, "wall")
+    top = af.Block(((0, 2), (2, 2), (2, 3), (0, 3)), af.STONE, "top, 1")
+    made = af.masonry.assembled([ring, wall, top], af.Contact(1e9, 4e8))
+    assert [joint.name for joint in made.joints] != made.face_names
+    assert made.face_names == ["ring to wall", "ring to wall", "wall to top, 1"]
+
+
 def test_a_clear_span_ends_at_the_piers_below_springers():
     """An arch of three stones between springers of its piers, whose faces are 3 m apart."""
     corners = {
