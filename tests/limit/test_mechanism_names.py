@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -174,3 +175,42 @@ def test_a_mechanism_of_some_parts_names_them():
         "right pier",
     }
     assert found.mechanism_name == "four-hinge mechanism of arch and right pier"
+
+
+def test_an_arch_in_a_wall_is_named_by_its_hinges_and_no_toe_wedge():
+    """A semicircle on two piers in bond, with wall stones beside it, pushed to the right.
+
+    The factor is that of a linear programme of forces at both ends of each facet, written apart.
+    """
+    count, inner, outer, spring, edge = 11, 1.4, 1.8, 1.6, 2.3
+    angles = np.pi * np.arange(count + 1) / count
+
+    def at(radius, k):
+        return radius * np.cos(angles[k]), spring + radius * np.sin(angles[k])
+
+    blocks = [af.Block(((-3, -1), (3, -1), (3, 0), (-3, 0)), af.STONE, "ground", fixed=True)]
+    for k in range(count):
+        outline = (at(inner, k), at(outer, k), at(outer, k + 1), at(inner, k + 1))
+        blocks.append(af.Block(outline, af.STONE, f"v{k}", part="arch", role="ring"))
+    for sign in (1, -1):
+        stones = []
+        for k in range(4):
+            cuts = (inner, (inner + edge) / 2, edge) if k % 2 else (inner, edge)
+            for a, b in pairwise(cuts):
+                y, top = 0.4 * k, 0.4 * (k + 1)
+                stones.append(("pier", [(a, y), (b, y), (b, top), (a, top)]))
+        for k in range(3):
+            low, high = at(outer, k), at(outer, k + 1)
+            stones.append(("wall", [low, (edge, low[1]), (edge, high[1]), high]))
+        for number, (part, points) in enumerate(stones):
+            outline = tuple((sign * x, y) for x, y in points)[::sign]
+            name = f"{sign} {part} {number}"
+            blocks.append(af.Block(outline, af.STONE, name, part=f"{part} {sign}", role="pier"))
+    contact = af.Contact(1e9, 4e8, friction=0.6)
+    portal = af.masonry.assembled(blocks, contact, width=0.6)
+    found = af.collapse_factor(portal, live=af.BodyForce(1.0))
+    words = (
+        r"mechanism of \d+ stones, turning and sliding, with hinges at arch, joints 2, 5 and 8; "
+    )
+    assert found.factor == pytest.approx(0.25602317, rel=1e-6)
+    assert re.fullmatch(f"{words}ground to 1 pier 0", found.mechanism_name)
