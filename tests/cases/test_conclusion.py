@@ -497,7 +497,7 @@ def test_a_displacement_has_the_range_of_its_time_steps_and_single_changes_are_s
         f"under 'a' and 'b': {moved}",
     ]
     assert [*conclusion._say_causes(ranges[:1])] == [same, moved]
-    assert [*conclusion._describe_ranges(ranges)][:2] == [
+    assert [*conclusion._describe_ranges(SimpleNamespace(verdict_ranges=ranges, runs={}))][:2] == [
         f"under '{motion}' it falls in none of 3 variations" for motion in "ab"
     ]
 
@@ -800,3 +800,13 @@ def test_a_demand_of_limit_analysis_comes_before_that_of_the_site():
     assert site_acceleration(af.Case.of(tables)) == pytest.approx(0.2)
     with pytest.raises(af.errors.InvalidInput, match=r"limit.demand"):
         af.Case.of({**tables, "limit": {"horizontal": 1.0, "demand": 0.0}})
+
+
+def test_variations_that_miss_the_run_have_no_range_of_displacements(case):
+    found = range_of(0.0012, 0.004)
+    for moved, stated in ((0.0023, True), (0.0047, False), (0.0005, False)):
+        data = data_of(case, found, first=verdict_of(displacement=moved))
+        texts = [getattr(piece, "text", "") for piece in conclusion.build_conclusion(data).pieces]
+        said = [x for x in texts if "argest displacements are 1.2 mm to 4 mm" in x]
+        listed = str([*conclusion._capacity_rows(data)])
+        assert (bool(said), "largest displacements 1.2 mm to 4 mm" in listed) == (stated, stated)

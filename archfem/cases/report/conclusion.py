@@ -24,6 +24,7 @@ from archfem.cases.report.doubts import (
     list_unvaried,
     object_to_motions,
     peak_of_ground,
+    spans_run,
 )
 from archfem.cases.report.motion_rules import check_motions
 from archfem.cases.report.report_data import SHOWN_RESULTS, ReportData
@@ -351,7 +352,7 @@ def _build_paragraphs(data: ReportData, doubtful: Sequence[str]) -> dict[str, li
         stated = [each.sentences for name, each in data.statements.items() if name != "assessment"]
         stated = [sorted(each, key=lambda x: not _is_of_norm(data, x)) for each in stated]
         answer += [*stated[0]] if len(data.statements) == 1 and stated else [x for x, *_ in stated]
-    answer += [*_describe_ends(data), *_describe_ranges(data.verdict_ranges)]
+    answer += [*_describe_ends(data), *_describe_ranges(data)]
     changes = [*_say_causes(data.verdict_ranges)]
     if (study := read_study(data)) is not None:
         changes += say_what_changes(study)
@@ -375,14 +376,15 @@ def _build_paragraphs(data: ReportData, doubtful: Sequence[str]) -> dict[str, li
     }
 
 
-def _describe_ranges(ranges: Sequence[VerdictRange]) -> Iterator[str]:
+def _describe_ranges(data: ReportData) -> Iterator[str]:
     """Yield how often the structure falls in variations, and how far it moves at most."""
+    ranges = data.verdict_ranges
     for each in ranges:
         motion, answers = each.dataset.attrs.get("motion"), each.answers["sampled"].values.any()
         under = f"under '{motion}' it " if motion else "it "
         groups = f": {each.groups}" if len(ranges) == 1 else ""
         yield f"{under}{each.count}{groups}{each.unanswered}" if answers else each.sentence
-    if moved := [each for each in ranges if each.displacements]:
+    if moved := [each for each in ranges if each.displacements and spans_run(data, each)]:
         far = max(moved, key=lambda x: np.nanmax(x.dataset["displacement"].values[~x.falls]))
         most = f"it moves farthest under '{far.dataset.attrs.get('motion')}': " * (len(ranges) > 1)
         yield f"{most}largest displacements are {far.displacement_ends}"
@@ -507,7 +509,8 @@ def _capacity_rows(data: ReportData) -> Iterator[tuple[str, Row]]:
     for computed in data.verdict_ranges:
         motion = computed.dataset.attrs.get("motion")
         name = f"{VARIATIONS} under '{motion}'" if motion else VARIATIONS
-        outcome = "; ".join(filter(None, [computed.count, computed.displacements]))
+        moved = computed.displacements if spans_run(data, computed) else ""
+        outcome = "; ".join(filter(None, [computed.count, moved]))
         yield VARIATIONS, Row(name, "the same motion", outcome + computed.unanswered, "-", {})
     for key, (first, name) in data.falls_across.items():
         demand = f"'{name}', of {SCALES_ACROSS[0]:g} to {SCALES_ACROSS[1]:g} ×"

@@ -148,6 +148,15 @@ def _doubt_displacement(data: ReportData, found: VerdictRange) -> Iterator[Doubt
         yield Doubt(words, RANGE_REMEDY, tuple(held))
 
 
+def spans_run(data: ReportData, found: VerdictRange) -> bool:
+    """Return whether the unvaried of variations is displaced as the run, within a factor of two."""
+    run, base = data.runs.get(found.dataset.attrs.get("motion", "")), found.dataset.isel(run=0)
+    if run is None or base["sampled"] or run.verdict.outcome in FALLEN_STATES:
+        return True
+    sizes = run.verdict.displacement, float(base["displacement"])
+    return not max(sizes) > 2.0 * min(sizes)
+
+
 def list_notes(data: ReportData) -> dict[str, list[str]]:
     """Return the notes of each result, with that on the rules of a norm for motions."""
     notes = {RESULTS[name]: [*each.notes] for name, each in data.statements.items() if each.notes}

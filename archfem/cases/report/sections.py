@@ -16,7 +16,7 @@ from archfem._files import read_listed
 from archfem.cases.answers import Ratios, read_numbers
 from archfem.cases.defaults import describe_friction_margin
 from archfem.cases.report.conclusion import build_conclusion, sentence
-from archfem.cases.report.doubts import list_elastic_fill, list_ranges, list_varied
+from archfem.cases.report.doubts import list_elastic_fill, list_ranges, list_varied, spans_run
 from archfem.cases.report.inputs import describe_value, tabulate_inputs
 from archfem.cases.report.report_data import (
     STATIC_RESULTS,
@@ -435,7 +435,8 @@ def _build_range(data: ReportData) -> list[Any]:
             text = blocks[0].text.removesuffix(found.table()).rstrip()
             blocks[:1] = [TextBlock(text, "lines"), Grid(*found.tabulate(), titled, "words")]
         elif found is not None:
-            told = filter(None, [found.sentence, found.displacements])
+            moved = found.displacements if spans_run(data, found) else ""
+            told = filter(None, [found.sentence, moved])
             blocks[: 2 if changes else 1] = [TextBlock(sentence("; ".join(told)))]
         if found is not None:
             count = found.dataset["sampled"].values.sum()
