@@ -509,7 +509,7 @@ def _capacity_rows(data: ReportData) -> Iterator[tuple[str, Row]]:
     for computed in data.verdict_ranges:
         motion = computed.dataset.attrs.get("motion")
         name = f"{VARIATIONS} under '{motion}'" if motion else VARIATIONS
-        moved = computed.displacements if spans_run(data, computed) else ""
+        moved = computed.displacements * spans_run(data, computed)
         outcome = "; ".join(filter(None, [computed.count, moved]))
         yield VARIATIONS, Row(name, "the same motion", outcome + computed.unanswered, "-", {})
     for key, (first, name) in data.falls_across.items():

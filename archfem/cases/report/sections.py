@@ -435,8 +435,7 @@ def _build_range(data: ReportData) -> list[Any]:
             text = blocks[0].text.removesuffix(found.table()).rstrip()
             blocks[:1] = [TextBlock(text, "lines"), Grid(*found.tabulate(), titled, "words")]
         elif found is not None:
-            moved = found.displacements if spans_run(data, found) else ""
-            told = filter(None, [found.sentence, moved])
+            told = filter(None, [found.sentence, found.displacements * spans_run(data, found)])
             blocks[: 2 if changes else 1] = [TextBlock(sentence("; ".join(told)))]
         if found is not None:
             count = found.dataset["sampled"].values.sum()
