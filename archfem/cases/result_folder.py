@@ -110,7 +110,7 @@ def open_results(folder: str | Path, *, inputs: str | Path | None = None) -> Res
 
     Args:
         folder: the folder.
-        inputs: folder of the mesh that the case names; by default the result folder.
+        inputs: folder of the mesh or extension of the case; by default the result folder.
 
     Returns:
         Case and histories of the folder.

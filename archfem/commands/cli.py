@@ -252,7 +252,7 @@ def _add_result_commands(commands: Any) -> None:
     add(
         "--set", action="append", default=[], metavar="report.KEY=WORDS", dest="changes", help=about
     )
-    add("--inputs", metavar="DIR", help="folder of a mesh that the case names (FOLDER)")
+    add("--inputs", metavar="DIR", help="folder of a mesh or an extension of the case (FOLDER)")
     add("--study", metavar="DIR", help="folder of a study that the report shows (FOLDER)")
     add("--pdf", action="store_true", help="also print it, by Chromium or Chrome")
     _add_own_code(add)
@@ -263,7 +263,7 @@ def _add_result_commands(commands: Any) -> None:
     add = _add_command(commands, "page", about, "run", description=text)
     add("folder", metavar="FOLDER", help="that `archfem run` has written")
     add("--out", metavar="FILE.html", help="the page (FOLDER/page.html)")
-    add("--inputs", metavar="DIR", help="folder of a mesh that the case names (FOLDER)")
+    add("--inputs", metavar="DIR", help="folder of a mesh or an extension of the case (FOLDER)")
     _add_own_code(add)
     about = "many cases: a table of results, on all cores or a cluster"
     add = _add_command(commands, "study", about, "study", description=about)
