@@ -134,7 +134,9 @@ def in_si_unit(values: Sequence[Any]) -> tuple[list[Any], str]:
 
 def warn_if_in_g(acceleration: float, key: str) -> None:
     """Warn of a peak acceleration [m/s²] so small that it is probably a multiple of g."""
-    if acceleration < 0.5:  # up to about 0.05 g seismicity is very low (EN 1998-1, 3.2.1)
+    # up to about 0.05 g seismicity is very low (EN 1998-1, 3.2.1); a multiple of 9.80665 that was
+    # given as one, as "0.03 g", has more than five digits
+    if acceleration < 0.5 and acceleration == float(f"{acceleration:.5g}"):
         words = "%s is %.3g m/s², which is %.3g g: write %.3g m/s² if it is %.3g g"
         in_g = acceleration * STANDARD_GRAVITY
         logger.warning(

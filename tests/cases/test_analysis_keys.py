@@ -225,7 +225,8 @@ def test_a_check_refuses_a_settlement_of_another_block_than_a_support(ring):
 
 
 def test_a_demand_that_looks_like_a_multiple_of_g_is_named_in_both_units(caplog):
-    parse_limit({"horizontal": 1.0, "demand": "0.24 g"})
+    for g in ("0.24 g", "0.03 g", "0.04 g"):
+        parse_limit({"horizontal": 1.0, "demand": g})
     assert not caplog.messages
     parse_limit({"horizontal": 1.0, "demand": 0.24})
     assert caplog.messages == [

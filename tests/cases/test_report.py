@@ -588,10 +588,19 @@ def test_the_paper_is_cited_where_a_value_is_its_own_alone():
     """The friction of a jointed fill follows from its angle, and no table has it."""
     tables = tomllib.loads(BRIDGE)
     tables["structure"]["fill"] = {"law": "jointed", "piece_size": 0.8, "friction_angle": 35}
-    rows = tabulate_inputs(report_data.ReportData(af.Case.of(tables), {})).rows
+    case = af.Case.of(tables)
+    rows = tabulate_inputs(report_data.ReportData(case, {})).rows
     marks = {name: (value, mark) for name, value, mark in rows}
     assert marks["stone: E"] == ("30 GPa (table 2 of Demirel and Aldemir (2021))", "default")
     assert marks["fill: μ"] == (f"{np.tan(np.radians(35)):.4g}", "inferred")
+    # stones have a contact with the fill for each size of its pieces, in one row for each value
+    own = {x.contact for x in case.structure.joints if x.contact.name == "soil to stone"}
+    ends = [f"{f(x.normal_stiffness for x in own) / 1e9:.4g} MPa/mm" for f in (min, max)]
+    found = [(name, value) for name, value, _ in rows if name.startswith("soil to stone")]
+    name = f"soil to stone and {len(own) - 1} more"
+    assert len(own) > 5
+    assert found[0] == (f"{name}: k_n", " to ".join(ends))
+    assert [x for x, _ in found] == [f"{name}: {word}" for word in ("k_n", "k_s", "μ")]
 
 
 def test_materials_that_differ_in_weight_alone_stand_once():

@@ -1,5 +1,6 @@
 """Inputs of a report: each value with its mark given, default or inferred."""
 
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from inspect import Parameter, signature
 from typing import Any
@@ -70,6 +71,9 @@ _SOURCES = {
 
 _WEIGHT = DECIDING_VALUES["materials"]["unit_weight"][0]
 _YOUNG = DECIDING_VALUES["materials"]["young"][0]
+
+# Quantities of which a row may state a range, by their words
+_VARIED = {_WEIGHT: "unit_weight", "k_n": "normal_stiffness", "k_s": "shear_stiffness"}
 
 # Properties that may be left out: name in texts, and unit
 _FURTHER_PROPERTIES = {
@@ -183,21 +187,29 @@ def describe_value(value: Any, kind: Any = None) -> str:
 def _property_rows(data: ReportData) -> Iterator[Row]:
     """Yield the values of materials and contacts, equal ones once."""
     groups = dict[Any, list[tuple[Material | Contact, list[Row]]]]()
-    for item in list_materials_and_contacts(data.case):
+    items = list_materials_and_contacts(data.case)
+    names = Counter(item.name for item in items if isinstance(item, Contact))
+    for item in items:
         rows, load = [*_list_given(data, item)], getattr(item, "stands_for", None)
-        # what carries more than itself may differ in weight alone from its neighbour
-        same = tuple(row for row in rows if load is None or row[0] != _WEIGHT)
-        groups.setdefault((type(item), load, same), []).append((item, rows))
-    for (_, load, _), group in groups.items():
+        # what carries more than itself may differ in weight alone from its neighbour, and joints of
+        # one name in stiffness alone, which depends on the pieces of fill beside them
+        finished = "finish" in find_table(data.case.settings, item)[1]
+        several = isinstance(item, Contact) and names[item.name] > 1 and not finished
+        varied = ("k_n", "k_s") if several else (_WEIGHT,) if load is not None else ()
+        same = tuple(row for row in rows if row[0] not in varied)
+        kind = type(item), item.name * several, varied, load, same
+        groups.setdefault(kind, []).append((item, rows))
+    for (cls, _, varied, load, _), group in groups.items():
         (first, rows), *others = group
         name = first.name + f" and {len(others)} more" * bool(others)
         if load is not None:
             yield f"{name}: stands also for", load, "given"
         for word, text, mark in rows:
-            if word == _WEIGHT and load is not None:
-                weights = [each.unit_weight for each, _ in group if isinstance(each, Material)]
-                ends = [value_text("materials", "unit_weight", x) for x in sorted(weights)]
-                text = " to ".join(dict.fromkeys([ends[0], ends[-1]]))
+            if word in varied and others:
+                section, key = "materials" if cls is Material else "contacts", _VARIED[word]
+                values = [getattr(each, key) for each, _ in group]
+                ends = (value_text(section, key, x) for x in (min(values), max(values)))
+                text = " to ".join(dict.fromkeys(ends))
             yield f"{name}: {word}", text, mark
 
 
