@@ -469,9 +469,11 @@ class CollapseScale:
             met = f"dislocated at {self.dislocated:#.3g} ×, {met}"
         if self.moves <= max(self._stood):
             met = f"a mechanism at {self.moves:#.3g} ×{' or less' * self.moves_in_all}, {met}"
-        said, one = _say_bracket("stands", self, met), describe_first_fall(self.as_one)
-        worse = self.as_one is not None and self.as_one.scale <= self.held
-        return f"{one.removeprefix('; ')}; in courses it {said}" if worse else f"{said}{one}"
+        said, first = _say_bracket("stands", self, met), self.as_one
+        if first is None:
+            return said
+        one = f"as one rigid body it {describe_first_fall(first)}"
+        return f"{one}; in courses it {said}" if first.scale <= self.held else f"{said}; {one}"
 
     def __repr__(self) -> str:
         """Return the sentence, how closely scales were run, and what was varied."""
@@ -552,8 +554,7 @@ class CollapseScale:
     @property
     def _least_fall(self) -> float:
         """Smallest scale at which it fell with any step [-]; infinite for none."""
-        falls = (run.scale for run in self._runs if run.fails(COLLAPSE_DEFINITION))
-        return min(falls, default=inf)
+        return min((run.scale for run in self._runs if run.fails(COLLAPSE_DEFINITION)), default=inf)
 
     @property
     def lower(self) -> float:
@@ -565,8 +566,7 @@ class CollapseScale:
     @property
     def moves(self) -> float:
         """Smallest scale at which failed joints let blocks move [-]; infinite for none."""
-        runs = (run.scale for run in self._runs if run.mechanisms.get("verified"))
-        return min(runs, default=inf)
+        return min((run.scale for run in self._runs if run.mechanisms.get("verified")), default=inf)
 
     @property
     def moves_in_all(self) -> bool:

@@ -35,7 +35,7 @@ def describe_falls_across(found: Mapping[str, tuple[FirstFall, str]]) -> str:
     """Describe the result of `find_falls_across` in one line."""
     scales = f"{SCALES_ACROSS[0]:g} to {SCALES_ACROSS[1]:g} × the motion"
     falls = (
-        f"under '{name}' the {key} {describe_first_fall(first).partition(' it ')[2]}"
+        f"under '{name}' the {key} {describe_first_fall(first)}"
         for key, (first, name) in found.items()
     )
     bodies = "across its plane, as one rigid body held by nothing else"

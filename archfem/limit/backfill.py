@@ -531,8 +531,8 @@ class BlocksWithFill:
         if self.fill is None:
             return None
         contacts = self.contacts
-        share = share[len(share) - len(contacts.block) :]  # a load factor may stand before them
-        share = share[contacts.partner]
+        first = len(share) - len(contacts.block)  # a load factor may stand before them
+        share = share[first:][contacts.partner]
         least, most = contacts.least.mean(axis=1), contacts.most.mean(axis=1)
         pressures = {"pressure": least + share * (most - least), "least": least, "most": most}
         variables = {key: ("contact", value, {"units": "Pa"}) for key, value in pressures.items()}

@@ -310,8 +310,8 @@ def moving_load(  # noqa: PLR0913  (loads, their places, and the strength of the
         spacings: distances between the axles, one fewer [m].
         positions: x of the vehicle's middle, halfway between first and last axle (n,) [m]; by
             default those of a rating (`rate`), from where it drives onto the structure to where it
-            is off it again, in steps of 1/100 of the structure's length, or 1/20 with a plastic
-            fill; without fill also where an axle stands at an end of a stone.
+            is off it again. Steps are 1/100 of the structure's length, or 1/20 with a plastic fill.
+            Without fill there are also those with an axle at an end of a stone.
         area_load: distributed load beside and below the axles, where it is adverse [Pa]. With a
             plastic fill that is found with the fill as `Fill`, and a warning says so.
         friction: as for `collapse_factor`.

@@ -239,12 +239,12 @@ class Contact:
         return self.coefficient < inf
 
 
-# Presets, Table 2 of Demirel and Aldemir (2021); it gives no μ for soil. The shear modulus of
-# 2.60 MPa that it prints for backfill is that of an isotropic material, E / 2 (1 + ν).
 # What a block of a wall across its plane stands for, whose weight is that of a course less broad
 # than the wall
 COURSE_LENGTH = "its length"
 
+# Presets, Table 2 of Demirel and Aldemir (2021); it gives no μ for soil. The shear modulus of
+# 2.60 MPa that it prints for backfill is that of an isotropic material, E / 2 (1 + ν).
 STONE = Material(30.0 * GPa, 0.2, 20.0 * kN, 56.0 * MPa, "stone")
 BACKFILL = Material(6.25 * MPa, 0.2, 18.0 * kN, None, "backfill")
 STONE_TO_STONE = Contact(1.48e9, 0.30e9, 0.60, "stone to stone")

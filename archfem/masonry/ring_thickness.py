@@ -83,8 +83,8 @@ def find_ring(structure: Structure, part: str | None = None) -> Ring:
         part: part that is the ring; None where there is one ring alone.
 
     Raises:
-        InvalidInput: there is no ring, there are several, it is drawn in one or two pieces, or it
-            is not one layer of stones between two springings, with nothing on its faces.
+        InvalidInput: there is no ring, there are several, or it is drawn in one or two pieces; or
+            it is not one layer of stones between two springings, with nothing on its faces.
 
     Example:
         >>> ring = af.masonry.find_ring(af.circular_arch(radius=1.0, thickness=0.2, embrace=180.0,

@@ -19,7 +19,7 @@ def area(points):
 
 
 def read(*elements, near=1e-3):
-    return list(read_svg(HEAD + "".join(elements) + "</svg>", near))
+    return list(read_svg(HEAD + "".join(elements) + "</svg>", near, Counter()))
 
 
 def test_a_ring_of_arcs_is_that_of_its_shape(tmp_path):

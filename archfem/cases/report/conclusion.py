@@ -433,12 +433,8 @@ def _describe_push(data: ReportData, name: str, push: PushFactors) -> Iterator[s
     size = f"{Ends((push.least, push.most)):ratio} times {push.site}{over}"
     text = f"pushed sideways{of} it begins to move at {size}"
     if bounded:
-        text += ", the least that a search found, and "
-        text += (
-            f"is proved to stand up to {format_ratio(push.proved)} times"
-            if push.proved
-            else NO_PROOF
-        )
+        proved = push.proved and f"is proved to stand up to {format_ratio(push.proved)} times"
+        text += f", the least that a search found, and {proved or NO_PROOF}"
     if moves and push.least >= 1.0:  # shaken it moves before
         yield f"{text}; that is no margin: {moves}"
         return
@@ -515,7 +511,7 @@ def _capacity_rows(data: ReportData) -> Iterator[tuple[str, Row]]:
     for key, (first, name) in data.falls_across.items():
         demand = f"'{name}', of {SCALES_ACROSS[0]:g} to {SCALES_ACROSS[1]:g} ×"
         factor = f"{first.scale:#.3g}" if first.scale < np.inf else "-"
-        outcome = describe_first_fall(first).removeprefix("; ") + ", held by nothing else"
+        outcome = f"as one rigid body it {describe_first_fall(first)}, held by nothing else"
         yield "", Row(f"across the plane, {key}", demand, outcome, factor, {})
     for result, statement in data.statements.items():
         of = f" of {name_spectrum(data)}" if result == "assessment" else ""

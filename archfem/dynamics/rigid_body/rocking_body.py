@@ -82,9 +82,9 @@ class RockingBody:
         """Least horizontal acceleration that turns it [m/s²]."""
         return min(self.gravity * abs(x) / y for x, y in self.arms)
 
-    def rock(self, motion: Motion, scale: float = 1.0) -> Rocking | None:
-        """Return the response to a multiple of a motion; None if the body slides."""
-        (time,), (displacement,), (slides,) = self.rock_scaled(motion, np.array([scale]))
+    def rock(self, motion: Motion) -> Rocking | None:
+        """Return the response to a motion; None if the body slides."""
+        (time,), (displacement,), (slides,) = self.rock_scaled(motion, np.ones(1))
         return None if slides else Rocking(float(time), float(displacement))
 
     def rock_scaled(self, motion: Motion, scales: Array) -> tuple[Array, Array, Flags]:
@@ -183,14 +183,10 @@ def find_first_fall(
     return body.first_fall(motion, (min(least, largest), largest))
 
 
-def describe_first_fall(first: FirstFall | None) -> str:
-    """Describe the result of `find_first_fall` behind that of courses; "" without one."""
-    if first is None:
-        return ""
+def describe_first_fall(first: FirstFall) -> str:
+    """Say at which scales of a motion a body falls, and stands again."""
     falls = f"first falls at {first.scale:#.3g} ×" if first.scale < inf else "falls at none"
-    if first.again:
-        falls += f", and stands again at {Ends(first.again):#.3g} ×"
-    return f"; as one rigid body it {falls}"
+    return falls + (f", and stands again at {Ends(first.again):#.3g} ×" if first.again else "")
 
 
 def doubt_courses(structure: Structure, fall: CollapseState, motion: Motion) -> Iterator[Doubt]:

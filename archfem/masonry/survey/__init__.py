@@ -2,7 +2,7 @@
 
 assemblies  outlines of plane assemblies of compas_assembly and compas_dem
 circle_fit  least-squares circle through surveyed points
-drawings    outlines in GeoJSON, DXF and tagged gmsh files
+drawings    outlines in GeoJSON, DXF, SVG, IFC and tagged gmsh files
 dxf         entities of DXF files
 faults      outlines of a drawing in error, with its overlaps and gaps
 outlines    blocks and structure from surveyed outlines, with small gaps closed

@@ -9,7 +9,7 @@ import json
 import re
 from cmath import rect
 from collections import Counter
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
@@ -96,13 +96,14 @@ def read_drawing(
     errors, or named in `faults`.
     """
     path, ignored = Path(path), Counter() if ignored is None else ignored
-    readers = {".geojson": _read_geojson, ".json": _read_geojson, ".msh": _read_msh}
     strays = list[str]()
-    readers |= {
+    readers: dict[str, Callable[..., Iterator[Outline]]] = {
+        **dict.fromkeys((".geojson", ".json"), _read_geojson),
         ".dxf": partial(_read_dxf, snap=snap, faults=strays),
+        ".ifc": _read_ifc,
+        ".msh": _read_msh,
         ".svg": partial(_read_svg, snap=snap),
     }
-    readers[".ifc"] = _read_ifc
     if (read := readers.get(path.suffix.lower())) is None:
         raise InvalidInput(f"{path} is no drawing: give a .geojson, .dxf, .svg, .ifc or .msh file")
     check_file(path, "drawing", max_bytes=2**25)

@@ -1,8 +1,8 @@
 """Closed shapes of SVG files: paths, polygons and rectangles, with their transformations.
 
 Paths are lines and cubic curves; quadratic curves are raised in degree, and arcs are divided into
-cubic curves (W3C, SVG 2, chapter 9 and appendix B). Nothing in a file is
-executed, and no other file is read.
+cubic curves (W3C, SVG 2, chapter 9 and appendix B). Nothing in a file is executed, and no other
+file is read.
 """
 
 import re
@@ -40,9 +40,7 @@ LARGEST_PIECE = radians(45.0)
 Segment = tuple[complex, ...]
 
 
-def read_svg(
-    text: str, near: float, ignored: Counter[str] | None = None
-) -> Iterator[tuple[str, str, Array]]:
+def read_svg(text: str, near: float, ignored: Counter[str]) -> Iterator[tuple[str, str, Array]]:
     """Yield name, layer and vertices (n, 2) of the closed shapes, y upwards, in units of the file.
 
     Shapes in layers that are keys of `ignored` are left out, and counted there, as are hidden ones
@@ -57,7 +55,7 @@ def read_svg(
         raise InvalidInput(f"it is no SVG: {error}") from error
     if _kind(root) != "svg":
         raise InvalidInput(f"it is no SVG: its root is '{_kind(root)}'")
-    numbers, ignored = Counter[str](), Counter() if ignored is None else ignored
+    numbers = Counter[str]()
     for element, layer, matrix, is_hidden in _walk(root, "drawing", np.eye(3)):
         if layer in ignored or is_hidden:
             ignored[layer if layer in ignored else f"{layer} (hidden)"] += 1
@@ -156,14 +154,15 @@ def _trace(element: XML.Element, name: str) -> Iterator[list[Segment]]:
         yield from _read_path(element.get("d", ""), name)
         return
     if _kind(element) == "rect":
-        sizes = {key: element.get(key, "0") for key in ("x", "y", "width", "height")}
+        keys = ("x", "y", "width", "height")
+        sizes = {key: element.get(key, "0").strip().removesuffix("px") for key in keys}
         for key, text in sizes.items():
-            if not re.fullmatch(NUMBER, text.strip().removesuffix("px")):
+            if not re.fullmatch(NUMBER, text):
                 raise InvalidInput(
                     f"'{name}' is a rectangle with {key} = {text!r}, and a number without a unit "
                     "is read: convert it to a path"
                 )
-        x, y, w, h = (float(text.strip().removesuffix("px")) for text in sizes.values())
+        x, y, w, h = map(float, sizes.values())
         corners = [complex(x, y), complex(x + w, y), complex(x + w, y + h), complex(x, y + h)]
     else:
         values = [float(number) for number in re.findall(NUMBER, element.get("points", ""))]
