@@ -155,7 +155,8 @@ def test_variations_that_are_stopped_are_kept(tmp_path, unplotted, capsys, monke
     monkeypatch.setattr(variations, "rate_again", rate_again)
     command = ["rate", str(path), "--vary", "--out", str(out)]
     assert af.commands.main(command) == 130
-    rows = pd.read_csv(out / "rating_variations.csv").set_index("cart, without impact with")["factor"]
+    table, names = out / "rating_variations.csv", "cart, without impact with"
+    rows = pd.read_csv(table).set_index(names)["factor"]
     late = rows[rows == "not computed"]
     assert len(late) == 14 - 3  # rings, and a narrower pier, which is refused before it is rated
     assert float(rows["rings a tenth thinner"]) < float(rows["rings a tenth thicker"])
@@ -165,7 +166,7 @@ def test_variations_that_are_stopped_are_kept(tmp_path, unplotted, capsys, monke
     stop[0] = 0
     assert af.commands.main(command) == 3
     assert len(seen) == 13 + 1  # all but the narrower pier, and the interrupted one twice
-    second = pd.read_csv(out / "rating_variations.csv").set_index("cart, without impact with")["factor"]
+    second = pd.read_csv(table).set_index(names)["factor"]
     assert "not computed" not in set(second)
     assert second["rings a tenth thinner"] == rows["rings a tenth thinner"]
     text, factors = (out / "rating.txt").read_text(), pd.to_numeric(second, errors="coerce")
