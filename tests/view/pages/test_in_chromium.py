@@ -131,7 +131,7 @@ def test_a_report_prints_without_cutting_a_figure(small, tmp_path):
         (page,) = [text for text in pages if "ground acceleration [m/s²]" in text]
         assert "a column under two pairs" in page
         assert "V / N [–]" in page
-        headings = "Structure and dead load", "Versions, digests"
+        headings = "Structure and dead load", "Versions and digests"
         assert all(words in "".join(pages) for words in headings)
         driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print"})
         figures = driver.execute_script(
