@@ -176,11 +176,11 @@ class VerdictRange(ResultDisplay):
 
         Runs with rigid joints are apart where these alone hardly move.
         """
-        sizes, apart = self._held_displacements
+        sizes, apart, alike = self._held_displacements
         if not np.isfinite(sizes).any():
             return ""
         others = ""
-        if apart.any():
+        if alike:
             ends = " to ".join(format_mm(x) for x in (sizes[apart].min(), sizes[apart].max()))
             others, sizes = f"; with rigid joints {ends}", sizes[~apart]
         least, usual, largest = np.quantile(sizes, (0.0, 0.95, 1.0), method="inverted_cdf")
@@ -188,13 +188,13 @@ class VerdictRange(ResultDisplay):
         return f"{ends}, in 95 % of {len(sizes)} runs {format_mm(usual)} or less{others}"
 
     @property
-    def _held_displacements(self) -> tuple[Array, NDArray[np.bool_]]:
-        """Displacements of the runs that do not fall, and whether it hardly moves as rigid ones."""
+    def _held_displacements(self) -> tuple[Array, NDArray[np.bool_], bool]:
+        """Displacements of runs that do not fall, which hardly move, and if these are all rigid."""
         held = self.answers.isel(run=np.flatnonzero(~self.falls[self.answered]))
         sizes = held["displacement"].values
         hardly = sizes < sizes.max(initial=0.0) / 100
-        alike = "joint_rule" in held and bool((held["joint_rule"].values[hardly] == "rigid").all())
-        return sizes, hardly & alike
+        rules = held["joint_rule"].values[hardly] if "joint_rule" in held else np.array([])
+        return sizes, hardly, len(rules) > 0 and bool((rules == "rigid").all())
 
     @property
     def displacements(self) -> str:
@@ -202,12 +202,11 @@ class VerdictRange(ResultDisplay):
         if not self.displacement_ends:
             return ""
         text = f"largest displacements {self.displacement_ends}"
-        sizes, apart = self._held_displacements
+        _, hardly, alike = self._held_displacements
         # runs that rest, as under a joint rule without a mechanism, say little of the others
-        hardly = (sizes < sizes.max() / 100).sum()
-        if not hardly or apart.any():
+        if not hardly.any() or alike:
             return text
-        return f"{text}; {hardly} of them moved by less than 1 % of the largest"
+        return f"{text}; {hardly.sum()} of them moved by less than 1 % of the largest"
 
     @property
     def single_changes(self) -> "list[SingleChange]":

@@ -490,8 +490,8 @@ class Structure(ResultDisplay):
             above = bottom >= level
             arm = np.average(heights[above], weights=weights[above]) - level
             up = level - ground
-            above_level = f"all above {up:.3g} m" if up >= 1.0 else f"all above {format_mm(up)}"
-            words = above_level if up else "all of it"
+            size = format_mm(up) if up < 1.0 else f"{up:.3g} m"
+            words = f"all above {size}" if up else "all of it"
             pushes[words] = 0.5 * self.width / float(arm)
         if self.heads.any():
             pushes["a strip from bottom to top"] = self.width / float(np.ptp(ends[:, :, 1]))

@@ -541,6 +541,9 @@ def test_every_input_has_its_mark():
     rows = tabulate_inputs(report_data.ReportData(af.Case.of(tables), {})).rows
     marks = {name: (value, mark) for name, value, mark in rows}
     assert {mark for _, mark in marks.values()} == {"given", "default"}
+    finished = {**tables, "contacts": {"stone to stone": {"finish": "dressed"}}}
+    rows = tabulate_inputs(report_data.ReportData(af.Case.of(finished), {})).rows
+    assert {mark for *_, mark in rows} == {"given", "default", "inferred"}
     expected = {
         "breadth": ("1 m", "given"),
         "gravity": ("9.81 m/s²", "default"),

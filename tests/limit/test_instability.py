@@ -167,18 +167,23 @@ def test_a_ring_on_one_support_is_named_with_its_end():
     assert "rest on nothing: add a support, or the stones that are missing" in text
 
 
+def bridge_with_ends(above, arch, cover):
+    """A bridge whose sidewalls hold the ends of its fill up to some heights above the springing."""
+    walls = [
+        af.shapes.Sidewall(length=1.5, height=1.0, above=high, state="fixed", name=name)
+        for high, name in zip(above, ("left wall", "right wall"), strict=True)
+    ]
+    fill = af.shapes.Backfill(cover=cover)
+    return af.bridge(arches=[arch], sidewalls=walls, backfill=fill)
+
+
 @pytest.mark.parametrize(
     ("above", "named"), [((0.1, 0.1), True), ((0.9, 0.1), True), ((0.9, 0.9), False)]
 )
 def test_fill_that_falls_out_of_a_free_end_is_held_by_higher_walls(above, named):
     """The end that is named is one with a low wall, and the remedy is one."""
-    walls = [
-        af.shapes.Sidewall(length=1.5, height=1.0, above=high, state="fixed", name=name)
-        for high, name in zip(above, ("left wall", "right wall"), strict=True)
-    ]
     arch = af.shapes.Arch(span=2.0, rise=0.5, thickness=0.3, voussoirs=5)
-    fill = af.shapes.Backfill(cover=0.4)
-    bridge = af.bridge(arches=[arch], sidewalls=walls, backfill=fill)
+    bridge = bridge_with_ends(above, arch, cover=0.4)
     text = explain_instability(af.masonry.jointed_fill(bridge, 0.45, friction_angle=20.0))
     if not named:
         assert text is None
@@ -191,13 +196,8 @@ def test_fill_that_falls_out_of_a_free_end_is_held_by_higher_walls(above, named)
 @pytest.mark.parametrize("above", [(0.1, 1.3), (1.3, 0.1), (1.3, 1.3)])
 def test_fill_that_opens_and_falls_out_of_a_free_end_is_named_by_the_dead_load(above):
     """Rigid, it stands by cohesion that joints lose as they open; higher walls let it rest."""
-    walls = [
-        af.shapes.Sidewall(length=1.5, height=1.0, above=high, state="fixed", name=name)
-        for high, name in zip(above, ("left wall", "right wall"), strict=True)
-    ]
     arch = af.shapes.Arch(span=4.0, rise=1.2, thickness=0.35, voussoirs=9)
-    fill = af.shapes.Backfill(cover=0.6)
-    bridge = af.bridge(arches=[arch], sidewalls=walls, backfill=fill)
+    bridge = bridge_with_ends(above, arch, cover=0.6)
     cut = af.masonry.jointed_fill(bridge, 0.5, friction_angle=30.0, cohesion=3e3)
     assert af.stands(cut)
     model = af.build(cut, fidelity="rigid")

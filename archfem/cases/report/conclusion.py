@@ -130,7 +130,7 @@ def _say_plainly(data: ReportData, doubtful: Sequence[str]) -> Iterator[str]:
             for row in stated.rows[:1]:
                 times = f", at {row.factor} times {row.demand}"
                 yield f"{row.result}: {row.outcome}{times * (name != 'risk' and row.factor != '-')}"
-    if not data.falls_across and _build_transverse(data):
+    if not data.across[0] and _build_transverse(data):
         push, demand = data.case.structure.transverse_push[0], find_largest_demand(data)
         falls = f", where it may overturn from {push:.3g} g on" * (push < demand)
         yield f"across the plane of the drawing it was not checked{falls}"
@@ -312,9 +312,10 @@ def _build_transverse(data: ReportData) -> list[TextBlock]:
         text += (
             f"; the largest demand, {demand:.3g} g, exceeds it ({format_ratio(demand / push)} ×)"
         )
-    if data.falls_across:
+    found, fault = data.across
+    if found:
         text = text.removeprefix("nothing is checked across the plane of the drawing: ")
-    text += data.across_fault
+    text += fault
     manner = "doubt" if push < demand else "plain"
     return [TextBlock(sentence(text), manner, lead="Across its plane?")]
 
@@ -417,7 +418,7 @@ def _describe_margin(data: ReportData) -> Iterator[str]:
 
 def _say_across(data: ReportData) -> Iterator[tuple[float, str, str]]:
     """Yield the scale at which each body across the plane first falls, in words, and the body."""
-    for key, (first, name) in data.falls_across.items():
+    for key, (first, name) in data.across[0].items():
         if first.scale < np.inf:
             peak = f"PGA {data.motions[name].pga / STANDARD_GRAVITY:.2f} g"
             yield first.scale, f"{first.scale:#.3g} × '{name}', {peak}", f"the {key}"
@@ -508,7 +509,7 @@ def _capacity_rows(data: ReportData) -> Iterator[tuple[str, Row]]:
         moved = computed.displacements * spans_run(data, computed)
         outcome = "; ".join(filter(None, [computed.count, moved]))
         yield VARIATIONS, Row(name, "the same motion", outcome + computed.unanswered, "-", {})
-    for key, (first, name) in data.falls_across.items():
+    for key, (first, name) in data.across[0].items():
         demand = f"'{name}', of {SCALES_ACROSS[0]:g} to {SCALES_ACROSS[1]:g} ×"
         factor = f"{first.scale:#.3g}" if first.scale < np.inf else "-"
         outcome = f"as one rigid body it {describe_first_fall(first)}, held by nothing else"

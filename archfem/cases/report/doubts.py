@@ -28,6 +28,10 @@ from archfem.units import STANDARD_GRAVITY
 # matched motions exceed the target by a tenth
 MAX_RATIO_OF_PEAKS = 1.25
 
+# Ratio of the displacements of a run and the unvaried of its variations beyond which a range of
+# these does not hold for the run: other steps alone change them by `MAX_RATIO_OF_DISPLACEMENTS`
+MAX_RATIO_TO_RUN = 2.0
+
 # Fewest motions that test a spectrum, in both norms of the rules
 MIN_MOTIONS = 3
 
@@ -149,12 +153,12 @@ def _doubt_displacement(data: ReportData, found: VerdictRange) -> Iterator[Doubt
 
 
 def spans_run(data: ReportData, found: VerdictRange) -> bool:
-    """Return whether the unvaried of variations is displaced as the run, within a factor of two."""
+    """Return whether the unvaried of variations is displaced nearly as far as the run."""
     run, base = data.runs.get(found.dataset.attrs.get("motion", "")), found.dataset.isel(run=0)
     if run is None or base["sampled"] or run.verdict.outcome in FALLEN_STATES:
         return True
     sizes = run.verdict.displacement, float(base["displacement"])
-    return not max(sizes) > 2.0 * min(sizes)
+    return not max(sizes) > MAX_RATIO_TO_RUN * min(sizes)
 
 
 def list_notes(data: ReportData) -> dict[str, list[str]]:

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from csv import reader
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -45,7 +45,6 @@ class ReportData:
     folder: Path | None = None
     missing: tuple[str, ...] = ()  # names of the pairs of the suite without a run
     study: Path | None = None  # folder of a study; that of the results may have one
-    across_fault: str = field(default="", init=False)  # why `falls_across` are not known
 
     @cached_property
     def dead(self) -> xr.Dataset | None:
@@ -60,14 +59,13 @@ class ReportData:
         return {name: read_motion(run, name) for name, run in self.runs.items()}
 
     @cached_property
-    def falls_across(self) -> dict[str, tuple[FirstFall, str]]:
-        """Least first falls of a wall in bond across its plane under the motions of the runs."""
+    def across(self) -> tuple[dict[str, tuple[FirstFall, str]], str]:
+        """Least first falls of a wall in bond across its plane, and why they are not known."""
         structure = self.case.structure
         try:
-            return find_falls_across(structure, self.motions) if structure.heads.any() else {}
+            return find_falls_across(structure, self.motions) if structure.heads.any() else {}, ""
         except ArchfemError as error:  # one paragraph fails, and no report
-            vars(self)["across_fault"] = f"; not checked against the motions across: {error}"
-            return {}
+            return {}, f"; not checked against the motions across: {error}"
 
     @cached_property
     def fidelity(self) -> str:
