@@ -43,6 +43,7 @@ from archfem.masonry.loads import Action, Settlement, describe_massless
 from archfem.masonry.ring_thickness import Ring
 from archfem.masonry.standing import describe_carried
 from archfem.masonry.structure import (
+    UNCHECKED_ACROSS,
     Structure,
     describe_spans,
     join_joint_names,
@@ -67,6 +68,9 @@ def mark_remarks(remarks: Iterable[Remark]) -> list[str]:
     lines = (f"{DOUBT_MARK}{x}" if isinstance(x, Doubt) else x for x in remarks)
     return [*dict.fromkeys(lines)]
 
+
+# What a run of a wall in bond checks across its plane
+CHECKED_ACROSS = "across the plane of the drawing a run checks it as one rigid body"
 
 # Note on abutments, which a rating varies
 IMMOVABLE = "abutments are taken as immovable"
@@ -242,7 +246,10 @@ def describe_dead_load(result: DeadLoadResult, *, explain: bool = False) -> str:
         *describe_friction_margin(result.case, structure),
         *note_masses(structure, parapets=result.case.parapets),
     ]
-    lines += filter(None, [structure.assessment, structure.transverse_remark])
+    across = structure.transverse_remark
+    if result.case.has_motion and structure.heads.any():
+        across = across.replace(UNCHECKED_ACROSS, CHECKED_ACROSS)
+    lines += filter(None, [structure.assessment, across])
     lines += filter(None, [defaults(result.case)])
     if result.strength_use is not None:
         lines.append(f"dead load: {strength_use_text(result.strength_use)}")

@@ -42,6 +42,7 @@ from archfem.cases.toml_file import format_tables, parse_change
 from archfem.commands.cli import ExitCode
 from archfem.commands.tools import print_motions, show_both_senses
 from archfem.dynamics.history import Ending, History
+from archfem.dynamics.rigid_body.rocking_body import describe_first_fall
 from archfem.dynamics.walls_across import describe_falls_across, find_falls_across
 from archfem.errors import ArchfemError, DidNotConverge, InvalidInput, keep_warnings, logger
 from archfem.limit.collapse import Collapse, describe_fill
@@ -508,22 +509,22 @@ def print_results(case: Case, found: Iterable[Result], folder: Path) -> tuple[st
         _print_pairs(suite, runs, at_rest, folder)
     verdict = result_text.describe_verdicts(runs.values()) if runs else ""
     if motions and case.structure.heads.any():
-        verdict += _print_falls_across(case.structure, motions)
+        verdict += print_falls_across(case.structure, motions)
     return verdict, any([of_limit, at_rest.doubts, *(run.doubts for run in runs.values())])
 
 
-def _print_falls_across(structure: Structure, motions: Mapping[str, Motion]) -> str:
+def print_falls_across(structure: Structure, motions: Mapping[str, Motion]) -> str:
     """Print at which scales a wall falls across its plane; return the least below 1 in words."""
     try:
         found = find_falls_across(structure, motions)
     except ArchfemError as error:  # what was run is kept
         logger.warning("the wall was not checked against the motions across its plane: %s", error)
         return ""
-    if not found:
-        return ""
-    print(describe_falls_across(found))
-    least = min(first.scale for first, _ in found.values())
-    return f"; across its plane it falls at {least:#.3g} ×" * (least <= 1.0)
+    print(describe_falls_across(found, motions))
+    body, (first, name) = min(found.items(), key=lambda fall: fall[1][0].scale)
+    of = f"'{name}'" if len(motions) > 1 else "the motion"
+    falls = f"; across its plane the {body} {describe_first_fall(first, motions[name].pga, of)}"
+    return falls * (first.scale <= 1.0)
 
 
 def _print_limit(

@@ -24,7 +24,12 @@ from archfem.dynamics.fall import state_rigid_falls
 from archfem.dynamics.history import Ending, History, first_mechanisms, partial_history
 from archfem.dynamics.monitor import FILL_TENSION, PULLED, refuse_fill_in_tension
 from archfem.dynamics.recorder import Record
-from archfem.dynamics.rigid_body.rocking_body import FirstFall, describe_first_fall, find_first_fall
+from archfem.dynamics.rigid_body.rocking_body import (
+    FirstFall,
+    describe_first_fall,
+    find_first_fall,
+    say_scale,
+)
 from archfem.dynamics.schemes import EffectiveDamping, Viscous
 from archfem.dynamics.solvers.integrator import Stepper
 from archfem.dynamics.time_history import time_history
@@ -37,7 +42,6 @@ from archfem.masonry.structure import Structure, join_names
 from archfem.models.model import Doubt, Ends, Model, group_doubts, log_doubts_once, merge_doubts
 from archfem.motion.motion import Motion, admissible_range
 from archfem.statics.equilibrium import Equilibrium, dead_load
-from archfem.units import STANDARD_GRAVITY
 
 # Limit state of large displacements, in place of a definition of mechanisms
 COLLAPSE_DEFINITION = "collapse"
@@ -139,7 +143,7 @@ class MechanismScales:
         first, bracket = self.first, self[self.first]
         met = "nor at any scale that was tried"
         if bracket.run:
-            met = f"first mechanism at {_say_scale(bracket.upper, self.pga)}, by {first}"
+            met = f"first mechanism at {say_scale(bracket.upper, self.pga)}, by {first}"
         return _say_bracket("no mechanism", self, met)
 
     def __repr__(self) -> str:
@@ -275,13 +279,6 @@ def _run_as_far(model: Model | Analysis, motion: Motion, **options: Any) -> Hist
         return history
 
 
-def _say_scale(scale: float, pga: float | None) -> str:
-    """Return a scale in words: as a peak acceleration where that of the motion is known."""
-    if pga is None:
-        return f"{scale:#.3g} × the motion"
-    return f"{scale * pga / STANDARD_GRAVITY:#.3g} g ({scale:#.3g} × the motion)"
-
-
 def _say_bracket(state: str, found: Any, met: str) -> str:
     """Return a bracket in words, from the state at its lower bound to the event above it."""
     if scale := found.states.get("tension"):
@@ -289,7 +286,7 @@ def _say_bracket(state: str, found: Any, met: str) -> str:
     met = f"{UNFINISHED}, {met}" if found.interrupted else met
     if not found.held:  # the smaller ones, if any were run, have no answer
         return f"{met}; no smaller scale is known to survive"
-    return f"{state} at {_say_scale(found.held, found.pga)}, {met}"
+    return f"{state} at {say_scale(found.held, found.pga)}, {met}"
 
 
 def _find_tension(runs: Iterable[ScaledRun]) -> float:
@@ -456,7 +453,7 @@ class CollapseScale:
         """Scales around the fall, and the least at which it is dislocated, in words."""
         least, met = self._least_fall, "falls at no scale that was tried"
         if least < inf:
-            met = f"falls at {_say_scale(least, self.pga)}"
+            met = f"falls at {say_scale(least, self.pga)}"
         elif unanswered := [run.scale for run in self._runs if run.fall is None]:
             none = f"{len(unanswered)} have none, the first at {min(unanswered):#.3g} ×"
             met = f"falls in no run that has an answer ({none})"
@@ -472,7 +469,7 @@ class CollapseScale:
         said, first = _say_bracket("stands", self, met), self.as_one
         if first is None:
             return said
-        one = f"as one rigid body it {describe_first_fall(first)}"
+        one = f"as one rigid body it {describe_first_fall(first, self.pga)}"
         return f"{one}; in courses it {said}" if first.scale <= self.held else f"{said}; {one}"
 
     def __repr__(self) -> str:

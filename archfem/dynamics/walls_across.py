@@ -7,6 +7,7 @@ from archfem.dynamics.rigid_body.rocking_body import (
     describe_first_fall,
     find_first_fall,
 )
+from archfem.errors import InvalidInput
 from archfem.masonry.shapes.rings import columns_across
 from archfem.masonry.structure import Structure
 from archfem.motion.motion import Motion
@@ -20,7 +21,7 @@ def find_falls_across(
 ) -> dict[str, tuple[FirstFall, str]]:
     """Return the least first fall of strip and whole of a wall across its plane, and its motion.
 
-    Each is one rigid body, held by nothing else.
+    Each is one rigid body, held by nothing else. It is an error if neither rocks.
     """
     found = dict[str, tuple[FirstFall, str]]()
     for key, column in columns_across(structure).items():
@@ -28,14 +29,21 @@ def find_falls_across(
             first = find_first_fall(column, motion, SCALES_ACROSS)
             if first and (key not in found or first.scale < found[key][0].scale):
                 found[key] = first, name
+    if motions and not found:
+        raise InvalidInput(
+            "as one rigid body neither strip nor whole rocks: it slides before, or its joints "
+            "resist tension; run a case of its courses, made by archfem.masonry.columns_across"
+        )
     return found
 
 
-def describe_falls_across(found: Mapping[str, tuple[FirstFall, str]]) -> str:
+def describe_falls_across(
+    found: Mapping[str, tuple[FirstFall, str]], motions: Mapping[str, Motion]
+) -> str:
     """Describe the result of `find_falls_across` in one line."""
     scales = f"{SCALES_ACROSS[0]:g} to {SCALES_ACROSS[1]:g} × the motion"
     falls = (
-        f"under '{name}' the {key} {describe_first_fall(first)}"
+        f"under '{name}' the {key} {describe_first_fall(first, motions[name].pga)}"
         for key, (first, name) in found.items()
     )
     bodies = "across its plane, as one rigid body held by nothing else"

@@ -28,6 +28,9 @@ from archfem.masonry.materials import Contact
 from archfem.masonry.parts import assign_roles, find_misplaced, select_assessed_parts
 from archfem.units import G, format_mm
 
+# What a result in the plane of the drawing leaves open
+UNCHECKED_ACROSS = "nothing is checked across the plane of the drawing"
+
 
 def find_number(kind: str, names: Sequence[str], requested: str | int) -> int:
     """Return the number of a block or joint, given by name or by number."""
@@ -502,15 +505,14 @@ class Structure(ResultDisplay):
     def transverse_remark(self) -> str:
         """What is not checked across the plane, in words, with the push that overturns it."""
         push, body = self.transverse_push
-        text = "nothing is checked across the plane of the drawing"
         if np.isnan(push):
             return (
-                f"{text}; if that is the section of a wall, the wall is checked across its own "
-                "plane here, and in it by a case of its own"
+                f"{UNCHECKED_ACROSS}; if that is the section of a wall, the wall is checked across "
+                "its own plane here, and in it by a case of its own"
             )
         loaded = any(self.blocks[number].material.stands_for for number in self.free)
         return (
-            f"{text}: held by nothing else, {body} begins to overturn at {push:.3g} g"
+            f"{UNCHECKED_ACROSS}: held by nothing else, {body} begins to overturn at {push:.3g} g"
             f"{' or less' * loaded}, by the width over twice the height of its centre"
         )
 

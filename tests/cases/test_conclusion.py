@@ -16,8 +16,10 @@ from archfem.cases.report import conclusion, doubts, report_data, sections
 from archfem.cases.report.report_data import ReportData
 from archfem.cases.result_text import PushFactors, site_acceleration
 from archfem.cases.toml_file import format_tables
+from archfem.commands.run import print_falls_across
 from archfem.dynamics import VerdictRange
 from archfem.dynamics.collapse_state import RANGE_REMEDY
+from archfem.dynamics.walls_across import describe_falls_across, find_falls_across
 from archfem.errors import InvalidInput
 from archfem.models.model import Doubt, read_doubts, write_doubts
 from archfem.statics.assessment_checks import UPPER_BOUND
@@ -689,12 +691,15 @@ def test_a_report_of_a_wall_has_its_falls_across_the_plane_as_one_rigid_body(mon
     for first, name in data.across[0].values():
         assert name == "strong"
         assert 0.8 <= first.scale <= 0.8 * 1.01
-    scale = f"{data.across[0]['strip'][0].scale:#.3g}"
-    at = f"{scale} × 'strong', PGA {edge / 0.8 * G / 9.80665:.2f} g: the strip"
+    first = data.across[0]["strip"][0].scale
+    scale, peak = f"{first:#.3g}", first * edge / 0.8 * G / 9.80665  # at the fall
+    at = f"{peak:#.3g} g ({scale} × 'strong'): the strip"
     assert say_margin(data)[0].startswith(f"the least margin is below {at} across the plane")
     verdict = dict(conclusion.list_facts(data))["verdict"]
     assert verdict.startswith("In its plane it stands under all 2 motions of PGA ")
-    assert f". Across its plane, held by nothing else, it falls at {at} as one rigid" in verdict
+    assert (
+        f". Across its plane, held by nothing else, it first falls at {at} as one rigid" in verdict
+    )
     assert "was not computed" not in verdict
     assert "survives" not in verdict
     (text,) = conclusion._build_transverse(data)
@@ -707,8 +712,9 @@ def test_a_report_of_a_wall_has_its_falls_across_the_plane_as_one_rigid_body(mon
     assert 1.25 <= data.across[0]["whole"][0].scale <= 1.25 * 1.01
     verdict = dict(conclusion.list_facts(data))["verdict"]
     assert verdict.startswith("It survives: it stands under ")
-    scale = f"{data.across[0]['strip'][0].scale:#.3g}"
-    at = f"{scale} × 'weak', PGA {edge / 1.25 * G / 9.80665:.2f} g: the strip as one rigid body"
+    first = data.across[0]["strip"][0].scale
+    peak = first * edge / 1.25 * G / 9.80665
+    at = f"{peak:#.3g} g ({first:#.3g} × 'weak'): the strip as one rigid body"
     assert f"Across its plane, held by nothing else, it first falls at {at}. From which" in verdict
     assert "acceleration on it falls in its plane was not computed." in verdict
     # a failure of the columns is a clause, and stops no report
@@ -742,9 +748,58 @@ def test_a_run_of_a_wall_says_at_which_scale_it_falls_across_its_plane(
     of = "the strip falls at none; " if falls is None else "the strip first falls at "
     assert of in line
     if falls is not None:
-        assert share <= float(line.rpartition("first falls at ")[2].split()[0]) <= 1.01 * share
-    assert ("; across its plane it falls at 0.80" in headline) is bool(falls)
-    assert ("across its plane it" in headline) is bool(falls)
+        peak, _, scale, *_ = line.rpartition("first falls at ")[2].split()
+        assert share <= float(scale.removeprefix("(")) <= 1.01 * share
+        # the peak at the fall, and not that of the motion as given
+        assert 0.998 <= float(peak) / (0.33033 * G / 9.80665) <= 1.012
+    said = "; across its plane the strip first falls at 0.331 g (0.80"
+    assert (said in headline) is bool(falls)
+    assert ("across its plane" in headline) is bool(falls)
+    # one statement on what is checked across the plane, with the push that overturns it
+    assert not [line for line in lines if "nothing is checked across" in line]
+    (line,) = [line for line in lines if "begins to overturn" in line]
+    assert line.startswith(
+        "across the plane of the drawing a run checks it as one rigid body: held"
+    )
+
+
+def test_a_wall_that_stands_again_says_so_beside_its_first_fall(tmp_path, capsys):
+    """One sine of ω/p = 5, integrated from impact to impact: it stands again at its full scale."""
+    assert [overturns(5.0, peak, 2) for peak in (0.65, 0.75, 1.75)] == [False, True, False]
+    sines = sine(5.0, 1.75, 2, 1e-3)
+    wall = wall_in_bond().structure
+    found = find_falls_across(wall, {"sines": sines})
+    first, name = found["strip"]
+    peak = first.scale * 1.75 * G / 9.80665
+    assert 0.65 < first.scale * 1.75 < 0.75
+    assert first.again[0] < 1.0 < first.again[1]
+    assert name == "sines"
+    assert (
+        f"under 'sines' the strip first falls at {peak:#.3g} g ({first.scale:#.3g} × the motion), "
+        f"and stands again at {first.again[0]:#.3g} to {first.again[1]:#.3g} ×; under "
+    ) in describe_falls_across(found, {"sines": sines})
+    headline = print_falls_across(wall, {"sines": sines})
+    assert headline == (
+        f"; across its plane the strip first falls at {peak:#.3g} g ({first.scale:#.3g} × the "
+        f"motion), and stands again at {first.again[0]:#.3g} to {first.again[1]:#.3g} ×"
+    )
+    assert capsys.readouterr().out.startswith("across its plane, as one rigid body")
+
+
+def test_a_wall_that_slides_before_it_rocks_is_not_checked_across_its_plane(caplog):
+    """One course as thick as high slides at its friction, 0.6, before it turns at 1 g."""
+    blocks = [af.Block(((0, -1), (4, -1), (4, 0), (0, 0)), af.STONE, "ground", fixed=True)]
+    for level, cuts in ((0.0, (0, 2, 4)), (0.5, (0, 1, 3, 4))):
+        for a, b in pairwise(cuts):
+            outline = ((a, level), (b, level), (b, level + 0.5), (a, level + 0.5))
+            blocks.append(af.Block(outline, af.STONE, f"{level} {a}", part="wall", role="pier"))
+    wall = af.masonry.assembled(blocks, af.Contact(1e9, 4e8, friction=0.6), width=1.0)
+    motion = af.Motion(np.full(100, 8.0), 0.01, name="push")
+    with pytest.raises(InvalidInput, match="neither strip nor whole rocks"):
+        find_falls_across(wall, {"push": motion})
+    assert find_falls_across(wall, {}) == {}
+    assert print_falls_across(wall, {"push": motion}) == ""
+    assert "the wall was not checked against the motions across its plane: " in caplog.text
 
 
 @pytest.mark.parametrize("demand", [None, "0.2 g"])

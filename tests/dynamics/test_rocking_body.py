@@ -133,7 +133,10 @@ def test_the_first_fall_is_found_to_a_hundredth():
     found = body.first_fall(sine(1.0, 1.0, 1, 1e-3), (0.1, 2.0))
     assert 0.33033 < found.scale < 1.01 * 0.3304
     assert found.again is None
-    assert describe_first_fall(found) == f"first falls at {found.scale:#.3g} ×"
+    assert describe_first_fall(found) == f"first falls at {found.scale:#.3g} × the motion"
+    assert describe_first_fall(found, 2.0 * 9.80665).startswith(
+        f"first falls at {2.0 * found.scale:#.3g} g ({found.scale:#.3g} × the motion)"
+    )
     none = body.first_fall(sine(1.0, 1.0, 1, 1e-3), (0.1, 0.32))
     assert none == (inf, None)
 
@@ -147,10 +150,10 @@ def test_a_body_that_stands_again_beyond_its_first_fall_has_no_one_crossing():
     fallen = found.scale, least / 1.011, most * 1.011
     assert [overturns(5.0, peak, 2) for peak in (*stood, *fallen)] == [False] * 3 + [True] * 3
     assert found.scale < least / 2.0
-    words = f"first falls at {found.scale:#.3g} ×, and stands again at {least:#.3g} to "
+    words = f"first falls at {found.scale:#.3g} × the motion, and stands again at {least:#.3g} to "
     assert f"{words}{most:#.3g} ×" in describe_first_fall(found)
     once = describe_first_fall(FirstFall(0.5, (2.0, 2.0)))
-    assert once == "first falls at 0.500 ×, and stands again at 2.00 ×"
+    assert once == "first falls at 0.500 × the motion, and stands again at 2.00 ×"
 
 
 @pytest.mark.parametrize(
@@ -195,4 +198,5 @@ def test_a_scale_of_a_stack_states_that_of_one_body():
     found = analysis.scale(sine(1.0, 0.3, 1, 1e-3).with_rest(3.0), dt=0.002, precision=0.1)
     assert found.as_one.scale == pytest.approx(1.10, rel=0.011)
     assert found.upper == pytest.approx(1.10, rel=0.1)
-    assert f"; as one rigid body it first falls at {found.as_one.scale:#.3g} ×" in found.sentence
+    scale = f"{0.3 * found.as_one.scale * G / 9.80665:#.3g} g ({found.as_one.scale:#.3g} × the"
+    assert f"; as one rigid body it first falls at {scale} motion)" in found.sentence

@@ -39,12 +39,12 @@ from archfem.dynamics.collapse_state import (
     CollapseState,
 )
 from archfem.dynamics.history import History
-from archfem.dynamics.rigid_body.rocking_body import describe_first_fall
+from archfem.dynamics.rigid_body.rocking_body import describe_first_fall, say_scale
 from archfem.dynamics.verdict_range import HALF_STEP, UNVARIED, VerdictRange
 from archfem.dynamics.walls_across import SCALES_ACROSS
-from archfem.masonry.structure import Structure, join_names, join_words
+from archfem.masonry.structure import UNCHECKED_ACROSS, Structure, join_names, join_words
 from archfem.models.model import Doubt, Ends
-from archfem.units import STANDARD_GRAVITY, format_mm, format_ratio
+from archfem.units import format_mm, format_ratio
 from archfem.view.pages.document import Grid, Section, TextBlock
 
 # Outcomes of runs as verbs and in plain words, the worst first; small displacements end where
@@ -140,9 +140,8 @@ def _say_first_failures(data: ReportData) -> Iterator[str]:
     """Yield where it first fails: across its plane as one rigid body, and in its plane."""
     across = sorted(_say_across(data))[:1]
     plane = "in its plane " * bool(across)
-    for scale, at, body in across:
-        falls = f"{'first ' * (scale > 1.0)}falls at {at}: {body} as one rigid body"
-        yield f"across its plane, held by nothing else, it {falls}"
+    for _, _, falls, body in across:
+        yield f"across its plane, held by nothing else, it {falls}: {body} as one rigid body"
     if failures := [words for words, _ in find_first_failures(data)]:
         yield f"{plane}it {join_words(failures[::-1])}"  # the least first
     elif "scale" not in data.statements and all(scale > 1.0 for scale, *_ in across):
@@ -314,7 +313,7 @@ def _build_transverse(data: ReportData) -> list[TextBlock]:
         )
     found, fault = data.across
     if found:
-        text = text.removeprefix("nothing is checked across the plane of the drawing: ")
+        text = text.removeprefix(f"{UNCHECKED_ACROSS}: ")
     text += fault
     manner = "doubt" if push < demand else "plain"
     return [TextBlock(sentence(text), manner, lead="Across its plane?")]
@@ -405,7 +404,7 @@ def _describe_margin(data: ReportData) -> Iterator[str]:
     """Yield the least factor on the demand of an earthquake, maybe as a range, and the others."""
     checks = read_numbers(Ratios, data.statements.get("assessment"))
     margins = [*sorted(_describe_check(data, each) for each in checks)[:1], *describe_scales(data)]
-    for least, at, body in sorted(_say_across(data))[:1]:
+    for least, at, _, body in sorted(_say_across(data))[:1]:
         text = f"below {at}: {body} across the plane as one rigid body, held by nothing else"
         margins.append((least, [text]))
     for k, (_, (first, *others)) in enumerate(sorted(margins)):
@@ -416,12 +415,13 @@ def _describe_margin(data: ReportData) -> Iterator[str]:
             yield from _describe_push(data, name, push) if push.site else ()
 
 
-def _say_across(data: ReportData) -> Iterator[tuple[float, str, str]]:
+def _say_across(data: ReportData) -> Iterator[tuple[float, str, str, str]]:
     """Yield the scale at which each body across the plane first falls, in words, and the body."""
     for key, (first, name) in data.across[0].items():
         if first.scale < np.inf:
-            peak = f"PGA {data.motions[name].pga / STANDARD_GRAVITY:.2f} g"
-            yield first.scale, f"{first.scale:#.3g} × '{name}', {peak}", f"the {key}"
+            given = data.motions[name].pga, f"'{name}'"
+            at, falls = say_scale(first.scale, *given), describe_first_fall(first, *given)
+            yield first.scale, at, falls, f"the {key}"
 
 
 def _describe_push(data: ReportData, name: str, push: PushFactors) -> Iterator[str]:
@@ -512,7 +512,8 @@ def _capacity_rows(data: ReportData) -> Iterator[tuple[str, Row]]:
     for key, (first, name) in data.across[0].items():
         demand = f"'{name}', of {SCALES_ACROSS[0]:g} to {SCALES_ACROSS[1]:g} ×"
         factor = f"{first.scale:#.3g}" if first.scale < np.inf else "-"
-        outcome = f"as one rigid body it {describe_first_fall(first)}, held by nothing else"
+        falls = describe_first_fall(first, data.motions[name].pga)
+        outcome = f"as one rigid body it {falls}, held by nothing else"
         yield "", Row(f"across the plane, {key}", demand, outcome, factor, {})
     for result, statement in data.statements.items():
         of = f" of {name_spectrum(data)}" if result == "assessment" else ""

@@ -33,6 +33,7 @@ from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import Structure
 from archfem.models.model import Doubt, Ends
 from archfem.motion.motion import Motion
+from archfem.units import STANDARD_GRAVITY
 
 # Step of the integration, and time after a motion in which a body falls or comes to rest [s]: the
 # least pulses that overturn a block are those of exact integration to 0.1 %
@@ -183,9 +184,17 @@ def find_first_fall(
     return body.first_fall(motion, (min(least, largest), largest))
 
 
-def describe_first_fall(first: FirstFall) -> str:
+def say_scale(scale: float, pga: float | None, of: str = "the motion") -> str:
+    """Return a scale in words: as a peak acceleration where that of the motion is known."""
+    if pga is None:
+        return f"{scale:#.3g} × {of}"
+    return f"{scale * pga / STANDARD_GRAVITY:#.3g} g ({scale:#.3g} × {of})"
+
+
+def describe_first_fall(first: FirstFall, pga: float | None = None, of: str = "the motion") -> str:
     """Say at which scales of a motion a body falls, and stands again."""
-    falls = f"first falls at {first.scale:#.3g} ×" if first.scale < inf else "falls at none"
+    falls = f"first falls at {say_scale(first.scale, pga, of)}"
+    falls = falls if first.scale < inf else "falls at none"
     return falls + (f", and stands again at {Ends(first.again):#.3g} ×" if first.again else "")
 
 
