@@ -227,7 +227,8 @@ def describe_dead_load(result: DeadLoadResult, *, explain: bool = False) -> str:
     defaults = explain_defaults if explain else describe_defaults
     joints = assessed_joints(result.dead.joints)
     lines = [
-        f"model: {model.fidelity}, {len(structure.free)} blocks, {len(structure.joints)} joints, "
+        f"model: {model.fidelity}, {len(structure.free)} blocks, "
+        f"{len(set(structure.face_names))} joints, "
         f"{model.size} coordinates ({result.seconds:.2f} s with the dead load)"
     ]
     lines += [] if model.prediction is None else [f"model: {model.prediction.text}"]

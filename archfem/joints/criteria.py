@@ -31,6 +31,9 @@ TENSION_COORDINATE = "tension"
 # Coordinate of a dataset with the head joints of walls; absent without any
 HEAD_COORDINATE = "head"
 
+# Coordinate of a structure with curved faces: the name of the face of which a joint is a chord
+FACE_COORDINATE = "face"
+
 # Prefix of dataset attributes with the criteria
 CRITERIA_PREFIX = "criteria_"
 
@@ -345,7 +348,8 @@ def assessed_joints(joints: xr.Dataset) -> xr.Dataset:
 
 def describe_assessed_joints(joints: xr.Dataset) -> str:
     """Describe which joints are assessed, and which are not; empty where all are."""
-    names, parts, judged = (np.atleast_1d(joints[key].values) for key in ("name", "part", "judged"))
+    face = FACE_COORDINATE if FACE_COORDINATE in joints.coords else "name"
+    names, parts, judged = (np.atleast_1d(joints[key].values) for key in (face, "part", "judged"))
     heads = np.atleast_1d(joints.coords.get(HEAD_COORDINATE, xr.zeros_like(joints["judged"])))
     words = names.astype(str).tolist(), parts.astype(str).tolist()
     return describe_assessment(*words, judged, heads)

@@ -23,6 +23,7 @@ from archfem._typing import Array
 from archfem._validation import validate_arguments
 from archfem.errors import InvalidInput
 from archfem.joints.criteria import (
+    FACE_COORDINATE,
     HEAD_COORDINATE,
     TENSION_COORDINATE,
     Criteria,
@@ -153,6 +154,8 @@ def joint_variables(
         coordinates[TENSION_COORDINATE] = "joint", structure.tension, {"units": "Pa"}
     if structure.heads.any():
         coordinates[HEAD_COORDINATE] = "joint", structure.heads
+    if (faces_of := structure.face_names) != coordinates["name"][1]:
+        coordinates[FACE_COORDINATE] = "joint", faces_of
     if time is not None:
         coordinates["time"] = ("time", time, {"units": "s"})
     return variables, coordinates, criteria.attributes

@@ -120,13 +120,19 @@ Shape = TypeVar("Shape", bound=Callable[..., "Structure"])
 
 
 def describe_assessment(
-    names: Sequence[str], parts: Sequence[str], judged: NDArray[np.bool_], heads: NDArray[np.bool_]
+    faces: Sequence[str], parts: Sequence[str], judged: NDArray[np.bool_], heads: NDArray[np.bool_]
 ) -> str:
-    """Describe which joints are assessed, and which are not; empty where all are."""
+    """Describe which joints are assessed, and which are not; empty where all are.
+
+    Chords of one curved face, which have its name, count as one joint.
+    """
     if judged.all():
         return ""
-    labels = np.array([part or "unnamed" for part in parts])
-    left_out = [str(name) for name, own in zip(names, judged, strict=True) if not own]
+    keys = [*zip(faces, judged.tolist(), strict=True)]
+    first = sorted({key: k for k, key in reversed([*enumerate(keys)])}.values())
+    judged, heads = judged[first], heads[first]
+    labels = np.array([parts[k] or "unnamed" for k in first])
+    left_out = [str(faces[k]) for k, own in zip(first, judged, strict=True) if not own]
     if len(left_out) > 4:  # too many to be named
         words = np.where(heads, "head joints ", "")[~judged]
         counts = Counter(zip(words, labels[~judged], strict=True))
@@ -469,8 +475,8 @@ class Structure(ResultDisplay):
     @cached_property
     def assessment(self) -> str:
         """Which joints are assessed, and what is not, in words; empty where all are."""
-        names, parts = zip(*((joint.name, joint.part) for joint in self.joints), strict=True)
-        return describe_assessment(names, parts, self.judged, self.heads)
+        parts = [joint.part for joint in self.joints]
+        return describe_assessment(self.face_names, parts, self.judged, self.heads)
 
     @cached_property
     def transverse_push(self) -> tuple[float, str]:

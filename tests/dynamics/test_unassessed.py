@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import xarray as xr
 from portals import DRY, box, portal
 
 import archfem as af
@@ -200,6 +201,19 @@ def test_fill_that_slides_is_no_doubt_but_left_out():
     assert describe_assessed_joints(joints) == (
         "assessed: 14 of 27 joints (rings and piers: arch); not assessed: 13 of backfill"
     )
+
+
+def test_chords_of_a_curved_face_count_as_one_joint(tmp_path):
+    """A ring of 13 stones has 14 joints and carries fill on 13 backs, by one chord or by four."""
+    arch = af.shapes.Arch(span=4.0, rise=1.6, thickness=0.3, voussoirs=13)
+    bridge = af.bridge(arches=[arch], backfill=af.shapes.Backfill(cover=0.5), chords=4)
+    words = "assessed: 14 of 27 joints (rings and piers: arch); not assessed: 13 of backfill"
+    assert len(bridge.joints) == 14 + 4 * 13
+    assert bridge.assessment == words
+    joints = history(bridge, [], "small")
+    assert describe_assessed_joints(joints) == words
+    joints.to_netcdf(tmp_path / "joints.nc")
+    assert describe_assessed_joints(xr.load_dataset(tmp_path / "joints.nc")) == words
 
 
 def test_nothing_is_said_where_all_joints_are_assessed():
