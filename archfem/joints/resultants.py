@@ -154,8 +154,8 @@ def joint_variables(
         coordinates[TENSION_COORDINATE] = "joint", structure.tension, {"units": "Pa"}
     if structure.heads.any():
         coordinates[HEAD_COORDINATE] = "joint", structure.heads
-    if (faces_of := structure.face_names) != coordinates["name"][1]:
-        coordinates[FACE_COORDINATE] = "joint", faces_of
+    if (chords := structure.face_names) != [joint.name for joint in structure.joints]:
+        coordinates[FACE_COORDINATE] = "joint", chords
     if time is not None:
         coordinates["time"] = ("time", time, {"units": "s"})
     return variables, coordinates, criteria.attributes
