@@ -36,7 +36,7 @@ from archfem.masonry.joint_closing import (
     with_finish,
 )
 from archfem.masonry.materials import CONTACT_PRESETS, MATERIAL_PRESETS, STONE, Contact, Material
-from archfem.masonry.shapes import bridges, rings
+from archfem.masonry.shapes import bridges, rings, walls
 from archfem.masonry.shapes.bridge_parts import Arch, Backfill, Paving, Pier, Sidewall
 from archfem.masonry.standing import StandingBody, carrying
 from archfem.masonry.structure import Joint, Structure, join_names
@@ -44,8 +44,14 @@ from archfem.masonry.survey.outlines import Layer, Survey, read_outlines, survey
 
 Described = TypeVar("Described")
 
-# Parts of which a bridge has several, from left to right, each under its name
-BRIDGE_PARTS: Table = {"arches": Arch, "piers": Pier, "sidewalls": Sidewall}
+# Parts of which a shape has several, each under its name; those of a bridge from left to right
+PARTS_BY_NAME: Mapping[str, Table] = {
+    "bridge": {"arches": Arch, "piers": Pier, "sidewalls": Sidewall},
+    "wall": {"openings": walls.Opening},
+}
+
+# Parts of which a bridge has one
+SINGLE_PARTS: Table = {"backfill": Backfill, "paving": Paving}
 
 # Keys of a material: its fields, and the preset that has those that are left out
 MATERIAL_KEYS = {**declared_keys(Material), "preset": str}
@@ -87,7 +93,7 @@ def list_shapes() -> dict[str, Callable[..., Structure]]:
     shapes = (
         *(rings.circular_arch, rings.pointed_arch, rings.elliptical_arch, rings.flat_arch),
         *(rings.arch_along, bridges.buttressed_arch, bridges.arcade, rings.column),
-        *(rings.arch_on_piers, bridges.bridge),
+        *(rings.arch_on_piers, bridges.bridge, walls.wall),
     )
     return {shape.__name__: shape for shape in shapes} | {"outlines": surveyed, "blocks": assembled}
 
@@ -98,12 +104,10 @@ def shape_keys(name: str) -> dict[str, Any]:
     if name == "blocks":
         keys["material"] = str
         del keys["name"], keys["fill"]  # the name is that of the case
-    elif name == "bridge":  # whose parts are tables by name
-        keys |= dict.fromkeys(BRIDGE_PARTS, dict)
     elif name == "outlines":
         keys["file"] = keys.pop("path")
         del keys["materials"]  # which are those of the case
-    return keys
+    return keys | dict.fromkeys(PARTS_BY_NAME.get(name, ()), dict)
 
 
 def build_structure(settings: Table, folder: Path = Path()) -> Structure:
@@ -134,9 +138,8 @@ def _build_shape(settings: Table, folder: Path) -> Structure:
     for section in PRESETS:
         for key in settings.get(section, {}):
             _resolve_preset(settings, section, key)
-    if name == "bridge":
-        values = _bridge_parts(values, settings)
-    elif name == "outlines":
+    values = _shape_parts(name, values, settings)
+    if name == "outlines":
         values = _outline_arguments(values, settings, folder)
     structure = _call(functions[name], f"structure of shape {name!r}", **values)
     return _divide_fill(structure, fill)
@@ -198,13 +201,13 @@ def _divide_fill(structure: Structure, table: Table) -> Structure:
     return jointed_fill(structure, **fill)
 
 
-def _bridge_parts(values: dict[str, Any], settings: Table) -> dict[str, Any]:
-    """Return the arguments of `bridge`, with the parts that its tables describe."""
+def _shape_parts(shape: str, values: dict[str, Any], settings: Table) -> dict[str, Any]:
+    """Return the arguments of a shape, with the parts that its tables describe."""
     parts = dict(values)
-    for key, part in BRIDGE_PARTS.items():
+    for key, part in PARTS_BY_NAME.get(shape, {}).items():
         if key in parts:
             parts[key] = _build_parts(part, parts[key], f"structure.{key}", settings)
-    for key, single in {"backfill": Backfill, "paving": Paving}.items():
+    for key, single in SINGLE_PARTS.items():
         if key in parts:
             parts[key] = _read_part(single, parts[key], f"structure.{key}", settings)
     return parts

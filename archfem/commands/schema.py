@@ -34,7 +34,6 @@ from archfem.masonry.joint_closing import CONDITIONS
 from archfem.masonry.loads import AttachedLoad, BodyForce, PointLoad, Settlement
 from archfem.masonry.materials import Contact, Material
 from archfem.masonry.parts import PART_ROLES
-from archfem.masonry.shapes.bridge_parts import Backfill, Paving
 from archfem.masonry.standing import StandingBody
 from archfem.masonry.structure import Joint
 from archfem.masonry.survey.outlines import Layer
@@ -134,9 +133,9 @@ def _parts_of_structure(name: str) -> dict[str, Schema]:
     if name == "outlines":
         parts |= {"layers": _by_name(_part(Layer)), "contacts": {"type": "object"}}
     elif name == "bridge":
-        parts |= {key: _parts_by_name(part) for key, part in structure_keys.BRIDGE_PARTS.items()}
-        parts |= {"backfill": _part(Backfill), "paving": _part(Paving)}
-    return parts
+        parts |= {key: _part(part) for key, part in structure_keys.SINGLE_PARTS.items()}
+    by_name = structure_keys.PARTS_BY_NAME.get(name, {})
+    return parts | {key: _parts_by_name(part) for key, part in by_name.items()}
 
 
 def _parts_by_name(declaration: Callable[..., Any]) -> Schema:

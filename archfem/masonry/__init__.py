@@ -9,7 +9,7 @@
     materials        Material, Contact, presets
     parts            roles and axes of rings and piers
     ring_thickness   a ring with another thickness about its middle line
-    shapes           parametric structures: arches, columns, arcades and bridges from a few lengths
+    shapes           parametric arches, columns, walls, arcades and bridges from a few lengths
     standing         bodies that stand on a structure, such as a lorry
     stiffness_ratio  block stiffness relative to its joints
     structure        Joint, Structure, rigid motion, look-up by name

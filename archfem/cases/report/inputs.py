@@ -19,7 +19,7 @@ from archfem.cases.defaults import (
 )
 from archfem.cases.report.report_data import STATIC_RESULTS, ReportData
 from archfem.cases.structure_keys import (
-    BRIDGE_PARTS,
+    PARTS_BY_NAME,
     find_table,
     keys_of_part,
     list_shapes,
@@ -111,7 +111,7 @@ def _structure_rows(data: ReportData) -> Iterator[Row]:
     """Yield the keys of [structure]; width and gravity also where they are defaults."""
     table, structure = data.case.settings.get("structure", {}), data.case.structure
     kinds = shape_keys(table["shape"])
-    parts = {**BRIDGE_PARTS, "backfill": Backfill} if table["shape"] == "bridge" else {}
+    parts = {**PARTS_BY_NAME.get(table["shape"], {}), "backfill": Backfill}
     drawn = ("blocks", "joints") if "drawing.txt" in data.files else ()
     for key, value in table.items():
         if key in ("material", "contact", "width", "gravity"):

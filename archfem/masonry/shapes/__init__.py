@@ -1,8 +1,9 @@
-"""Parametric structures: arches, columns, arcades and bridges from a few lengths.
+"""Parametric structures: arches, columns, walls, arcades and bridges from a few lengths.
 
 bridge_parts  Arch, Pier, Sidewall, Backfill, Paving
 bridges       bridges and arcades, and their stonework
 rings         rings, columns, arch on piers, polycentric curves
+walls         walls in running bond, with openings
 """
 
 from archfem.masonry.shapes.bridge_parts import Arch as Arch
@@ -20,3 +21,5 @@ from archfem.masonry.shapes.rings import column as column
 from archfem.masonry.shapes.rings import elliptical_arch as elliptical_arch
 from archfem.masonry.shapes.rings import flat_arch as flat_arch
 from archfem.masonry.shapes.rings import pointed_arch as pointed_arch
+from archfem.masonry.shapes.walls import Opening as Opening
+from archfem.masonry.shapes.walls import wall as wall
