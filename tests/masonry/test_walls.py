@@ -7,6 +7,7 @@ import pytest
 from bonded import bonded_wall
 
 import archfem as af
+from archfem.errors import InvalidStructure
 
 CONTACT = af.Contact(1.48e9, 0.3e9, friction=0.6)
 DOOR = af.shapes.Opening(left=-0.75, breadth=1.0, head=2.0, name="door")
@@ -81,6 +82,74 @@ def test_one_stone_spans_each_opening(name):
             inside = low_x < each.right - 1e-9 and high_x > each.left + 1e-9
             assert not (inside and each.sill - 1e-9 < low_y < each.head - 1e-9)
         assert len(lintels) == 1
+
+
+def lay_opening(left, right, sill, head, name="opening"):
+    return af.shapes.Opening(left=left, breadth=right - left, sill=sill, head=head, name=name)
+
+
+@pytest.mark.parametrize(
+    ("opening", "area"),
+    [
+        ((-0.45, 0.45, 0.9, 2.7), 17.1),  # its head is a third of a course below the eaves
+        ((-0.45, 0.45, 2.9, 4.1), 17.64),
+        ((-2.3, -1.4, 0.9, 2.1), None),  # beside the edge there is no room for a jamb
+        ((1.5, 2.6, 0.9, 2.1), None),
+    ],
+)
+def test_opening_takes_its_area_or_is_refused(opening, area):
+    """4.8 m broad, 2.8 m to the eaves and 5 m to the ridge: 18.72 m²."""
+    lengths = {"breadth": 4.8, "height": 5.0, "eaves": 2.8, "width": 0.4}
+    lengths["openings"] = [lay_opening(*opening)]
+    if area is None:
+        with pytest.raises(InvalidStructure, match=r"has room for it below 2\.3 m"):
+            af.shapes.wall(**lengths)
+        return
+    wall = af.shapes.wall(**lengths)
+    assert sum(wall.blocks[k].area for k in wall.free) == pytest.approx(area)
+
+
+@pytest.mark.parametrize(
+    ("openings", "head", "eaves"),
+    [
+        ([], 0.0, 2.5),
+        ([(-0.75, 0.25, 0.0)], 2.0, 2.5),
+        ([(0.2, 1.0, 1.0)], 2.0, 2.4),
+        ([(0.2, 1.0, 0.75)], 2.0, 2.4),
+        ([(-0.5, 0.5, 1.0)], 1.75, 2.5),
+        ([(-1.9, -0.9, 0.0), (0.4, 1.5, 0.9)], 2.0, 2.5),  # a door and a window
+    ],
+)
+def test_walls_are_in_running_bond(openings, head, eaves):
+    """No head joint is above another, also where a lintel ends; a mirrored wall is the same."""
+    walls = []
+    for each in (openings, [(-right, -left, sill) for left, right, sill in openings]):
+        laid = [lay_opening(*sides, head, f"opening {k}") for k, sides in enumerate(each)]
+        lengths = {"breadth": 5.2, "height": eaves + 1.8, "eaves": eaves, "width": 0.4}
+        walls.append(af.shapes.wall(openings=laid, **lengths))
+    found = [
+        np.array([j.ends for j, head in zip(w.joints, w.heads, strict=True) if head]) for w in walls
+    ]
+    places, low, high = (found[0][:, :, 0].mean(axis=1), *np.sort(found[0][:, :, 1], axis=1).T)
+    above = np.isclose(high[:, None], low)
+    assert above.any()
+    assert np.abs(places[:, None] - places)[above].min() > 0.15
+    other = np.sort((found[1].mean(axis=1) * [-1.0, 1.0]).round(6).view(complex), axis=0)
+    assert np.allclose(np.sort(found[0].mean(axis=1).round(6).view(complex), axis=0), other)
+    for left, right, sill in openings:
+        middle, points = (left + right) / 2.0, [block.points for block in walls[0].blocks[1:]]
+        (lintel,) = (
+            each
+            for each in points
+            if each[:, 1].min() == head and each[:, 0].min() < middle < each[:, 0].max()
+        )
+        assert lintel[:, 0].min() < left - 0.2
+        assert lintel[:, 0].max() > right + 0.2
+        inside = np.array([middle, (sill + head) / 2.0])
+        assert not any(
+            (b.points.min(0) < inside).all() and (b.points.max(0) > inside).all()
+            for b in walls[0].blocks
+        )
 
 
 def test_wall_equals_stones_laid_one_by_one():

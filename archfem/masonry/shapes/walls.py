@@ -134,11 +134,11 @@ def wall(  # noqa: PLR0913  (all are lengths and properties of one structure)
 def _check_opening(opening: Opening, height: float, reach: float) -> None:
     """Refuse an opening that is not within a wall, up to `reach` from its middle at the head."""
     within = 0.0 <= opening.sill < opening.head < height and opening.breadth > 0.0
-    if not within or max(-opening.left, opening.right) > reach:
+    if not within or max(-opening.left, opening.right) >= reach:
         raise InvalidStructure(
             f"opening '{opening.name}' is from x = {opening.left:.4g} to {opening.right:.4g} m and "
             f"from {opening.sill:.4g} to {opening.head:.4g} m high: the wall is {height:.4g} m "
-            f"high, and has room for it up to {reach:.4g} m from the middle at its head"
+            f"high, and has room for it below {reach:.4g} m from the middle at its head"
         )
 
 
