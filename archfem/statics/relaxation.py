@@ -87,9 +87,11 @@ class TrescaJoints(JointOperator):
 
 
 class MovesOn(DidNotConverge):
-    """Structure that moves on in steps of creep: coordinates before and after the last one."""
+    """Structure that moves on in steps of creep."""
 
-    steps: tuple[Array, Array]
+    def __init__(self, message: str, steps: tuple[Array, Array]) -> None:
+        super().__init__(message)
+        self.steps = steps  # coordinates before and after the last one
 
 
 def relax(
@@ -117,12 +119,11 @@ def relax(
         if len(residuals) > patience and residual > 0.5 * residuals[-patience]:
             break
         drag /= drag_factor if step.iterations <= easy_iterations else 1.0
-    moves_on = MovesOn(
+    raise MovesOn(
         f"it does not come to rest in {len(residuals) - 1} steps of creep: {residuals[-1]:.2e} of "
-        f"{scale:.2e} stays out of balance"
+        f"{scale:.2e} stays out of balance",
+        (before, q),
     )
-    moves_on.steps = before, q
-    raise moves_on
 
 
 def _solve_creep_step(
