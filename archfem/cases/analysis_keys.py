@@ -12,10 +12,10 @@ from archfem.cases.structure_keys import find_table
 from archfem.cases.toml_file import Table, check_table, read_object
 from archfem.errors import InvalidInput
 from archfem.joints.criteria import Criteria
-from archfem.limit.backfill import check_options, self_weight_programme
 from archfem.limit.collapse import Collapse, collapse_factor, describe_crushing, solve_least
 from archfem.limit.fill_strength import Fill, PlasticFill
 from archfem.limit.rating import ASSUMED_STRENGTH, Rating, rate
+from archfem.limit.self_weight import check_options, self_weight_programme
 from archfem.limit.vehicles import VEHICLES, VEHICLES_OF_CODES, Vehicle
 from archfem.masonry.loads import Action, AttachedLoad, BodyForce, PointLoad, Settlement
 from archfem.masonry.stiffness_ratio import find_yielding_blocks

@@ -1,6 +1,6 @@
 """Limit analysis of rigid blocks: collapse factor, least thickness, mechanisms.
 
-    backfill              earth pressure, load spreading, self-weight programme
+    backfill              earth pressure, load spreading
     collapse              collapse_factor, stands, warnings
     cone_programme        second-order cone programmes
     displaced_blocks      limit analysis of blocks at displaced places
@@ -16,6 +16,7 @@
     mechanism_names       plain names of mechanisms
     nonassociated         sliding without dilatancy
     rating                rating for vehicles of codes
+    self_weight           linear programme of self-weight
     support_movement      finite movement of a support
     thickness             least thickness
     vehicles              vehicles over a bridge

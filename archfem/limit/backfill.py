@@ -1,4 +1,4 @@
-"""Backfill in limit analysis: earth pressure, load spreading, linear programme of self-weight.
+"""Backfill in limit analysis: earth pressure and load spreading.
 
 A fill is not a body here but an action on the stones below it. The structure is cut into vertical
 strips. The weight of each column of fill rests on the stone at its foot. The vertical stress in it
@@ -19,14 +19,13 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
 from archfem._typing import Array, Flags, Numbers
-from archfem._validation import check_between, check_choice, check_number, check_type
+from archfem._validation import check_number
 from archfem.errors import InvalidInput, logger
 from archfem.joints.rigid_kinematics import jump_rates
 from archfem.limit.fill_strength import Fill, place_backing
-from archfem.limit.linear_programme import Optimum, Programme, RigidBlocks
+from archfem.limit.linear_programme import RigidBlocks
 from archfem.limit.mechanism_kinematics import RigidRegions, find_rigid_regions, take_all_rigid
 from archfem.masonry.loads import Action, BodyForce, PointLoad
-from archfem.masonry.materials import STONE
 from archfem.masonry.standing import find_bodies
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import CONTACT_TOLERANCE, Structure
@@ -55,6 +54,16 @@ class BlockSlices:
         """Centroid of each slice along x (n,) [m]."""
         share = _centroid_share(np.maximum(self.top - self.bottom, 0.0))
         return np.asarray(self.side[:, 0] + share * (self.side[:, 1] - self.side[:, 0]))
+
+
+@dataclass(frozen=True, eq=False)
+class FillColumns:
+    """Vertical columns of fill, each of which acts on the stone at its foot."""
+
+    stone: Numbers  # number of the block at the foot of each column (n,)
+    place: Array  # at which its forces act (n, 2) [m]
+    weight: Array  # (n,) [N]
+    lean: Array  # vertical force over the horizontal one that causes it (n,) [-]
 
 
 def _centroid_share(heights: Array) -> Array:
@@ -134,12 +143,12 @@ class FillProfile:
         """Numbers of the bodies that stand on the structure."""
         return [self.structure.block_number(name) for name in find_bodies(self.structure)]
 
-    def columns(self, lever: float = 0.0) -> tuple[Numbers, Array, Array, Array]:
-        """Return stone (n,), place (n, 2) [m], weight (n,) [N] and lean of every column of fill.
+    def columns(self, lever: float = 0.0) -> FillColumns:
+        """Return the columns of fill.
 
         A body on the fill has the moment of its forces about the fill's surface in any case: no
         shear carries it away. On one base it acts column by column; on several feet it leans on
-        those in front. The lean (n,) is that vertical force over the horizontal one [-].
+        those in front.
 
         Args:
             lever: where the place is, from 0 for the foot of a column to 1 for its centroid [-].
@@ -170,7 +179,8 @@ class FillProfile:
             lean[feet] = -above * load.sum() * arm / (load @ arm**2)
         level = np.where(soft[carried], height, _interpolate_edge(cut.side[base], cut.top[base], x))
         height -= (1.0 - lever) * (level - foot)
-        return cut.block[carrier], np.stack([x, height], axis=1), weight, lean
+        place = np.stack([x, height], axis=1)
+        return FillColumns(cut.block[carrier], place, weight, lean)
 
     def overburden(self, point: Array, side: float) -> float:
         """Return the vertical stress of all fill above a point, just beside it [Pa]."""
@@ -460,10 +470,11 @@ class BlocksWithFill:
         for action in actions:
             # a body force acts on the fill too, and so on the stone below each column
             if self.fill is not None and isinstance(action, BodyForce):
-                block, place, weight, lean = self._profile.columns(self.fill.lever)
-                pull = weight[:, None] * np.array([action.horizontal, action.vertical])
-                pull[:, 1] += action.horizontal * lean * weight
-                total += self._sum_forces(self.rigid_regions.place[block], place, pull)
+                columns = self._profile.columns(self.fill.lever)
+                pull = columns.weight[:, None] * np.array([action.horizontal, action.vertical])
+                pull[:, 1] += action.horizontal * columns.lean * columns.weight
+                stones = self.rigid_regions.place[columns.stone]
+                total += self._sum_forces(stones, columns.place, pull)
             if self.fill is not None and isinstance(action, PointLoad):
                 number, point = action.place(self.whole)
                 if self.rigid_regions.place[number] < 0:
@@ -494,7 +505,7 @@ class BlocksWithFill:
         grown = np.array(sum_body_forces(dead)) + factor * np.array(sum_body_forces(live))
         sideways, down = abs(float(grown[0])), 1.0 - grown[1]
         # what is taken off an axle, as a share of its load and of the horizontal pull
-        share = np.max(np.sign(grown[0]) * self._profile.columns()[-1], initial=0.0)
+        share = np.max(np.sign(grown[0]) * self._profile.columns().lean, initial=0.0)
         if sideways * share > down:
             logger.warning(
                 "at a factor of %.4g, %.3g g sideways, an axle has lifted, at %.3g g: the factor "
@@ -613,66 +624,3 @@ def attach_fill(structure: Structure, fill: object) -> BlocksWithFill:
     if set(regions.blocks) & set(soil):
         raise InvalidInput(f"there is nothing but fill, {names}: limit analysis is of stones")
     return BlocksWithFill(structure, place_backing(fill, structure), regions)
-
-
-def refuse_bonds(structure: Structure) -> None:
-    """Refuse joints with tensile strength, which break and do not yield."""
-    if structure.tension.any():
-        raise InvalidInput(
-            f"joints have a tensile strength of {structure.tension.max():.3g} Pa: this analysis is "
-            "for joints that yield, and bonds break; for the safe answer without them give "
-            "Contact(tension=0.0, cohesion=0.0); collapse_factor lets bonds yield, a pushover "
-            "breaks them"
-        )
-
-
-def check_options(structure: Structure, friction: str | None, strength: float | None) -> float:
-    """Refuse unknown options, and return the strength at which joints crush, infinite for none."""
-    check_choice(friction, "friction", ("coulomb", "nonassociated", None))
-    if strength is None:
-        stones = (structure.blocks[k] for k in np.unique(structure.pairs[structure.judged]))
-        own = {block.material.strength for block in stones} - {None, STONE.strength}
-        return min(filter(None, own), default=np.inf)
-    if strength != np.inf:
-        check_between(strength, "strength [Pa]", 0.0, remedy="leave it out for no limit")
-        check_number(strength, "strength [Pa], of which 5 MPa are 5e6,", minimum=1e3)
-    return strength
-
-
-def self_weight_programme(
-    structure: Structure,
-    friction: str | None,
-    strength: float | None,
-    fill: Fill | None,
-    dead: Sequence[Action] = (),
-) -> tuple[BlocksWithFill, Programme]:
-    """Return the rigid stones, and the linear programme of self-weight and other dead loads."""
-    check_type(structure, Structure, "structure", "give one, e.g. circular_arch(…)")
-    strength = check_options(structure, friction, strength)
-    stones = attach_fill(structure, fill)
-    rigid = stones.rigid_regions.structure
-    blocks = RigidBlocks(rigid)
-    coefficient = rigid.friction if friction is not None else np.full(len(rigid.joints), np.inf)
-    crushing = None
-    if np.isfinite(strength):
-        # pieces of fill have the strength of their joints, and none of stone
-        is_piece = np.array([block.grain for block in rigid.blocks])[rigid.pairs].any(axis=1)
-        crushing = blocks.crushing_forces(strength)
-        crushing = np.where(is_piece, np.inf, crushing)
-    weight = blocks.dimensionless(stones.load([SELF_WEIGHT, *dead]) + stones.active_forces())
-    # Compressions are counted from the plastic tension of bonds on: F + T/2 >= 0 at each end.
-    slope = np.where(np.isfinite(coefficient), coefficient, 0.0)
-    strengths = coefficient, blocks.cohesion - slope * blocks.tension
-    programme = Programme(
-        blocks, weight + blocks.balance @ blocks.bond, *strengths, crushing=crushing
-    )
-    if fill is None:
-        return stones, programme
-    # further unknowns, 0 to 1: the position of each contact's pressure in its range
-    pressures = sparse.diags(-blocks.coordinate_units / blocks.force_unit) @ stones.passive_forces()
-    return stones, programme.with_unknowns(pressures, np.zeros(pressures.shape[1]), 1.0)
-
-
-def is_balanced(fall: Optimum, dead: Programme, tolerance: float = 1e-8) -> bool:
-    """Return whether the forces missing for equilibrium are below a share of the weights."""
-    return fall.value <= tolerance * len(dead.blocks.structure.free)

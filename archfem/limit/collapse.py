@@ -21,14 +21,7 @@ from archfem._typing import Array, CrushingStrength
 from archfem._validation import validate_arguments
 from archfem.errors import InvalidInput, logger
 from archfem.joints.resultants import check_instant, joint_dataset
-from archfem.limit.backfill import (
-    BlocksWithFill,
-    check_options,
-    is_balanced,
-    refuse_bonds,
-    self_weight_programme,
-    sum_body_forces,
-)
+from archfem.limit.backfill import BlocksWithFill, sum_body_forces
 from archfem.limit.fill_bounds import FillBounds, bound_least_factor, refine_bounds
 from archfem.limit.fill_range import FillRange, say_part, vary_fill
 from archfem.limit.fill_strength import Fill, PlasticFill, find_clear_springing, place_backing
@@ -36,6 +29,12 @@ from archfem.limit.linear_programme import Optimum, Programme, RigidBlocks
 from archfem.limit.mechanism_kinematics import RigidRegions
 from archfem.limit.mechanism_names import name_mechanism
 from archfem.limit.nonassociated import NonassociatedBounds, search_nonassociated
+from archfem.limit.self_weight import (
+    check_options,
+    is_balanced,
+    refuse_bonds,
+    self_weight_programme,
+)
 from archfem.masonry.loads import (
     Action,
     PointLoad,

@@ -34,18 +34,13 @@ from scipy import sparse
 from archfem._display import ProgressReport
 from archfem._typing import Array, Flags, Numbers
 from archfem.errors import DidNotConverge, InvalidInput, logger
-from archfem.limit.backfill import (
-    SELF_WEIGHT,
-    BlocksWithFill,
-    check_options,
-    hold_backed,
-    sum_body_forces,
-)
+from archfem.limit.backfill import SELF_WEIGHT, BlocksWithFill, hold_backed, sum_body_forces
 from archfem.limit.cone_programme import Rows, solve_cones
 from archfem.limit.fill_mesh import HELD, SURFACE, FillMesh, mesh_fill
 from archfem.limit.fill_strength import PlasticFill, as_pressure, place_backing
 from archfem.limit.linear_programme import RigidBlocks
 from archfem.limit.mechanism_kinematics import RigidRegions, find_rigid_regions
+from archfem.limit.self_weight import check_options
 from archfem.masonry.loads import Action, BodyForce, PointLoad
 from archfem.masonry.standing import find_bodies
 from archfem.masonry.stiffness_ratio import find_yielding_blocks

@@ -26,7 +26,6 @@ from archfem._display import ExplainedWord
 from archfem._typing import Array, Flags
 from archfem._validation import check_choice, validate_arguments
 from archfem.errors import DidNotConverge, InvalidInput
-from archfem.limit.backfill import refuse_bonds
 from archfem.limit.collapse import Outcome, collapse_factor
 from archfem.limit.displaced_blocks import (
     STILL,
@@ -39,6 +38,7 @@ from archfem.limit.displaced_blocks import (
     tangent,
 )
 from archfem.limit.linear_programme import NoEquilibrium
+from archfem.limit.self_weight import refuse_bonds
 from archfem.masonry.block import largest_overlap, rotate
 from archfem.masonry.loads import Action, AttachedLoad, PointLoad, list_loads
 from archfem.masonry.stiffness_ratio import find_yielding_blocks

@@ -13,8 +13,8 @@ from scipy import sparse
 
 from archfem._typing import Array
 from archfem.errors import DidNotConverge, InvalidInput
-from archfem.limit.backfill import is_balanced, refuse_bonds, self_weight_programme
 from archfem.limit.linear_programme import Programme, RigidBlocks
+from archfem.limit.self_weight import is_balanced, refuse_bonds, self_weight_programme
 from archfem.masonry.block import as_point, say_place
 from archfem.masonry.structure import CONTACT_TOLERANCE, Structure, join_joint_names
 

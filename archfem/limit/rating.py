@@ -11,7 +11,6 @@ from archfem._display import ResultDisplay, track_progress
 from archfem._typing import Array, Metres, NewtonsPerMetre, Pascals
 from archfem._validation import validate_arguments
 from archfem.errors import InvalidInput
-from archfem.limit.backfill import check_options, is_balanced, self_weight_programme
 from archfem.limit.collapse import describe_crushing, describe_fill
 from archfem.limit.fill_range import say_part, vary_pressure
 from archfem.limit.fill_strength import (
@@ -20,6 +19,7 @@ from archfem.limit.fill_strength import (
     as_pressure,
     place_backing,
 )
+from archfem.limit.self_weight import check_options, is_balanced, self_weight_programme
 from archfem.limit.thickness import find_geometric_factor
 from archfem.limit.vehicles import (
     DRIVING_DIRECTIONS,

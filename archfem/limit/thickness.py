@@ -8,10 +8,10 @@ import numpy as np
 
 from archfem._validation import check_between, check_type, validate_arguments
 from archfem.errors import InvalidInput, InvalidStructure
-from archfem.limit.backfill import is_balanced, self_weight_programme
 from archfem.limit.collapse import stands
 from archfem.limit.fill_strength import Fill
 from archfem.limit.instability import DeepenedBlocks
+from archfem.limit.self_weight import is_balanced, self_weight_programme
 from archfem.limit.vehicles import MovingLoad
 from archfem.masonry.loads import PointLoad
 from archfem.masonry.structure import CONTACT_TOLERANCE, Structure

@@ -13,12 +13,13 @@ from archfem._display import ProgressReport, ResultDisplay, track_progress
 from archfem._typing import Array, Flags, Metres, Newtons, Numbers, Pascals
 from archfem._validation import check_choice, check_number, check_numbers
 from archfem.errors import InvalidInput, logger
-from archfem.limit.backfill import BlocksWithFill, is_balanced, refuse_bonds, self_weight_programme
+from archfem.limit.backfill import BlocksWithFill
 from archfem.limit.collapse import Collapse, collapse_factor, read_bounds, warn_locking
 from archfem.limit.fill_bounds import FillBounds, bound_least_factor, refine_bounds
 from archfem.limit.fill_strength import Fill, PlasticFill, as_pressure
 from archfem.limit.linear_programme import Optimum, Programme
 from archfem.limit.nonassociated import find_weakest, starting_forces
+from archfem.limit.self_weight import is_balanced, refuse_bonds, self_weight_programme
 from archfem.masonry.loads import Action, PointLoad
 from archfem.masonry.standing import find_bodies, parse_axles
 from archfem.masonry.structure import (

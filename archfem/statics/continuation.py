@@ -19,8 +19,8 @@ from scipy.sparse.linalg import splu
 
 from archfem._typing import Array
 from archfem.errors import ArchfemError, DidNotConverge, InvalidInput
-from archfem.limit.backfill import self_weight_programme
 from archfem.limit.linear_programme import RigidBlocks
+from archfem.limit.self_weight import self_weight_programme
 from archfem.masonry.loads import BodyForce, PointLoad, Settlement
 from archfem.models.model import Model
 from archfem.statics.equilibrium import Equilibrium, self_weight

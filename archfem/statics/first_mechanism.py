@@ -36,20 +36,21 @@ def take_fill_as_loads(
         return structure, ()
     regions = find_rigid_regions(structure)
     stones = np.isin(np.arange(len(structure.blocks)), regions.blocks)
-    stone, place, weight, lean = FillProfile(structure, stones).columns(lever)
-    if lean.any():
+    columns = FillProfile(structure, stones).columns(lever)
+    if columns.lean.any():
         raise InvalidInput(
             "an assessment takes no axles on an elastic fill, on which a vehicle leans: give its "
             "weight and length without axles, cut the fill into pieces, or push it by `archfem "
             "limit`"
         )
     loads = []
-    for number in np.unique(stone):
-        own = stone == number
-        if not structure.blocks[number].fixed and weight[own].sum() > 0.0:
-            x, y = np.average(place[own], axis=0, weights=weight[own])
+    for number in np.unique(columns.stone):
+        own = columns.stone == number
+        weight = columns.weight[own]
+        if not structure.blocks[number].fixed and weight.sum() > 0.0:
+            x, y = np.average(columns.place[own], axis=0, weights=weight)
             name = structure.blocks[number].name
-            loads.append(AttachedLoad(name, (float(x), float(y)), float(weight[own].sum())))
+            loads.append(AttachedLoad(name, (float(x), float(y)), float(weight.sum())))
     return regions.structure, tuple(loads)
 
 

@@ -23,7 +23,8 @@ from shapely import LineString, Point, Polygon
 
 import archfem as af
 from archfem.limit import Fill
-from archfem.limit.backfill import FillProfile, is_balanced, slice_blocks
+from archfem.limit.backfill import FillProfile, slice_blocks
+from archfem.limit.self_weight import is_balanced
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 
 ROUND_OFF = 1e-12
@@ -134,13 +135,14 @@ def test_slices_cover_every_block(build):
 
 def test_every_stone_carries_the_column_above_it():
     structure = arch_bridge(width=3.0)
-    carrier, foot, weight, lean = profile(structure).columns()
-    assert not lean.any()  # for no vehicle stands on it
+    columns = profile(structure).columns()
+    foot, weight = columns.place, columns.weight
+    assert not columns.lean.any()  # for no vehicle stands on it
     for number, block in enumerate(structure.blocks):
         if block.part != "arch":
             continue
         expected, x = column_above(structure, number)
-        own = carrier == number
+        own = columns.stone == number
         assert weight[own].sum() == pytest.approx(expected, rel=1e-6)  # corners merged within 1e-6
         assert (weight * foot[:, 0])[own].sum() / expected == pytest.approx(x, rel=1e-6)
     whole = fill_of(structure)
@@ -181,9 +183,9 @@ def test_nothing_of_an_eroded_fill_under_paving_is_lost_between_two_rings():
     found = profile(structure)
     resting = [b for b, stone in zip(structure.blocks, found.stones, strict=True) if not stone]
     weight = 4.7 * sum(block.area * block.material.unit_weight for block in resting)
-    carrier, _, weights, _ = found.columns()
-    assert weights.sum() == pytest.approx(weight, rel=AREA_ROUND_OFF)
-    parts = {structure.blocks[number].part for number in carrier}
+    columns = found.columns()
+    assert columns.weight.sum() == pytest.approx(weight, rel=AREA_ROUND_OFF)
+    parts = {structure.blocks[number].part for number in columns.stone}
     assert parts >= {"west arch", "east arch", "pier", "west wall", "east wall"}
 
 
@@ -191,8 +193,8 @@ def test_paving_rests_on_the_blocks_under_the_fill():
     bare, paved = (profile(row_of_stones(paving=paving)).columns() for paving in (0.0, 0.2))
     each = 0.5 * 0.2 * af.STONE.unit_weight
     for stone in range(1, 13):
-        added = paved[2][paved[0] == stone].sum() - bare[2][bare[0] == stone].sum()
-        assert added == pytest.approx(each, rel=AREA_ROUND_OFF)
+        more, less = (x.weight[x.stone == stone].sum() for x in (paved, bare))
+        assert more - less == pytest.approx(each, rel=AREA_ROUND_OFF)
 
 
 def test_overburden_is_unit_weight_times_depth():

@@ -13,8 +13,8 @@ from scipy.optimize import linprog
 
 import archfem as af
 from archfem.limit import linear_programme
-from archfem.limit.backfill import self_weight_programme
 from archfem.limit.linear_programme import RigidBlocks
+from archfem.limit.self_weight import self_weight_programme
 
 
 @pytest.fixture

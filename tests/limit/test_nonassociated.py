@@ -11,10 +11,10 @@ from scipy.optimize import Bounds, LinearConstraint, milp
 
 import archfem as af
 from archfem.limit import Outcome, linear_programme, nonassociated
-from archfem.limit.backfill import self_weight_programme
 from archfem.limit.collapse import warn_lost_solution
 from archfem.limit.linear_programme import RigidBlocks
 from archfem.limit.nonassociated import descend, find_solution, starting_forces
+from archfem.limit.self_weight import self_weight_programme
 
 EXACT = 1e-7
 """Relative: the programme is solved to 1e-9 block weights."""

@@ -11,8 +11,8 @@ from scipy import sparse
 from scipy.optimize import linprog
 
 import archfem as af
-from archfem.limit.backfill import self_weight_programme
 from archfem.limit.linear_programme import RigidBlocks
+from archfem.limit.self_weight import self_weight_programme
 
 SIDEWAYS = af.BodyForce(1.0)
 
