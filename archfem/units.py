@@ -1,11 +1,11 @@
 """Units: factors into SI, as in `young=30 * GPa`, and quantities as text, as in "1.48 MPa/mm"."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from functools import cache, partial
 from math import degrees, inf, isfinite, pi, prod, tan
-from typing import Any
+from typing import Any, Self
 
 from archfem._validation import is_number, short_repr, validate_arguments
 from archfem.errors import InvalidInput, logger
@@ -153,6 +153,24 @@ def format_ratio(ratio: float, digits: int = 3) -> str:
     """Return a ratio with some digits, and more where it would be rounded to or across 1."""
     texts = [f"{ratio:.{count}g}" for count in range(digits, 18)]
     return next(x for x in texts if (float(x) > 1.0, float(x) < 1.0) == (ratio > 1.0, ratio < 1.0))
+
+
+class Ends(tuple[float, ...]):
+    """Least and largest of a number, of one format; "mm" is that of lengths, "ratio" of ratios."""
+
+    @classmethod
+    def of(cls, numbers: Iterable[float]) -> Self:
+        """Return the ends of some numbers."""
+        known = [*numbers]
+        return cls((min(known), max(known)))
+
+    def __format__(self, spec: str) -> str:
+        """Return both ends, or one where their texts do not differ."""
+        if spec == "mm":
+            texts = (format_mm(end).removesuffix(" mm") for end in self)
+            return f"{' to '.join(dict.fromkeys(texts))} mm"
+        texts = (format_ratio(end) if spec == "ratio" else format(end, spec) for end in self)
+        return " to ".join(dict.fromkeys(texts))
 
 
 def _check_text(text: str, unit: str, key: str) -> None:

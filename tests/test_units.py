@@ -5,8 +5,7 @@ import pint
 import pytest
 
 import archfem as af
-from archfem.models.model import Ends
-from archfem.units import format_ratio
+from archfem.units import Ends, format_ratio
 
 
 @pytest.fixture(scope="module")

@@ -13,13 +13,13 @@ from archfem.dynamics.motion_scaling import CollapseScale, MechanismScales
 from archfem.limit.fill_range import FillRange
 from archfem.limit.rating import Rating
 from archfem.masonry.structure import join_words
-from archfem.models.model import Doubt, Ends, read_doubts, write_doubts
+from archfem.models.model import Doubt, read_doubts, write_doubts
 from archfem.motion.hazard import DESIGN_PERIOD, MEASURES
 from archfem.motion.matching import DEFAULT_BAND
 from archfem.motion.motion import Motion
 from archfem.statics.assessment_checks import AssessmentCheck
 from archfem.statics.mechanism_assessment import KinematicAssessment
-from archfem.units import STANDARD_GRAVITY, format_ratio
+from archfem.units import STANDARD_GRAVITY, Ends, format_ratio
 
 # Results by the names of their files
 RESULTS = {

@@ -51,13 +51,13 @@ from archfem.masonry.structure import (
     join_words,
     list_or_count,
 )
-from archfem.models.model import Doubt, Ends
+from archfem.models.model import Doubt
 from archfem.motion.matching import Match
 from archfem.motion.motion import Motion
 from archfem.motion.response_spectra import measure_intensity
 from archfem.statics.pushover import Pushover
 from archfem.statics.stress import strength_use_text, utilisation_text
-from archfem.units import STANDARD_GRAVITY, format_mm, kN
+from archfem.units import STANDARD_GRAVITY, Ends, format_mm, kN
 
 # A doubt, or a line with a note
 Remark = Doubt | str

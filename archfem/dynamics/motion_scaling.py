@@ -39,9 +39,10 @@ from archfem.errors import DidNotConverge, InvalidInput
 from archfem.joints.criteria import Criteria
 from archfem.limit.mechanism_count import Mechanism
 from archfem.masonry.structure import Structure, join_names
-from archfem.models.model import Doubt, Ends, Model, group_doubts, log_doubts_once, merge_doubts
+from archfem.models.model import Doubt, Model, group_doubts, log_doubts_once, merge_doubts
 from archfem.motion.motion import Motion, admissible_range
 from archfem.statics.equilibrium import Equilibrium, dead_load
+from archfem.units import Ends
 
 # Limit state of large displacements, in place of a definition of mechanisms
 COLLAPSE_DEFINITION = "collapse"

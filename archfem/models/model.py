@@ -21,7 +21,7 @@ from archfem.errors import InvalidInput, filter_log
 from archfem.joints.operator import JointOperator
 from archfem.masonry.loads import Action, BodyForce, Settlement
 from archfem.masonry.structure import Structure
-from archfem.units import format_mm, format_ratio
+from archfem.units import Ends
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,24 +181,6 @@ class Doubt:
         """Place, cause and remedy as one sentence."""
         text = f"{self.place}: {self.cause}" if self.place else self.cause
         return f"{text}; {self.remedy}" if self.remedy else text
-
-
-class Ends(tuple[float, ...]):
-    """Least and largest of a number, of one format; "mm" is that of lengths, "ratio" of ratios."""
-
-    @classmethod
-    def of(cls, numbers: Iterable[float]) -> Self:
-        """Return the ends of some numbers."""
-        known = [*numbers]
-        return cls((min(known), max(known)))
-
-    def __format__(self, spec: str) -> str:
-        """Return both ends, or one where their texts do not differ."""
-        if spec == "mm":
-            texts = (format_mm(end).removesuffix(" mm") for end in self)
-            return f"{' to '.join(dict.fromkeys(texts))} mm"
-        texts = (format_ratio(end) if spec == "ratio" else format(end, spec) for end in self)
-        return " to ".join(dict.fromkeys(texts))
 
 
 def list_ends(value: Any) -> tuple[float, ...]:

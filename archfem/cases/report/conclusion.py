@@ -43,8 +43,8 @@ from archfem.dynamics.rigid_body.rocking_body import describe_first_fall, say_sc
 from archfem.dynamics.verdict_range import HALF_STEP, UNVARIED, VerdictRange
 from archfem.dynamics.walls_across import SCALES_ACROSS
 from archfem.masonry.structure import UNCHECKED_ACROSS, Structure, join_names, join_words
-from archfem.models.model import Doubt, Ends
-from archfem.units import format_mm, format_ratio
+from archfem.models.model import Doubt
+from archfem.units import Ends, format_mm, format_ratio
 from archfem.view.pages.document import Grid, Section, TextBlock
 
 # Outcomes of runs as verbs and in plain words, the worst first; small displacements end where

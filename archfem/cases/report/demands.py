@@ -9,8 +9,7 @@ from archfem.cases.report.doubts import MAX_RATIO_OF_PEAKS, peak_of_ground, read
 from archfem.cases.report.report_data import ReportData
 from archfem.cases.result_text import peak_of_spectrum
 from archfem.masonry.structure import join_words
-from archfem.models.model import Ends
-from archfem.units import STANDARD_GRAVITY
+from archfem.units import STANDARD_GRAVITY, Ends
 from archfem.view.pages.document import Grid
 
 

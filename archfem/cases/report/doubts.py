@@ -20,9 +20,9 @@ from archfem.dynamics.verdict_range import (
 from archfem.masonry.joint_closing import finish_range
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import join_words
-from archfem.models.model import Doubt, Ends, group_doubts, merge_doubts
+from archfem.models.model import Doubt, group_doubts, merge_doubts
 from archfem.statics.assessment_checks import UPPER_BOUND
-from archfem.units import STANDARD_GRAVITY
+from archfem.units import STANDARD_GRAVITY, Ends
 
 # Ratio of the peaks of motions and spectrum beyond which they are different demands: those of
 # matched motions exceed the target by a tenth

@@ -31,13 +31,12 @@ from archfem.masonry.joint_closing import FINISHED_KEYS
 from archfem.masonry.materials import Contact, Material
 from archfem.masonry.shapes.bridge_parts import Backfill
 from archfem.masonry.structure import Structure, describe_piers, find_clear_spans
-from archfem.models.model import Ends
 from archfem.motion.design_spectra import CodeSpectrum
 from archfem.motion.matching import DEFAULT_BAND
 from archfem.motion.motion import Motion
 from archfem.statics.mechanism_assessment import kinematic_assessment
 from archfem.statics.pushover import pushover
-from archfem.units import in_unit
+from archfem.units import Ends, in_unit
 from archfem.view.pages.document import Grid
 
 Row = tuple[str, str, str]  # quantity, value, mark

@@ -11,7 +11,7 @@ from archfem.dynamics.collapse_state import COLLAPSE_STATES
 from archfem.dynamics.monitor import PULLED
 from archfem.dynamics.motion_scaling import UNFINISHED
 from archfem.masonry.structure import join_words
-from archfem.models.model import Ends
+from archfem.units import Ends
 
 # States that a search of scales finds, in the words of margin and answer
 _STATES = {

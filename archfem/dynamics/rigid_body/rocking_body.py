@@ -31,9 +31,9 @@ from archfem.dynamics.collapse_state import (
 from archfem.dynamics.rigid_body.bodies import masses_of
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import Structure
-from archfem.models.model import Doubt, Ends
+from archfem.models.model import Doubt
 from archfem.motion.motion import Motion
-from archfem.units import STANDARD_GRAVITY
+from archfem.units import STANDARD_GRAVITY, Ends
 
 # Step of the integration, and time after a motion in which a body falls or comes to rest [s]: the
 # least pulses that overturn a block are those of exact integration to 0.1 %
