@@ -604,6 +604,17 @@ def test_the_paper_is_cited_where_a_value_is_its_own_alone():
     assert len(own) > 5
     assert found[0] == (f"{name}: k_n", " to ".join(ends))
     assert [x for x, _ in found] == [f"{name}: {word}" for word in ("k_n", "k_s", "μ")]
+    # a given k_n is that of the joint alone, and in series with that of the fill it is less
+    tables["contacts"] = {"soil to stone": {"normal_stiffness": "2 MPa/mm"}}
+    case = af.Case.of(tables)
+    own = {x.contact for x in case.structure.joints if x.contact.name == "soil to stone"}
+    ends = [f"{f(x.normal_stiffness for x in own) / 1e9:.4g} MPa/mm" for f in (min, max)]
+    assert max(x.normal_stiffness for x in own) < 2e9
+    rows = tabulate_inputs(report_data.ReportData(case, {})).rows
+    assert [row for row in rows if row[0].startswith(f"{name}: k_n")] == [
+        (f"{name}: k_n", "2 MPa/mm", "given"),
+        (f"{name}: k_n with its pieces of fill", " to ".join(ends), "inferred"),
+    ]
 
 
 def test_materials_that_differ_in_weight_alone_stand_once():

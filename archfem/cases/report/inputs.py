@@ -209,6 +209,14 @@ def _property_rows(data: ReportData) -> Iterator[Row]:
                 values = [getattr(each, key) for each, _ in group]
                 ends = (value_text(section, key, x) for x in (min(values), max(values)))
                 text = " to ".join(dict.fromkeys(ends))
+                if cls is Contact and mark == "given":  # pieces of fill beside joints add to theirs
+                    own = find_table(data.case.settings, first)[1][key]
+                    yield (
+                        f"{name}: {word}",
+                        value_text(section, key, in_unit(own, "Pa/m", key)),
+                        mark,
+                    )
+                    word, mark = f"{word} with its pieces of fill", "inferred"
             yield f"{name}: {word}", text, mark
 
 
