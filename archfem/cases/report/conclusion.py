@@ -120,7 +120,8 @@ def _say_plainly(data: ReportData, doubtful: Sequence[str]) -> Iterator[str]:
         yield from _say_first_failures(data)
         yield from say_fragile(data)
         yield _say_what_decides(data.verdict_ranges)
-    for found in dict.fromkeys(_judge_checks(data)):  # of each direction
+    # of each direction
+    for found in dict.fromkeys(_judge_check(data, check)[0] for check in list_checks(data)):
         yield f"by the kinematic assessment {found}"
     for name, stated in data.statements.items():
         yield from (pushes := [*_say_pushes(data, name, stated)])
@@ -211,23 +212,24 @@ def _say_what_decides(ranges: Sequence[VerdictRange]) -> str:
     return "no property that was varied decides" if ranges else "no property was varied"
 
 
-def _judge_checks(data: ReportData) -> Iterator[str]:
-    """Yield whether the structure withstands the spectrum, by each check of an assessment."""
-    for check in list_checks(data):
-        of = name_spectrum(data)
-        if check.needed:
-            yield f"it does not withstand under some assumptions on the fill {of}"
-        elif check.least < 1.0:
-            yield f"it does not withstand {of}"
-        elif check.by_split:
-            yield f"it withstands or not, by the split of weights, {of}"
-        elif check.bounded:
-            bound = f"as its ratio, {format_ratio(check.least)}, is an upper bound"
-            yield f"alone it is not shown to withstand {of}, {bound}: {_say_test(data)}"
-        elif check.moved and _say_motion(data, check.least, peak_of_spectrum(data.case)):
-            yield f"it withstands at rest alone, and moves in the runs, {of}"
-        else:
-            yield f"it withstands {of}"
+def _judge_check(data: ReportData, check: Ratios) -> tuple[str, str]:
+    """Return whether the structure withstands the spectrum by a check, and why its ratio fails."""
+    of = name_spectrum(data)
+    if check.needed:
+        words = f", passed only with {check.needed}"
+        return f"it does not withstand under some assumptions on the fill {of}", words
+    if check.least < 1.0:
+        return f"it does not withstand {of}", ", which it fails"
+    if check.by_split:
+        words = ", which it fails with one weight a body"
+        return f"it withstands or not, by the split of weights, {of}", words
+    if check.bounded:
+        bound, test = f"its ratio, {format_ratio(check.least)}, is an upper bound", _say_test(data)
+        words = f"alone it is not shown to withstand {of}, as {bound}: {test}"
+        return words, f", an upper bound: {test}"
+    if check.moved and _say_motion(data, check.least, peak_of_spectrum(data.case)):
+        return f"it withstands at rest alone, and moves in the runs, {of}", ""
+    return f"it withstands {of}", ""
 
 
 def _say_test(data: ReportData) -> str:
@@ -452,11 +454,7 @@ def _describe_check(data: ReportData, check: Ratios) -> tuple[float, list[str]]:
     if check.moved is not None and moves:  # what moves at less than the push that begins it is
         begins = f"the check passes for what is at rest, and {moves}"  # judged by how far
         return check.moved, [f"{check.moved:.3g} by displacements, {by}", begins]
-    fails = f", passed only with {check.needed}" if check.needed else ""
-    fails = fails or ", which it fails" * (check.least < 1.0)
-    fails = fails or ", which it fails with one weight a body" * check.by_split
-    fails = fails or f", an upper bound: {_say_test(data)}" * check.bounded
-    ends = f"{Ends((check.least, check.most)):ratio}"
+    ends, (_, fails) = f"{Ends((check.least, check.most)):ratio}", _judge_check(data, check)
     texts = [f"{ends}{over}{check.beside}, {by}{fails}"]
     if check.moved is not None:
         texts.append(f"{ends} times the spectrum begins to move it")
