@@ -114,29 +114,43 @@ class StandingBody:
         Raises:
             InvalidInput: it stands beside the structure, or on less width than there is.
         """
-        feet, mass = self.feet, self.centre_of_gravity
-        places, lengths = feet.mean(axis=1), np.ptp(feet, axis=1)
-        below = [[block.top(x) for block in structure.blocks] for x in places]
-        tops = [top for each in below for top in each if top is not None]
-        beyond = [x for x, each in zip(places, below, strict=True) if each.count(None) == len(each)]
-        if tops and beyond:
-            raise InvalidInput(
-                f"'{self.name}': its axle at x = {beyond[0]:.4g} m is beyond the structure: give "
-                "only the axles on the bridge, with their spacings and x halfway between them"
-            )
-        if not tops:
-            raise InvalidInput(
-                f"'{self.name}' stands at x = {self.x:.4g} m beside the structure: move it onto a "
-                "block"
-            )
-        width = structure.width if self.width is None else self.width
+        level, width = self._find_level(structure), self.width or structure.width
         if width > structure.width:
             raise InvalidInput(
                 f"'{self.name}': width {width:.4g} m, and the structure has {structure.width:.4g} "
                 "m: leave it out"
             )
+        outline, area = self._outline()
+        corners = tuple((float(x), float(level + y)) for x, y in outline)
+        # it stands for itself, at any weight
+        unit_weight = self.total / (area * width)
+        material = Material(30.0 * GPa, 0.2, unit_weight, None, self.name, stands_for=self.name)
+        return Block(corners, material, self.name, part=self.name, role="other")
+
+    def _find_level(self, structure: Structure) -> float:
+        """Return the level of the base on a structure, its highest point below a foot [m]."""
+        places = self.feet.mean(axis=1)
+        below = [[block.top(x) for block in structure.blocks] for x in places]
+        tops = [top for each in below for top in each if top is not None]
+        if not tops:
+            raise InvalidInput(
+                f"'{self.name}' stands at x = {self.x:.4g} m beside the structure: move it onto a "
+                "block"
+            )
+        beyond = [x for x, each in zip(places, below, strict=True) if each.count(None) == len(each)]
+        if beyond:
+            raise InvalidInput(
+                f"'{self.name}': its axle at x = {beyond[0]:.4g} m is beyond the structure: give "
+                "only the axles on the bridge, with their spacings and x halfway between them"
+            )
+        return max(tops)
+
+    def _outline(self) -> tuple[list[tuple[float, float]], float]:
+        """Return the corners, above the base [m], and the area [m²] about its centre of gravity."""
+        feet, mass = self.feet, self.centre_of_gravity
+        lengths = np.ptp(feet, axis=1)
         # the outline is as long on both sides of the centre of gravity, but for round-off
-        middle = np.average(places, weights=lengths)
+        middle = np.average(feet.mean(axis=1), weights=lengths)
         lean = round(float(feet[0, 0] + feet[-1, 1] - 2.0 * middle), 9)
         left, right = feet[0, 0] - max(lean, 0.0), feet[-1, 1] - min(lean, 0.0)
         leg = 0.1 * mass if len(feet) > 1 else 0.0
@@ -145,11 +159,7 @@ class StandingBody:
         height = above + np.sqrt(above**2 + 2.0 * legs * (mass - 0.5 * leg) / (right - left))
         base = [(x, y) for a, b in feet for x, y in ((a, leg), (a, 0.0), (b, 0.0), (b, leg))]
         base = [(left, leg), *base, (right, leg), (right, leg + height), (left, leg + height)]
-        corners = tuple((float(x), float(max(tops) + y)) for x, y in dict.fromkeys(base))
-        unit_weight = self.total / ((legs + height * (right - left)) * width)
-        # it stands for itself, at any weight
-        material = Material(30.0 * GPa, 0.2, unit_weight, None, self.name, stands_for=self.name)
-        return Block(corners, material, self.name, part=self.name, role="other")
+        return [*dict.fromkeys(base)], float(legs + height * (right - left))
 
 
 def find_bodies(structure: Structure) -> list[str]:
