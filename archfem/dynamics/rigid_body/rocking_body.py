@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from archfem._numba import entry, kernel
-from archfem._typing import Array, Flags
+from archfem._typing import Array
 from archfem.dynamics.collapse_state import (
     DISLOCATION,
     FALLEN_STATES,
@@ -85,58 +85,59 @@ class RockingBody:
 
     def rock(self, motion: Motion) -> Rocking | None:
         """Return the response to a motion; None if the body slides."""
-        (time,), (displacement,), (slides,) = self.rock_scaled(motion, np.ones(1))
-        return None if slides else Rocking(float(time), float(displacement))
-
-    def rock_scaled(self, motion: Motion, scales: Array) -> tuple[Array, Array, Flags]:
-        """Return times of fall, displacements, and what slides, by multiples of a motion (k,)."""
-        ground = motion.at(STEP * (np.arange(int((motion.duration + REST) / STEP)) + 0.5))
-        body = self.arms, self.reach, self.foot, self.inertia, self.gravity, self.friction
-        found = np.zeros((len(scales), 3))
-        rock_steps(ground, scales, body, found)
-        return found[:, 0], found[:, 1], found[:, 2] > 0.0
+        return self._rock_on(_sample_ground(motion))
 
     def first_fall(self, motion: Motion, between: tuple[float, float]) -> FirstFall | None:
         """Return the first fall over multiples of a motion; None if it slides at a smaller one."""
         lower, upper = between
-        scales = np.geomspace(lower, upper, int(np.ceil(log(upper / lower) / log(SCALE_RATIO))) + 1)
-        times, _, slides = self.rock_scaled(motion, scales)
-        fell = np.isfinite(times)
-        first = int(fell.argmax()) if fell.any() else len(scales)
-        if slides[:first].any():
+        count = int(np.ceil(log(upper / lower) / log(SCALE_RATIO))) + 1
+        scales, ground = np.geomspace(lower, upper, count).tolist(), _sample_ground(motion)
+        found = [self._rock_on(ground, scale) for scale in scales]
+        first = next((k for k, x in enumerate(found) if x and x.time < inf), count)
+        if None in found[:first]:
             return None
-        again = scales[first:][~(fell | slides)[first:]].tolist()
-        return FirstFall([*scales.tolist(), inf][first], (again[0], again[-1]) if again else None)
+        after = zip(scales[first:], found[first:], strict=True)
+        again = [scale for scale, x in after if x and x.time == inf]
+        return FirstFall([*scales, inf][first], (again[0], again[-1]) if again else None)
+
+    def _rock_on(self, ground: Array, scale: float = 1.0) -> Rocking | None:
+        """Return the response to a multiple of a sampled motion; None if the body slides."""
+        body = self.arms, self.reach, self.foot, self.inertia, self.gravity, self.friction
+        time, displacement, slides = rock_steps(ground, scale, body)
+        return None if slides else Rocking(time, displacement)
+
+
+def _sample_ground(motion: Motion) -> Array:
+    """Return the accelerations in the middles of steps, of a motion and rest after it (k, 2)."""
+    return motion.at(STEP * (np.arange(int((motion.duration + REST) / STEP)) + 0.5))
 
 
 @entry
-def rock_steps(ground, scales, body, found):  # type: ignore
-    """Follow a body under multiples of a motion (k,): its fall, displacement and sliding (k, 3).
+def rock_steps(ground, scale, body):  # type: ignore
+    """Return when a body falls under a multiple of a motion, its displacement, whether it slides.
 
     The body is of the fields of `RockingBody`, with the direction of its foot.
     """
     arms, reach, _, inertia, gravity, _ = body
-    for n in range(len(scales)):
-        angle, speed, side, found[n, 0] = 0.0, 0.0, 0, inf
-        for k in range(len(ground)):
-            across, up = scales[n] * ground[k, 0], scales[n] * ground[k, 1] + gravity
-            # at rest: about the left end, or else the right one
-            if angle == 0.0 and speed == 0.0:
-                side = int(arms[1][1] * across > arms[1][0] * up)
-            turn, slips = _accelerate(body, (angle, speed, side), across, up)
-            if slips:
-                found[n, 2] = 1.0
-                break
-            before, speed = angle, speed + STEP * turn
-            angle += STEP * speed
-            if before != 0.0 and angle * before <= 0.0:
-                share = before / (before - angle)  # of the step until it lands
-                speed, side = _land(arms, inertia, gravity, side, speed)
-                angle = (1.0 - share) * STEP * speed
-            found[n, 1] = max(found[n, 1], 2.0 * reach[side] * sin(0.5 * abs(angle)))
-            if abs(angle) > LOST:
-                found[n, 0] = STEP * (k + 1)
-                break
+    angle, speed, side, displacement = 0.0, 0.0, 0, 0.0
+    for k in range(len(ground)):
+        across, up = scale * ground[k, 0], scale * ground[k, 1] + gravity
+        # at rest: about the left end, or else the right one
+        if angle == 0.0 and speed == 0.0:
+            side = int(arms[1][1] * across > arms[1][0] * up)
+        turn, slips = _accelerate(body, (angle, speed, side), across, up)
+        if slips:
+            return inf, displacement, True
+        before, speed = angle, speed + STEP * turn
+        angle += STEP * speed
+        if before != 0.0 and angle * before <= 0.0:
+            share = before / (before - angle)  # of the step until it lands
+            speed, side = _land(arms, inertia, gravity, side, speed)
+            angle = (1.0 - share) * STEP * speed
+        displacement = max(displacement, 2.0 * reach[side] * sin(0.5 * abs(angle)))
+        if abs(angle) > LOST:
+            return STEP * (k + 1), displacement, False
+    return inf, displacement, False
 
 
 @kernel
