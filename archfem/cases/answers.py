@@ -9,7 +9,8 @@ import numpy as np
 from archfem._display import NOTE_MARK
 from archfem.cases.case import Case
 from archfem.cases.result_text import PushFactors, Remark, ResultTable
-from archfem.dynamics.motion_scaling import CollapseScale, MechanismScales
+from archfem.dynamics.motion_scaling import CollapseScale
+from archfem.dynamics.scale_search import MechanismScales
 from archfem.limit.fill_range import FillRange
 from archfem.limit.rating import Rating
 from archfem.masonry.structure import join_words

@@ -24,14 +24,8 @@ from archfem.commands.run import (
 )
 from archfem.dynamics.collapse_state import DISLOCATION, CollapseState, shallowest_part
 from archfem.dynamics.history import Ending
-from archfem.dynamics.motion_scaling import (
-    CollapseScale,
-    KeptRuns,
-    MechanismScales,
-    ScaledRun,
-    collapse_scale,
-    mechanism_scales,
-)
+from archfem.dynamics.motion_scaling import CollapseScale, collapse_scale, mechanism_scales
+from archfem.dynamics.scale_search import KeptRuns, MechanismScales, ScaledRun
 from archfem.errors import InvalidInput
 from archfem.limit.mechanism_count import Mechanism
 from archfem.models.model import Doubt

@@ -15,6 +15,7 @@
     motion_scaling    scale of a motion at first mechanism or collapse
     recorder          Record, recording of a run
     rigid_body        free rigid blocks with impacts and friction
+    scale_search      search of scales: runs, brackets, next scale
     schemes           time integration schemes, Rayleigh and stiffness damping
     separation        joints that let go, stones that meet, blocks that overturn
     slip_error        error of the slip of joints in time stepping

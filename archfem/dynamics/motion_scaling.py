@@ -1,28 +1,21 @@
-"""Scale of a ground motion at the first mechanism, or at collapse of the structure.
+"""Scale of a ground motion at the first mechanism, or at collapse of the structure."""
 
-Incremental dynamic analysis: runs at increasing and decreasing scales until each limit state is
-bracketed, then at the geometric mean of the widest bracket. A structure may stand at a larger scale
-than one at which it falls. Hence runs also fill the gaps between scales below the smallest fall;
-where one falls, the search continues below it.
-"""
-
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import pairwise
-from math import inf, sqrt
-from time import perf_counter
+from math import inf
 from typing import Any
 
-from archfem._display import ProgressReport, call_late_bound
+from archfem._display import call_late_bound
 from archfem._files import align_columns
 from archfem._validation import validate_arguments, validate_methods
 from archfem.dynamics.analysis import Analysis, takes_analysis, takes_falling_analysis
-from archfem.dynamics.collapse_state import FALLEN_STATES, CollapseState, doubt_soft_blocks
+from archfem.dynamics.collapse_state import doubt_soft_blocks
 from archfem.dynamics.events import EveryMechanism, applicable_definitions
 from archfem.dynamics.fall import state_rigid_falls
 from archfem.dynamics.history import Ending, History, first_mechanisms, partial_history
-from archfem.dynamics.monitor import FILL_TENSION, PULLED, refuse_fill_in_tension
+from archfem.dynamics.monitor import refuse_fill_in_tension
 from archfem.dynamics.recorder import Record
 from archfem.dynamics.rigid_body.rocking_body import (
     FirstFall,
@@ -30,180 +23,35 @@ from archfem.dynamics.rigid_body.rocking_body import (
     find_first_fall,
     say_scale,
 )
+from archfem.dynamics.scale_search import (
+    COLLAPSE_DEFINITION,
+    FILLED_SHARE,
+    NEAR_RATIO,
+    Bracket,
+    KeptRuns,
+    MechanismScales,
+    ScaledRun,
+    check_search,
+    doubt_searches,
+    find_tension,
+    list_bounds,
+    say_bracket,
+    search_scales,
+)
 from archfem.dynamics.schemes import EffectiveDamping, Viscous
 from archfem.dynamics.solvers.integrator import Stepper
 from archfem.dynamics.time_history import time_history
-from archfem.dynamics.verdict import MECHANISM_DEFINITIONS
 from archfem.dynamics.verdict_range import VerdictRange
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.joints.criteria import Criteria
-from archfem.limit.mechanism_count import Mechanism
 from archfem.masonry.structure import Structure, join_names
-from archfem.models.model import Doubt, Model, group_doubts, log_doubts_once, merge_doubts
+from archfem.models.model import Doubt, Model
 from archfem.motion.motion import Motion, admissible_range
 from archfem.statics.equilibrium import Equilibrium, dead_load
 from archfem.units import Ends
 
-# Limit state of large displacements, in place of a definition of mechanisms
-COLLAPSE_DEFINITION = "collapse"
-
-# Words beside the bounds of a search that Ctrl-C has ended
-UNFINISHED = "search unfinished"
-
 # Step of a search that is given none, and the least to which it is shortened for sliding [s]
 OWN_STEP, LEAST_STEP = 0.005, 0.0005
-
-# Gaps between scales are filled down to a ratio, from a share of the smallest fall on [-]
-FILLED_SHARE, FILLED_RATIO = 0.5, 1.1
-NEAR_SHARE, NEAR_RATIO = 0.7, 1.05  # where windows of falls are most frequent
-
-
-@dataclass(frozen=True)
-class ScaledRun:
-    """Result of one run of a search."""
-
-    scale: float  # factor on the motion [-]
-    mechanisms: dict[str, Mechanism | None]  # the first mechanism by each definition, or None
-    ending: Ending
-    outcome: str  # ending in words
-    fall: CollapseState | None = None  # state of collapse; None for small displacements
-    doubts: tuple[Doubt, ...] = ()
-    admissible_step: float = inf  # that follows sliding, where that of the run does not [s]
-
-    def has_answer(self, definition: str) -> bool:
-        """Return whether the run decides on a limit state: on a fall by a state of collapse."""
-        return definition != COLLAPSE_DEFINITION or self.fall is not None
-
-    def fails(self, definition: str) -> bool:
-        """Return whether the limit state was met."""
-        if definition == COLLAPSE_DEFINITION:
-            return self.fall is not None and self.fall.kind in FALLEN_STATES
-        # a step without equilibrium counts as a mechanism
-        return self.mechanisms[definition] is not None or self.ending is Ending.FAILED
-
-    def survives(self, definition: str) -> bool:
-        """Return whether the whole motion passed without the limit state."""
-        return self.has_answer(definition) and not self.fails(definition)
-
-
-# Runs by time step, None where it was not given, and scale
-KeptRuns = Mapping[tuple[float | None, float], ScaledRun]
-
-
-@dataclass(frozen=True)
-class Bracket:
-    """Scales between which a limit state is first met.
-
-    Failure need not be monotonic in the scale: the smallest failing scale counts.
-    """
-
-    lower: float  # largest surviving scale below `upper` [-]; 0 for none
-    upper: float  # smallest failing scale [-]; infinite for none
-    run: ScaledRun | None  # that at `upper`, or None
-    above: tuple[float, ...]  # surviving scales beyond `upper`
-    unanswered: tuple[float, ...] = ()  # scales of runs that do not decide on it
-
-    @property
-    def ratio(self) -> float:
-        """Ratio of the bounds [-]; infinite where one is missing."""
-        return self.upper / self.lower if self.lower > 0.0 else inf
-
-
-@dataclass(frozen=True)
-class MechanismScales:
-    """Runs of a search for the scales at first mechanism; `scales[definition]` is a bracket."""
-
-    definitions: tuple[str, ...]  # for which the structure has enough joints
-    runs: tuple[ScaledRun, ...] = ()  # in order of their scales
-    interrupted: bool = False  # whether Ctrl-C ended the search
-    pga: float | None = None  # peak of the motion [m/s²]
-    dt: float | None = None  # time step that was given [s]
-
-    @property
-    def first(self) -> str:
-        """Definition of the mechanism that is met at the smallest scale."""
-        return min(self.definitions, key=lambda definition: self[definition].upper)
-
-    @property
-    def held(self) -> float:
-        """Largest scale below the first mechanism, and below a fill in tension [-]; 0 for none."""
-        most, below = self[self.first].lower, _find_tension(self.runs)
-        stood = (run.scale for run in self.runs if run.survives(self.first) and run.scale < below)
-        return max((scale for scale in stood if scale <= most), default=0.0)
-
-    @property
-    def states(self) -> dict[str, float]:
-        """Smallest scales at which it forms a mechanism, and before at which its fill is pulled."""
-        bracket, pulled = self[self.first], _find_tension(self.runs)
-        scales = {"tension": pulled} if pulled <= bracket.lower else {}
-        return scales | ({"mechanism": bracket.upper} if bracket.run else {})
-
-    @property
-    def sentence(self) -> str:
-        """Scales around the first mechanism by any definition, in words."""
-        first, bracket = self.first, self[self.first]
-        met = "nor at any scale that was tried"
-        if bracket.run:
-            met = f"first mechanism at {say_scale(bracket.upper, self.pga)}, by {first}"
-        return _say_bracket("no mechanism", self, met)
-
-    def __repr__(self) -> str:
-        """Return the sentence."""
-        return self.sentence
-
-    @property
-    def doubts(self) -> tuple[Doubt, ...]:
-        """Reasons why the scales of the first mechanism may be wrong."""
-        return _doubts_of_searches({"": self}, self.first)
-
-    @property
-    def kept_runs(self) -> KeptRuns:
-        """Runs by time step and scale."""
-        return {(self.dt, run.scale): run for run in self.runs}
-
-    def with_run(self, run: ScaledRun) -> "MechanismScales":
-        """Return the search with one more run."""
-        return replace(self, runs=tuple(sorted([*self.runs, run], key=lambda each: each.scale)))
-
-    def __getitem__(self, definition: str) -> Bracket:
-        """Bracket of a definition; without bounds if the structure has too few joints for it."""
-        if definition not in self.definitions:
-            return Bracket(0.0, inf, None, ())
-        failing = [run for run in self.runs if run.fails(definition)]
-        surviving = [run.scale for run in self.runs if run.survives(definition)]
-        upper = failing[0].scale if failing else inf
-        return Bracket(
-            max((scale for scale in surviving if scale < upper), default=0.0),
-            upper,
-            failing[0] if failing else None,
-            tuple(scale for scale in surviving if scale > upper),
-            tuple(run.scale for run in self.runs if not run.has_answer(definition)),
-        )
-
-    def table(self) -> str:
-        """Return a line per definition: its bracket, and the mechanism at the upper bound."""
-        head = ["mechanism", "survives", "fails", "class", "at", "part", "note"]
-        return align_columns(head, [self._row(definition) for definition in MECHANISM_DEFINITIONS])
-
-    def _row(self, definition: str) -> list[str]:
-        bracket = self[definition]
-        mechanism = bracket.run.mechanisms[definition] if bracket.run else None
-        notes = []
-        if bracket.run and mechanism is None:
-            notes.append(bracket.run.outcome)
-        if definition not in self.definitions:
-            notes.append("has no such joints")
-        if bracket.above:
-            notes.append("survives also " + ", ".join(f"{scale:.3g}" for scale in bracket.above))
-        return [
-            definition,
-            f"{bracket.lower:.3g}" if bracket.lower else "-",
-            f"{bracket.upper:.3g}" if bracket.run else "-",
-            mechanism.kind if mechanism else "-",
-            f"{mechanism.time:.3f} s" if mechanism and mechanism.time is not None else "-",
-            mechanism.part if mechanism else "-",
-            "; ".join(notes) or "-",
-        ]
 
 
 @takes_analysis
@@ -280,150 +128,6 @@ def _run_as_far(model: Model | Analysis, motion: Motion, **options: Any) -> Hist
         return history
 
 
-def _say_bracket(state: str, found: Any, met: str) -> str:
-    """Return a bracket in words, from the state at its lower bound to the event above it."""
-    if scale := found.states.get("tension"):
-        met = f"at {scale:#.3g} × {PULLED}: {met}"
-    met = f"{UNFINISHED}, {met}" if found.interrupted else met
-    if not found.held:  # the smaller ones, if any were run, have no answer
-        return f"{met}; no smaller scale is known to survive"
-    return f"{state} at {say_scale(found.held, found.pga)}, {met}"
-
-
-def _find_tension(runs: Iterable[ScaledRun]) -> float:
-    """Return the smallest scale at which an elastic fill bears more tension than soil [-]."""
-    doubted = (run.scale for run in runs if any(x.words == FILL_TENSION for x in run.doubts))
-    return min(doubted, default=inf)
-
-
-def _list_bounds(scales: MechanismScales, definition: str) -> list[ScaledRun]:
-    """Return the runs at both ends of a bracket."""
-    bracket = scales[definition]
-    return [run for run in scales.runs if run.scale in (bracket.lower, bracket.upper)]
-
-
-def _doubts_of_searches(
-    searches: Mapping[str, MechanismScales], definition: str
-) -> tuple[Doubt, ...]:
-    """Return reasons why brackets may be wrong: runs broken off, not monotonic, or in doubt.
-
-    Searches are by their settings in words. Doubts that differ in numbers alone are stated once.
-    """
-    doubts, of_runs = list[Doubt](), list[Doubt]()
-    for settings, scales in searches.items():
-        bracket = scales[definition]
-        if above := bracket.above:
-            words = "it is not monotonic: above a fall it survives {:#.3g} × the motion"
-            doubts.append(Doubt(words, "", ((min(above), max(above)),), settings))
-        if broken := [run for run in scales.runs if run.scale in bracket.unanswered]:
-            first = f": the first {broken[0].outcome}" if broken[0].outcome else ""
-            words, at = "runs without an answer were at {:#.3g} × the motion{}", bracket.unanswered
-            doubts.append(Doubt(words, "", ((at[0], at[-1]), first), settings))
-        if scales.interrupted:
-            made = f"{len(scales.runs)} run{'s' * (len(scales.runs) != 1)}"
-            words = f"the search was interrupted after {made}"
-            doubts.append(Doubt(words, "the same command continues it", (), settings))
-        for run in _list_bounds(scales, definition):
-            place = f"{run.scale:#.3g} × {settings}".strip()
-            of_runs += [replace(doubt, place=place) for doubt in run.doubts]
-    for same in group_doubts(of_runs):
-        first, *others = [doubt.place for doubt in same]
-        likewise = f" (likewise at {join_names(others)})" if others else ""
-        doubts.append(merge_doubts(same, f"at {first}{likewise}"))
-    return tuple(doubts)
-
-
-def check_search(precision: float, between: Sequence[float]) -> None:
-    """Refuse a width of brackets, or a range of scales, that no search has."""
-    if not (1e-4 <= precision <= 1.0 and 0.0 < between[0] <= between[1] < inf):
-        raise InvalidInput(
-            f"precision {precision:g} between scales {tuple(between)}: give 0.0001 to 1, and two "
-            "scales above 0, the smaller first"
-        )
-
-
-@log_doubts_once()
-def search_scales(
-    run_scaled: Callable[[float], ScaledRun],
-    definitions: tuple[str, ...],
-    precision: float,
-    between: tuple[float, float],
-    begin: Sequence[float] = (1.0,),
-    found: MechanismScales | None = None,
-    name: str = "",
-) -> MechanismScales:
-    """Make runs until all brackets are within the precision, and below a fall no gap is wide.
-
-    The first ones are at `begin`; those that were `found` before are kept.
-    """
-    scales = found or MechanismScales(definitions)
-    try:
-        with ProgressReport(f"scale of {name or 'the motion'}", None) as progress:
-            while (scale := _next_scale(scales, precision, between, begin)) is not None:
-                began = perf_counter()
-                run = run_scaled(scale)
-                seconds = perf_counter() - began
-                if run.ending is Ending.INTERRUPTED:  # says nothing about the scale
-                    raise KeyboardInterrupt
-                scales = scales.with_run(run)
-                result = run.fall.kind if run.fall else run.outcome
-                progress.show(f"{scale:#.3g} × the motion: {result}, in {seconds:.2g} s", 1)
-    except KeyboardInterrupt:
-        scales = replace(scales, interrupted=True)
-    return scales
-
-
-def _next_below_fall(scales: MechanismScales, precision: float, smallest: float) -> float | None:
-    """Return a scale in the widest gap below the smallest fall or the last run, or None."""
-    runs = scales.runs
-    top = min(scales[COLLAPSE_DEFINITION].upper, runs[-1].scale)
-    if runs[0].scale > max(FILLED_SHARE * top, smallest):
-        return max(runs[0].scale / sqrt(2.0), smallest)
-
-    def excess(gap: tuple[float, float]) -> float:
-        ratio = NEAR_RATIO if gap[1] > NEAR_SHARE * top else FILLED_RATIO
-        return gap[1] / gap[0] / max(ratio, 1.0 + precision)
-
-    gaps = pairwise(run.scale for run in runs if run.scale <= top)
-    wide = [gap for gap in gaps if gap[1] > FILLED_SHARE * top and excess(gap) > 1.0]
-    if not wide:
-        return None
-    lower, upper = max(wide, key=excess)
-    return sqrt(lower * upper)
-
-
-def _next_scale(
-    scales: MechanismScales, precision: float, between: tuple[float, float], begin: Sequence[float]
-) -> float | None:
-    """Return the scale of the next run, or None."""
-    runs, (smallest, largest) = scales.runs, between
-    ratio, max_runs = sqrt(2.0), 40  # ratio of scales before bisection
-    first = [min(max(scale, smallest), largest) for scale in begin]
-    missing = [scale for scale in first if all(scale != run.scale for run in runs)]
-    if missing:
-        return missing[0]
-    # four definitions to five per cent take about fifteen runs
-    if len(runs) >= max_runs:
-        return None
-    brackets = [scales[definition] for definition in scales.definitions]
-    fails = any(bracket.lower == 0.0 for bracket in brackets)
-    if runs[0].scale > smallest and (fails or _find_tension(runs[:1]) < inf):
-        return max(runs[0].scale / ratio, smallest)
-    if runs[-1].scale < largest and any(bracket.run is None for bracket in brackets):
-        return min(runs[-1].scale * ratio, largest)
-    wide = [bracket for bracket in brackets if 1.0 + precision < bracket.ratio < inf]
-    fills = COLLAPSE_DEFINITION in scales.definitions
-    if fills and (scale := _next_below_fall(scales, precision, smallest)) is not None:
-        return scale
-    for bracket in sorted(wide, key=lambda bracket: -bracket.ratio):
-        # a scale without an answer divides no bracket: its neighbours are tried instead
-        for share in (1.0 / 2.0, 1.0 / 3.0, 2.0 / 3.0):
-            scale = bracket.lower * bracket.ratio**share
-            if all(abs(scale / other - 1.0) > 1e-6 for other in bracket.unanswered):
-                return float(scale)
-    return None
-
-
 @validate_methods
 @dataclass(frozen=True)
 class CollapseScale:
@@ -467,7 +171,7 @@ class CollapseScale:
             met = f"dislocated at {self.dislocated:#.3g} ×, {met}"
         if self.moves <= max(self._stood):
             met = f"a mechanism at {self.moves:#.3g} ×{' or less' * self.moves_in_all}, {met}"
-        said, first = _say_bracket("stands", self, met), self.as_one
+        said, first = say_bracket("stands", self, met), self.as_one
         if first is None:
             return said
         one = f"as one rigid body it {describe_first_fall(first, self.pga)}"
@@ -510,7 +214,7 @@ class CollapseScale:
                 words, ends = "a time step finds a fall at {:#.3g} ×, and another none", (low, low)
             doubts.append(Doubt(words, "", (ends,)))
         searches = {f"by {1e3 * dt:g} ms": search for dt, search in self.searches.items()}
-        of_runs = _doubts_of_searches(searches, COLLAPSE_DEFINITION)
+        of_runs = doubt_searches(searches, COLLAPSE_DEFINITION)
         doubts += [x for x in of_runs if replace(x, place="") not in self.of_model]
         falls = [(run.scale, run.doubts) for run in self._runs if run.fails(COLLAPSE_DEFINITION)]
         return tuple(state_rigid_falls(doubt, falls) for doubt in doubts)
@@ -577,7 +281,7 @@ class CollapseScale:
 
         That of "tension" is one at which it stands, and its fill bears more of it than soil does.
         """
-        scales = {"tension": _find_tension(self._runs), "moves": self.moves}
+        scales = {"tension": find_tension(self._runs), "moves": self.moves}
         scales = {state: at for state, at in scales.items() if at <= max(self._stood)}
         scales |= {"dislocated": self.dislocated, "falls": self._least_fall}
         return {state: scale for state, scale in scales.items() if scale < inf}
@@ -593,7 +297,7 @@ class CollapseScale:
 
         It is also below any at which an elastic fill bears more tension than soil.
         """
-        return max(at for at in self._stood if at < _find_tension(self._runs))
+        return max(at for at in self._stood if at < find_tension(self._runs))
 
     @property
     def _stood(self) -> list[float]:
@@ -688,7 +392,7 @@ def _admissible_step(searches: Mapping[float, MechanismScales]) -> float:
     """Return the step that follows sliding in all runs that bound a fall [s]; infinite if any."""
     if any(search.interrupted for search in searches.values()):
         return inf  # it ends here
-    bounds = (run for each in searches.values() for run in _list_bounds(each, COLLAPSE_DEFINITION))
+    bounds = (run for each in searches.values() for run in list_bounds(each, COLLAPSE_DEFINITION))
     return max(LEAST_STEP, min((run.admissible_step for run in bounds), default=inf))
 
 

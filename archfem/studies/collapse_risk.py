@@ -40,8 +40,8 @@ from archfem._validation import (
 )
 from archfem.dynamics.analysis import Analysis
 from archfem.dynamics.collapse_state import FALLEN_STATES, CollapseState, doubt_soft_blocks
-from archfem.dynamics.motion_scaling import check_search
 from archfem.dynamics.recorder import Record
+from archfem.dynamics.scale_search import check_search
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.masonry.structure import Structure
 from archfem.models.model import Doubt, read_doubts, write_doubts

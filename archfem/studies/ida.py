@@ -25,7 +25,7 @@ from archfem.dynamics.analysis import Analysis, with_one_facet
 from archfem.dynamics.collapse_state import CollapseState, doubt_soft_blocks
 from archfem.dynamics.events import applicable_definitions
 from archfem.dynamics.history import Ending, partial_history
-from archfem.dynamics.motion_scaling import (
+from archfem.dynamics.scale_search import (
     COLLAPSE_DEFINITION,
     ScaledRun,
     check_search,

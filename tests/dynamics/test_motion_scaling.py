@@ -16,13 +16,13 @@ from archfem.dynamics import CollapseScale, mechanism_scales, motion_scaling
 from archfem.dynamics.collapse_state import CollapseState
 from archfem.dynamics.fall import RIGID_STAND
 from archfem.dynamics.monitor import FILL_TENSION
-from archfem.dynamics.motion_scaling import (
+from archfem.dynamics.rigid_body.rocking_body import FirstFall
+from archfem.dynamics.scale_search import (
     COLLAPSE_DEFINITION,
     MechanismScales,
     ScaledRun,
     search_scales,
 )
-from archfem.dynamics.rigid_body.rocking_body import FirstFall
 from archfem.errors import logger as log
 from archfem.models.model import Doubt
 from archfem.motion.motion import admissible_range

@@ -10,7 +10,7 @@ from scipy.integrate import trapezoid
 import archfem as af
 from archfem import ida
 from archfem.dynamics.collapse_state import FALLEN_STATES
-from archfem.dynamics.motion_scaling import MechanismScales
+from archfem.dynamics.scale_search import MechanismScales
 from archfem.studies import ida as ida_module
 from archfem.studies.cache import dead_load_of
 from archfem.studies.evaluators import run_motion

@@ -9,7 +9,8 @@ import xarray as xr
 import archfem as af
 from archfem.dynamics.collapse_state import CollapseState
 from archfem.dynamics.history import Ending
-from archfem.dynamics.motion_scaling import CollapseScale, MechanismScales, ScaledRun
+from archfem.dynamics.motion_scaling import CollapseScale
+from archfem.dynamics.scale_search import MechanismScales, ScaledRun
 from archfem.view import draw_findings, draw_study
 from archfem.view.studies import draw_scale
 

@@ -9,7 +9,7 @@ from archfem.cases.report.doubts import peak_of_ground
 from archfem.cases.report.report_data import ReportData
 from archfem.dynamics.collapse_state import COLLAPSE_STATES
 from archfem.dynamics.monitor import PULLED
-from archfem.dynamics.motion_scaling import UNFINISHED
+from archfem.dynamics.scale_search import UNFINISHED
 from archfem.masonry.structure import join_words
 from archfem.units import Ends
 
