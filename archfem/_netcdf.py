@@ -36,10 +36,7 @@ FORMAT_ATTRIBUTE = "archfem_format"
 
 
 def write_dataset(
-    dataset: xr.Dataset,
-    path: Path,
-    what: str,
-    encoding: Mapping[Any, Any] = MappingProxyType({}),
+    dataset: xr.Dataset, path: Path, what: str, encoding: Mapping[Any, Any] = MappingProxyType({})
 ) -> Path:
     """Write a dataset, a file of a kind, atomically: a killed run leaves the old or the new one."""
     refuse_listed(path)

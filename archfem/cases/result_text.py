@@ -27,12 +27,7 @@ from archfem.dynamics.collapse_state import FALLEN_STATES
 from archfem.dynamics.history import Ending, History
 from archfem.dynamics.verdict import ALL_DEFINITIONS, Verdict
 from archfem.errors import InvalidInput
-from archfem.joints.criteria import (
-    assessed_joints,
-    envelope,
-    first_time,
-    longest_duration,
-)
+from archfem.joints.criteria import assessed_joints, envelope, first_time, longest_duration
 from archfem.limit.collapse import Collapse, Outcome, describe_crushing, describe_fill
 from archfem.limit.fill_strength import Fill, PlasticFill, as_pressure
 from archfem.limit.instability import explain_instability

@@ -13,12 +13,7 @@ from archfem._validation import validate_arguments
 from archfem.errors import InvalidInput
 from archfem.limit.collapse import describe_crushing, describe_fill
 from archfem.limit.fill_range import say_part, vary_pressure
-from archfem.limit.fill_strength import (
-    Fill,
-    PlasticFill,
-    as_pressure,
-    place_backing,
-)
+from archfem.limit.fill_strength import Fill, PlasticFill, as_pressure, place_backing
 from archfem.limit.self_weight import check_options, is_balanced, self_weight_programme
 from archfem.limit.thickness import find_geometric_factor
 from archfem.limit.vehicles import (

@@ -72,9 +72,7 @@ def minimum_thickness(
 
 
 def _find_bracket(
-    build: Callable[[float], Structure],
-    is_stable: Callable[[float], bool],
-    tolerance: float = 1e-9,
+    build: Callable[[float], Structure], is_stable: Callable[[float], bool], tolerance: float = 1e-9
 ) -> tuple[float, float]:
     """Return an unstable thickness and a stable one, at most twice as large [m]."""
     thin, is_start = _find_thin_member(build)

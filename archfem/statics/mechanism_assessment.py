@@ -54,9 +54,7 @@ from archfem.masonry.structure import (
     structure_of,
 )
 from archfem.models.model import Doubt
-from archfem.motion.design_spectra import (
-    DesignSpectrum,
-)
+from archfem.motion.design_spectra import DesignSpectrum
 from archfem.motion.motion import Motion
 from archfem.statics.assessment_checks import (
     LIMIT_STATES,

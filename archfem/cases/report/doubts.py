@@ -12,11 +12,7 @@ from archfem.cases.report.report_data import ReportData
 from archfem.cases.report.study_findings import list_studied, read_study
 from archfem.dynamics.collapse_state import COLLAPSE_STATES, FALLEN_STATES, RANGE_REMEDY
 from archfem.dynamics.history import History
-from archfem.dynamics.verdict_range import (
-    MAX_RATIO_OF_DISPLACEMENTS,
-    VerdictRange,
-    property_text,
-)
+from archfem.dynamics.verdict_range import MAX_RATIO_OF_DISPLACEMENTS, VerdictRange, property_text
 from archfem.masonry.joint_closing import finish_range
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import join_words

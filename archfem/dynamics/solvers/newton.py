@@ -48,11 +48,7 @@ from archfem.dynamics.solvers.linear_step import (
     subtract_derivatives,
     tangent_pattern,
 )
-from archfem.dynamics.solvers.rigid_chains import (
-    ChainSystem,
-    chain_system,
-    constant_chain_parts,
-)
+from archfem.dynamics.solvers.rigid_chains import ChainSystem, chain_system, constant_chain_parts
 from archfem.dynamics.solvers.semismooth_newton import (
     Correction,
     Tolerances,
@@ -383,10 +379,7 @@ def _solve_small_step(system):  # type: ignore
             number[0] = -1
         if iterations > 0:
             for row in range(len(law.guess)):
-                work.gap_before[row], work.gap[row] = (
-                    work.gap[row],
-                    law.guess[row],
-                )
+                work.gap_before[row], work.gap[row] = work.gap[row], law.guess[row]
                 work.force[row] = system.balanced[row]
             for k in range(len(system.linear.weight)):
                 work.contact[k] = system.contact[0, k]

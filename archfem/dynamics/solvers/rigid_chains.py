@@ -47,16 +47,7 @@ from archfem.joints.large.lane_law import (
     lane_overlap,
     pad,
 )
-from archfem.joints.large.lanes import (
-    WIDTH,
-    any_lane,
-    gather,
-    lane,
-    load,
-    spread,
-    store,
-    with_lane,
-)
+from archfem.joints.large.lanes import WIDTH, any_lane, gather, lane, load, spread, store, with_lane
 
 # Rows of stones: cosine and sine of half the angle at the start and the end, cosine and sine of the
 # angle in the middle of the step, series of half its rotation, that half, and x and y

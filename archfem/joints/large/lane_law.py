@@ -12,16 +12,7 @@ import numpy as np
 from archfem._numba import inlined_kernel, kernel
 from archfem._typing import Array
 from archfem.joints.large.closing_law import excess_means, facet_step_excess
-from archfem.joints.large.lanes import (
-    WIDTH,
-    any_lane,
-    lane,
-    load,
-    select,
-    spread,
-    store,
-    with_lane,
-)
+from archfem.joints.large.lanes import WIDTH, any_lane, lane, load, select, spread, store, with_lane
 from archfem.joints.large.overlap_law import (
     ROUNDED_SLIP,
     FaceLaw,
