@@ -6,12 +6,23 @@ passive pressure needs movement to develop. Both are assumed, so a result must h
 values.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from typing import NamedTuple
 
 from archfem.limit.fill_strength import Fill, change_fill
+
+# Fills of `vary_pressure`, and as given ("factor") or as the pressure of a plastic one, with those
+# whose pressures are within theirs, so that their factors are bounds from below; the weakest first
+WEAKER_FILLS: Mapping[str, Sequence[str]] = {
+    "without_either": (),
+    "without_backing": (),
+    "without_pressure": ("without_either",),
+    "by_pressure": ("without_backing",),
+    "factor": ("without_backing",),
+    "full_pressure": ("by_pressure", "factor", "without_backing"),
+}
 
 
 class FillAssumption(NamedTuple):

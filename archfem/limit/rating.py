@@ -12,7 +12,7 @@ from archfem._typing import Array, Metres, NewtonsPerMetre, Pascals
 from archfem._validation import validate_arguments
 from archfem.errors import InvalidInput
 from archfem.limit.collapse import describe_crushing, describe_fill
-from archfem.limit.fill_range import say_part, vary_pressure
+from archfem.limit.fill_range import WEAKER_FILLS, say_part, vary_pressure
 from archfem.limit.fill_strength import Fill, PlasticFill, as_pressure, place_backing
 from archfem.limit.self_weight import check_options, is_balanced, self_weight_programme
 from archfem.limit.thickness import find_geometric_factor
@@ -58,6 +58,10 @@ _STATES = (*_PRESSURES, "by_pressure")
 
 # Prefix of the states in which stones crush at the assumed strength
 _CRUSHING = "crushing "
+
+# Each state with those whose factors guide its search, in the order of their searches
+_GUIDES: dict[str, Sequence[str]] = {"": ("factor",), **WEAKER_FILLS}
+_GUIDES |= {f"{_CRUSHING}{state}": (state, "by_pressure") for state in WEAKER_FILLS}
 
 # What a rating assumes of fill and stones
 _PRESSURE, _BACKING = "the pressure of the fill", "the backing"
@@ -574,9 +578,8 @@ def rate(  # noqa: PLR0913  (factors of the check, and the strength of the bridg
     for key, each, by, states in _further_searches(driven, rows, live, options):
         # of the whole width, as the structure is modelled
         loads = [np.column_stack([structure.width / width * row, axles[:, 1]]) for row in each]
-        # mechanisms are much the same whichever axle has the impact of CS 454
-        count = 32 if key else 32 * len(rows)
-        found = _find_least_factors(weighted, positions, loads, by * area_load, states, count)
+        known = None if key or is_plastic else moving
+        found = _find_least_factors(weighted, positions, loads, by * area_load, states, known)
         more |= {key: found} if key else found
     factors = live, impact, dead, width, area_load
     more |= {"missing": missing, "parapets": parapets}
@@ -601,8 +604,8 @@ def rate_again(found: Rating, structure: Structure, width: float | None, **optio
     loads = [np.column_stack([share * row, axles[:, 1]]) for row in rows]
     area_load, states = found.live * found.area_load, {"": options}
     places = _places_along(weighted, axles)
-    count = 32 * len(rows)
-    return _find_least_factors(weighted, places, loads, area_load, states, count).get("", np.nan)
+    again = _find_least_factors(weighted, places, loads, area_load, states, found.moving)
+    return again.get("", np.nan)
 
 
 def _check_width(width: float, structure: Structure) -> None:
@@ -662,30 +665,36 @@ def _find_least_factors(
     vehicles: Sequence[Array],
     area_load: float,
     states: dict[str, dict[str, Any]],
-    count: int,
+    moving: MovingLoad | None,
 ) -> dict[str, Any]:
     """Return the least factor in each state; none where the structure does not stand in it.
 
     Those of states with crushing are in a table of their own, undefined (NaN) where it does not.
-    A count of rows of axles, of all vehicles together, is solved first.
+    Factors of the same vehicle as it is rated, if it is given, are those of the state "factor".
     """
-    rows = dict.fromkeys(
+    rows = [
         axles_on_structure(structure, vehicle, way, x)
         for vehicle in vehicles
         for way in DRIVING_DIRECTIONS
         for x in places
-    )
+    ]
     # the fans of loads do not depend on pressure, backing and strength
     stones, _ = self_weight_programme(structure, **next(iter(states.values())))
-    axles = {row: stones.load(row) for row in rows if row}
+    axles = {row: stones.load(row) for row in dict.fromkeys(rows) if row}
+    guides = dict[str, Array]()
+    if moving is not None:
+        at = dict(zip(rows, np.tile(moving.factors_at(places), len(vehicles)), strict=True))
+        guides["factor"] = np.array([at[row] for row in axles])
     strips, factors = cut_road(structure, area_load), dict[str, Any]()
     forces = [stones.load([strip]) for strip in strips]
-    for name, given in track_progress("other states", states.items()):
+    for name in track_progress("other states", [name for name in _GUIDES if name in states]):
+        given = states[name]
         stones, dead = self_weight_programme(structure, **given)
         if not is_balanced(dead.minimise_residual(), dead):
             continue
+        guide = next((guides[x] for x in _GUIDES[name] if x in guides), np.zeros(len(axles)))
         # these are worst with sliding that dilates: without, one of the next may be
-        worst = find_worst_rows(dead, axles, strips, forces, count)
+        worst, guides[name] = find_worst_rows(dead, axles, strips, forces, guide)
         worst = dict(islice(worst.items(), 1 if given["friction"] != "nonassociated" else 3))
         factors[name] = min(collapse_factors(stones, dead, worst, given).values())
     crushed = [name for name in states if name.startswith(_CRUSHING)]

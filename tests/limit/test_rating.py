@@ -541,6 +541,35 @@ def test_other_states_of_the_fill_have_worst_places_of_their_own(area_load, monk
     assert area_load or there > 1.3 * found.full_pressure
 
 
+@pytest.mark.slow
+def test_a_narrow_worst_place_is_found(monkeypatch):
+    """Against all places: places a fifteenth of the bridge apart are 5 % beside it."""
+    shapes = ((7.85, 1.53, 0.591, 11), (6.09, 1.77, 0.377, 7), (4.72, 2.12, 0.406, 7))
+    names = ("span", "rise", "thickness", "voussoirs")
+    bridge = af.bridge(
+        arches=[
+            af.shapes.Arch(**dict(zip(names, shape, strict=True)), name=f"arch {k}")
+            for k, shape in enumerate(shapes)
+        ],
+        piers=[
+            af.shapes.Pier(gap=gap, height=height, course=height / 2.0, name=f"pier {gap}")
+            for gap, height in ((0.91, 2.3), (1.58, 3.7))
+        ],
+        sidewalls=[
+            af.shapes.Sidewall(length=length, height=1.5, state="fixed", name=f"wall {length}")
+            for length in (2.69, 1.79)
+        ],
+        backfill=af.shapes.Backfill(cover=0.52),
+        width=3.0,
+    )
+    fill = af.limit.Fill(friction_angle=36.1, backing=0.224, mobilisation=0.0, active=0.0)
+    lorry = Vehicle("lorry", (69e3, 111.6e3), (1.38,), grade="read")
+    monkeypatch.setattr(rating, "_places_along", partial(places_along, steps=60))
+    monkeypatch.setattr(rating, "_other_states", lambda given: {"without_pressure": given})
+    found = af.rate(bridge, lorry, fill=fill, width=3.0)
+    assert found.without_pressure == pytest.approx(found.factor, rel=EXACT)
+
+
 def test_a_plastic_fill_has_the_factors_of_its_pressure_beside_its_own(monkeypatch):
     """Those of a rating with the fill as weight and pressure, of the same strength and backing."""
     monkeypatch.setattr(rating, "_places_along", lambda *_: (3.0, 3.5, 4.0, 5.5, 6.5))
