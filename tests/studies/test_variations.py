@@ -445,6 +445,17 @@ def test_a_report_shows_the_range(tmp_path, undrawn, calls):
     assert af.commands.main(["verdict", str(path), "--out", str(out), "--samples", "2"]) == 0
     words = " ".join(read_page(report(out)).words)
     assert af.dynamics.VerdictRange.read(out / "verdict_range.nc").sentence[1:] in words
+    assert "falls with none of 13 single changes" in words
+
+
+@pytest.mark.slow
+def test_a_report_draws_the_properties_that_decide(tmp_path, undrawn):
+    path, out = tmp_path / "column.toml", tmp_path / "out"
+    path.write_text(CASE.replace('"0.4 m"', '"0.2 m"').replace("duration = 1.0", "duration = 3.0"))
+    af.commands.main(["run", str(path), "--out", str(out)])
+    af.commands.main(["verdict", str(path), "--out", str(out), "--samples", "12"])
+    assert af.dynamics.VerdictRange.read(out / "verdict_range.nc").decisive.any()
+    words = " ".join(read_page(report(out)).words)
     assert "Residual displacement over the properties that explain most of it" in words
 
 
