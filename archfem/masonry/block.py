@@ -186,9 +186,10 @@ class Block:
             object.__setattr__(self, "corners", tuple(map(int, self.corners)))
         sides = np.roll(self.points, -1, axis=0) - self.points
         if (short := np.flatnonzero(~sides.any(axis=1))).size:
+            first, count = int(short[0]), len(self.outline)
             raise InvalidStructure(
-                f"block '{self.name}' has two corners beside each other at "
-                f"{self.outline[short[0]]}: leave one out"
+                f"block '{self.name}' has two corners beside each other at {self.outline[first]}, "
+                f"points {first + 1} and {(first + 1) % count + 1} of its {count}: leave one out"
             )
         if self.area <= 0.0:
             import shapely
