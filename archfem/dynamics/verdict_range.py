@@ -297,7 +297,8 @@ class VerdictRange(ResultDisplay):
                 words.append(f"{count} of the {own} that vary {name}")
         share = f"{low:.0%} to {high:.0%} at 95%"
         if self.counted != "falls":
-            return f"{', '.join(words)}; share of falls {share}"
+            number = int((self.answered & sampled).sum())
+            return f"{', '.join(words)}; share of falls {share} by the {number}"
         return f"{', '.join(words)} ({share})"
 
     @cached_property

@@ -354,7 +354,7 @@ def test_falls_and_dislocations_are_explained_where_falls_alone_are_too_few():
     assert found.where == f"{where}, where 10 of 10 fall or are dislocated"
     assert np.array_equal(found.decisive, friction < -0.05)
     text = f"falls in 2 of 40 variations and is dislocated in 8: {found.where}; 10 of the 40 that "
-    assert found.sentence.startswith(f"{text}vary all; share of falls 1% to 17% at 95%")
+    assert found.sentence.startswith(f"{text}vary all; share of falls 1% to 17% at 95% by the 40")
     assert found.plot().get_suptitle().replace("\n", " ").startswith(found.headline)
     # thirds of 13, 14 and 13 runs, with 10 decisive in the first
     share = (13 * (10 / 13 - 0.25) ** 2 + 27 * 0.25**2) / (40 * 0.25 * 0.75)
