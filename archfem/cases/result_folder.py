@@ -32,7 +32,7 @@ from archfem.cases.run import (
 )
 from archfem.cases.toml_file import read_tables
 from archfem.dynamics.collapse_state import FALLEN_STATES
-from archfem.dynamics.history import History
+from archfem.dynamics.history import Ending, History
 from archfem.errors import ArchfemError, InvalidInput, logger
 from archfem.limit.collapse import Collapse, Outcome
 from archfem.masonry.loads import find_push
@@ -234,8 +234,13 @@ def dead_load_files(result: DeadLoadResult) -> Files:
 
 
 def run_files(run: Run, at_rest: DeadLoadResult, text: str) -> Files:
-    """Return critical instant, envelope, joints over time, fall, film and summary of a run."""
+    """Return critical instant, envelope, joints over time, fall, film and summary of a run.
+
+    One that was interrupted has a summary alone, since pictures take time.
+    """
     case, history, dead = run.case, run.history, at_rest.dead
+    if history.ending is Ending.INTERRUPTED:
+        return {"summary.txt": text}
     files: Files = {} if case.suite is None else {"motion.png": run.motion.plot()}
     files |= {
         "critical_instant.png": draw_critical(case.structure, history, dead.model),
@@ -274,7 +279,9 @@ def adopt_files(run: Run) -> bool:
 
 
 def pair_files(runs: Mapping[str, History], at_rest: DeadLoadResult, text: str) -> Files:
-    """Return the table of a suite, and the envelopes of its runs."""
+    """Return the table of a suite and, unless it was interrupted, the envelopes of its runs."""
+    if any(run.ending is Ending.INTERRUPTED for run in runs.values()):
+        return {"suite.txt": text}
     figures = draw_envelopes(runs, at_rest.dead.joints)
     numbers = ["", *(f"_{number}" for number in range(2, len(figures) + 1))]
     envelopes = {f"envelope{k}.png": each for k, each in zip(numbers, figures, strict=True)}

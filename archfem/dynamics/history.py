@@ -265,13 +265,17 @@ class History(ResultDisplay):
     @cached_property
     def mechanisms(self) -> dict[str, Mechanism | None]:
         """First mechanism by each definition that applies, or None."""
-        return detect_mechanisms(self.joints, self.structure)
+        # of a long run of a wall verification takes minutes, and Ctrl-C wants the end
+        interrupted = self.ending is Ending.INTERRUPTED
+        return detect_mechanisms(self.joints, None if interrupted else self.structure)
 
     @cached_property
     def verdict(self) -> Verdict:
         """Assessment of the run; `str(run.verdict)` describes it in words."""
         attrs, joints, mechanisms = self.dataset.attrs, self.joints, self.mechanisms
         remarks = [] if self.ending is Ending.FINISHED else [f"the run {self.outcome}"]
+        if self.ending is Ending.INTERRUPTED:
+            remarks[0] += ", and no mechanism was verified"
         if self.structure is not None and self.fall is not None and self.fall.time is None:
             remarks.append(describe_dislocation(self.structure))
         farthest, standing = find_farthest(self.dataset, self.structure)

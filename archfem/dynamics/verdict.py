@@ -69,7 +69,7 @@ class Verdict:
         farthest: blocks of both; none where blocks came loose.
         mechanisms: first mechanism, or None, by each definition of `MECHANISM_DEFINITIONS` that
             applies, and by the criterion of Demirel and Aldemir; "verified" only where the
-            structure is known.
+            structure is known and the run was not interrupted.
         fall: state of collapse with large displacements, or None.
         incomplete: how the run was broken off, such as "failed at 1.2 s"; "" otherwise.
         assessed: which joints the verdict is based on, and which it leaves out; "" if none.
@@ -176,7 +176,8 @@ def brief_mechanism_remarks(
         return []
     loose = with_failure_flags(joints, replace(criteria, duration=0.0))
     begins: dict[float | None, list[str]] = {}
-    for name, brief in detect_mechanisms(loose, structure).items():
+    verified = structure if "verified" in detected else None
+    for name, brief in detect_mechanisms(loose, verified).items():
         counted = detected[name]
         # over the record each joint counts only once its failure has lasted: it is never brief
         if name == OVER_RECORD or brief is None:

@@ -271,6 +271,11 @@ def test_a_signal_ends_a_motion_and_keeps_its_steps(
         seen = []
         return af.time_history(dead.model, motion, dt=0.005, start=dead, until=press)
 
+    def fail(*_):
+        raise AssertionError("it does not end within seconds")
+
+    # of a wall mechanisms take minutes to verify
+    monkeypatch.setattr("archfem.dynamics.verdict.first_verified_mechanism", fail)
     monkeypatch.setattr("archfem.cases.run.run_time_history", cut_short)
     before = signal.signal(signal.SIGINT, signal.default_int_handler)  # may be ignored here
     try:
@@ -282,6 +287,8 @@ def test_a_signal_ends_a_motion_and_keeps_its_steps(
     assert 0.5 < run.time[-1] < 2.9
     summary = (tmp_path / "out" / "summary.txt").read_text()
     assert "outcome: interrupted at" in summary
+    assert "s, and no mechanism was verified" in summary
+    assert not (tmp_path / "out" / "envelope.png").exists()  # nor other pictures of the run
     assert "interrupted" in capsys.readouterr().err
 
 
