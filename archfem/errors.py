@@ -85,7 +85,8 @@ class Interrupted(KeyboardInterrupt):
     """Ctrl-C or SIGTERM within a computation; results up to that point are attached.
 
     Attributes:
-        last: frames of a fall, of the longest steps that were followed to its end, or so far.
+        last: frames of a fall, of the longest steps that were followed to its end, or so far; the
+            `Collapse` of a search without dilatancy; or the table of a study.
     """
 
     def __init__(self, last: Any) -> None:

@@ -10,7 +10,7 @@ from archfem._validation import check_choice, check_number, declared_keys, valid
 from archfem.cases.motion_keys import build_spectrum
 from archfem.cases.structure_keys import find_table
 from archfem.cases.toml_file import Table, check_table, read_object
-from archfem.errors import InvalidInput
+from archfem.errors import Interrupted, InvalidInput
 from archfem.joints.criteria import Criteria
 from archfem.limit.collapse import Collapse, collapse_factor, describe_crushing, solve_least
 from archfem.limit.fill_strength import Fill, PlasticFill
@@ -105,6 +105,18 @@ class LimitAnalysis:
                 'point = { x = "1.4 m", force = ["0 kN", "-1 kN"] }'
             )
         return collapse_factor(structure, live=self.live, dead=self.dead, **self.resistance)
+
+    def solve_so_far(self, structure: Structure) -> Collapse:
+        """Return the result of `solve`; of a search that is interrupted the bound so far.
+
+        Args:
+            structure: structure of the case.
+        """
+        try:
+            return self.solve(structure)
+        except Interrupted as error:
+            found: Collapse = error.last
+            return found
 
     def solve_least(self, found: Collapse) -> Collapse:
         """Return a result, with its range, under the assumption on a fill with the least factor.

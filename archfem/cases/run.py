@@ -319,7 +319,7 @@ def carry_out(
             return
     # of a large wall it takes longest, and its interruption loses nothing else
     if case.limit.live:
-        yield case.limit.solve(case.structure)
+        yield case.limit.solve_so_far(case.structure)
 
 
 @validate_arguments

@@ -44,7 +44,14 @@ from archfem.commands.tools import print_motions, show_both_senses
 from archfem.dynamics.history import Ending, History
 from archfem.dynamics.rigid_body.rocking_body import describe_first_fall
 from archfem.dynamics.walls_across import describe_falls_across, find_falls_across
-from archfem.errors import ArchfemError, DidNotConverge, InvalidInput, keep_warnings, logger
+from archfem.errors import (
+    ArchfemError,
+    DidNotConverge,
+    Interrupted,
+    InvalidInput,
+    keep_warnings,
+    logger,
+)
 from archfem.limit.collapse import Collapse, describe_fill
 from archfem.limit.rating import Rating
 from archfem.masonry.ring_thickness import find_ring
@@ -227,7 +234,7 @@ def limit(options: argparse.Namespace) -> int:
         write_results("limit", case, options.out, f"{case.title}\n{text}", files)
 
     with record_doubts(case.structure) as doubts:
-        show_both_senses(case, case.limit.solve(case.structure), show, doubts)
+        show_both_senses(case, case.limit.solve_so_far(case.structure), show, doubts)
     return doubt_code(doubts)
 
 
@@ -253,7 +260,12 @@ def assess(options: argparse.Namespace) -> int:
     motion = case.ground_motion() if case.motion is not None else None
     demand = case.target if case.target is not None else motion
     with record_doubts(case.structure) as doubts:
-        found = case.assessment.solve(case.structure, demand, options.parts)
+        try:
+            found = case.assessment.solve(case.structure, demand, options.parts)
+        except KeyboardInterrupt as error:
+            bound = f"{error.last.sentence}; " if isinstance(error, Interrupted) else ""
+            write_progress_line("assessment", f"{bound}nothing is kept")
+            raise
     # warnings of the comparison are those of the assessment, or of a sliding that it leaves out
     with keep_warnings():
         remarks = [*doubts, *_compare_crushing(case, found.values())]

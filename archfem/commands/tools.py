@@ -175,12 +175,14 @@ def show_both_senses(
 ) -> None:
     """Show a result of limit analysis beside that of the other sense, each at its least end.
 
-    Both may add to the doubts. Where the rest is cut short, the result is shown.
+    Both may add to the doubts. Where it, or the rest, is cut short, the result is shown.
     """
     # where a structure does not stand, the load plays no part
     other = None if first.outcome is Outcome.INFEASIBLE else case.limit.opposite
     opposite, left = None, "\nin the other sense: not computed" if other else ""
     try:
+        if first.solutions and first.solutions.interrupted:
+            raise KeyboardInterrupt
         first = case.limit.solve_least(first)
         if other is not None:
             # a search in walls takes minutes in each sense

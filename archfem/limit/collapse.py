@@ -19,7 +19,7 @@ import xarray as xr
 from archfem._display import ExplainedWord, ResultDisplay
 from archfem._typing import Array, CrushingStrength
 from archfem._validation import validate_arguments
-from archfem.errors import InvalidInput, logger
+from archfem.errors import Interrupted, InvalidInput, logger
 from archfem.joints.resultants import check_instant, joint_dataset
 from archfem.limit.backfill import BlocksWithFill, sum_body_forces
 from archfem.limit.fill_bounds import FillBounds, bound_least_factor, refine_bounds
@@ -382,6 +382,8 @@ def _solve_loads(
     result = replace(result, strength=crushes, live=actions, dead=stays, structure=structure)
     if result.outcome is Outcome.BRACKETED:
         logger.warning("%s: the factor is only a bound; %s", result.sentence, result.solutions)
+    if result.solutions is not None and result.solutions.interrupted:
+        raise Interrupted(result)
     return result
 
 
@@ -530,6 +532,8 @@ def _vary_assumptions(
         optimum, least = loaded.solve(), np.inf
         if friction == "nonassociated":
             optimum, solutions = search_nonassociated(loaded, optimum, -1.0)
+            if solutions.interrupted:
+                raise Interrupted(found)
             least = solutions.bracket[0]  # where none was found
         values[assumption] = least if optimum is None else -optimum.value
     return FillRange(values)
@@ -721,7 +725,10 @@ def warn_idle_joints(result: Collapse) -> None:
 def warn_lost_solution(solutions: NonassociatedBounds) -> None:
     """Warn where the weakest was found by chance, or the factor rises suddenly with friction."""
     least, tried = solutions.between[0], solutions.starts[0]
-    if solutions.may_be_less and solutions.agreeing < 2:
+    if solutions.interrupted:
+        words = "a weaker solution without dilatancy may exist: the search was interrupted after %d"
+        logger.warning(f"{words} starting states; run it to its end", tried)
+    elif solutions.may_be_less and solutions.agreeing < 2:
         found = f"only one of {tried} starting states led to the least found, {least:.4g}"
         if not solutions.agreeing:
             found = (

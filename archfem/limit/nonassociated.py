@@ -32,7 +32,7 @@ from scipy.spatial import cKDTree
 
 from archfem._display import ProgressReport
 from archfem._typing import Array
-from archfem.errors import DidNotConverge
+from archfem.errors import DidNotConverge, Interrupted
 from archfem.limit.linear_programme import Limits, Optimum, Programme, no_limits, uneven_compression
 
 # States from which the search starts besides the associated one; fewer for many joints
@@ -210,6 +210,7 @@ class NonassociatedBounds:
         gap: complementarity gap, friction dissipation minus work of the loads, relative to the
             objective [-].
         agreeing: number of starting states that reached the weakest solution, within a thousandth.
+        interrupted: whether Ctrl-C ended the search.
     """
 
     bracket: tuple[float, float]
@@ -221,9 +222,14 @@ class NonassociatedBounds:
     opening: float = np.nan
     gap: float = np.nan
     agreeing: int = 0
+    interrupted: bool = False
 
     def __str__(self) -> str:
         """Describe the range of the solutions in one line."""
+        return "the search was interrupted: " * self.interrupted + self._describe_range()
+
+    def _describe_range(self) -> str:
+        """Describe the range of the solutions, whether or not the search has ended."""
         tried, successful = self.starts
         lower, upper = self.bracket
         if not np.isfinite(lower):
@@ -312,41 +318,72 @@ def _find_mirror(programme: Programme) -> tuple[sparse.csr_matrix, sparse.csr_ma
     return (motion, forces) if alike and max(abs(x).max() for x in differences) < 1e-9 else None
 
 
+@dataclass(eq=False)
+class _SearchState:
+    """Solutions and bound of a search so far."""
+
+    path: Sequence[tuple[float, float]] = ()  # shares of the friction, and objectives with them
+    tried: int = 0  # starts
+    solutions: Sequence[AlternatingIterate] = ()  # to which starts led
+    weaker: tuple[AlternatingIterate, ...] = ()  # from a descent below these
+    bound: float = 0.0  # on all objectives from above, zero of a growing load until it is proved
+
+
 def _search(
     programme: Programme, start: Optimum | None, scale: float
 ) -> tuple[Optimum | None, NonassociatedBounds]:
     """Return the result of `search_nonassociated` for a programme as it is."""
-    # the number of starts falls with the joints squared
-    joints = len(programme.blocks.structure.depths)
-    number = max(2, MAX_START_COUNT * min(joints, MAX_FULL_SEARCH_JOINTS) ** 2 // joints**2)
-    with ProgressReport("limit analysis", len(FRICTION_SHARES) + number) as progress:
-        followed, path = _follow_friction(programme, progress)
-        starts = followed + _free_head_joints(programme)
-        starts += _relax_starts(programme, start, number)
-        solutions = _find_solutions(programme, starts, progress)
-    normal = np.array([normal_forces(forces) for forces in starts])
-    smallest = normal.reshape(-1, joints).min(axis=0, initial=np.inf)
+    found, interrupted = _SearchState(), False
     associated = -np.inf if start is None else start.value
-    bound = max(associated, _bound_objective(programme, smallest))
-    limits = scale * associated, scale * bound
-    successful = len(solutions)
-    first = max(solutions, key=lambda iterate: iterate.state.value, default=None)
-    least = -np.inf
-    if first is not None:
-        least = first.state.value + OBJECTIVE_DECREASE * abs(first.state.value)
-    if starts and bound > least:  # a weaker solution is possible: descend to it
-        solutions += descend(programme, first, starts[0], patience=30)
+    try:
+        _search_solutions(programme, start, found)
+    except KeyboardInterrupt:
+        if programme.force_cost is not None:  # no bound is known
+            raise
+        interrupted = True
+    limits = scale * associated, scale * max(associated, found.bound)
+    solutions, successful = [*found.solutions, *found.weaker], len(found.solutions)
     values = [scale * iterate.state.value for iterate in solutions] or [np.nan]
     bounds = NonassociatedBounds(
-        (min(limits), max(limits)), (min(values), max(values)), (len(starts), successful)
+        (min(limits), max(limits)),
+        (min(values), max(values)),
+        (found.tried, successful),
+        tuple((share, scale * value) for share, value in found.path),
+        interrupted=interrupted,
     )
-    bounds = replace(bounds, path=tuple((share, scale * value) for share, value in path))
     if not solutions:
         return None, bounds
     weakest = max(solutions, key=lambda iterate: iterate.state.value)
     close = np.isclose(values[:successful], scale * weakest.state.value, rtol=OBJECTIVE_DECREASE)
     bounds = replace(bounds, agreeing=int(close.sum()))
     return weakest.state, _with_residuals(programme, weakest, bounds)
+
+
+def _search_solutions(programme: Programme, start: Optimum | None, found: _SearchState) -> None:
+    """Search from all starts, bound the objective, and descend below the weakest solution."""
+    # the number of starts falls with the joints squared
+    joints = len(programme.blocks.structure.depths)
+    number = max(2, MAX_START_COUNT * min(joints, MAX_FULL_SEARCH_JOINTS) ** 2 // joints**2)
+    with ProgressReport("limit analysis", len(FRICTION_SHARES) + number) as progress:
+        followed, found.path = _follow_friction(programme, progress)
+        starts = followed + _free_head_joints(programme)
+        starts += _relax_starts(programme, start, number)
+        try:
+            found.tried, found.solutions = len(starts), _find_solutions(programme, starts, progress)
+        except Interrupted as error:
+            found.tried, found.solutions = error.last
+            raise
+    normal = np.array([normal_forces(forces) for forces in starts])
+    smallest = normal.reshape(-1, joints).min(axis=0, initial=np.inf)
+    found.bound = _bound_objective(programme, smallest)
+    first = max(found.solutions, key=lambda iterate: iterate.state.value, default=None)
+    least = -np.inf
+    if first is not None:
+        least = first.state.value + OBJECTIVE_DECREASE * abs(first.state.value)
+    associated = -np.inf if start is None else start.value
+    if starts and max(found.bound, associated) > least:  # a weaker solution is possible
+        for iterate in descend(programme, first, starts[0], patience=30):
+            found.weaker += (iterate,)
 
 
 def _follow_friction(
@@ -383,13 +420,16 @@ def _free_head_joints(programme: Programme) -> list[Array]:
 def _find_solutions(
     programme: Programme, starts: Sequence[Array], progress: ProgressReport | None = None
 ) -> list[AlternatingIterate]:
-    """Return the solutions to which given forces lead."""
-    solutions = []
-    for number, forces in enumerate(starts, start=1):
-        if progress is not None:
-            progress.show(f"start {number} of {len(starts)}", done=1)
-        if (iterate := find_solution(programme, forces)) is not None:
-            solutions.append(iterate)
+    """Return the solutions to which given forces lead; Ctrl-C raises with those so far."""
+    solutions, number = list[AlternatingIterate](), 1
+    try:
+        for number, forces in enumerate(starts, start=1):
+            if progress is not None:
+                progress.show(f"start {number} of {len(starts)}", done=1)
+            if (iterate := find_solution(programme, forces)) is not None:
+                solutions.append(iterate)
+    except KeyboardInterrupt as error:
+        raise Interrupted((number - 1, solutions)) from error
     return solutions
 
 

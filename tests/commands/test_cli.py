@@ -347,6 +347,33 @@ def test_sigterm_interrupts_where_gmsh_is_loaded():
     assert (ran.stdout, said) == ("130\n", ["archfem: interrupted"])
 
 
+def test_an_interrupted_search_without_dilatancy_keeps_or_says_its_bound(
+    column, tmp_path, unplotted, monkeypatch, capsys
+):
+    """The column slides at 0.3 g; the other sense is not searched, and no assessment is kept."""
+
+    def stop(*_):
+        searched.append(1)
+        raise KeyboardInterrupt
+
+    searched, out, sliding = [], tmp_path / "out", "contacts.'stone to stone'.friction=0.3"
+    monkeypatch.setattr("archfem.limit.nonassociated._follow_friction", stop)
+    changes = ["limit.horizontal=1", "limit.friction=nonassociated", sliding]
+    changes += ["assessment.spectrum={ code = 'EC8', ag = 0.3, ground = 'B' }"]
+    given = [part for change in changes for part in ("--set", change)]
+    assert af.commands.main(["limit", str(column), *given, "--out", str(out)]) == 130
+    text = (out / "limit.txt").read_text(encoding="utf-8")
+    bound = "no state without dilatancy was found; it is at most 0.3 g, pushed to the right"
+    assert text.startswith(f"limit analysis: {bound}\n")
+    assert "the search was interrupted: 0 starting states led to no solution" in text
+    assert "in the other sense: not computed" in text
+    assert len(searched) == 1
+    capsys.readouterr()
+    assert af.commands.main(["assess", str(column), *given, "--out", str(tmp_path / "no")]) == 130
+    assert f"assessment: {bound}; nothing is kept\n" in capsys.readouterr().err
+    assert not (tmp_path / "no").exists()
+
+
 def test_sigterm_in_limit_analysis_keeps_dead_load_and_motion(
     column, tmp_path, unplotted, monkeypatch, caplog
 ):

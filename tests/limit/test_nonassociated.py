@@ -10,6 +10,7 @@ from scipy import sparse
 from scipy.optimize import Bounds, LinearConstraint, milp
 
 import archfem as af
+from archfem.errors import Interrupted
 from archfem.limit import Outcome, linear_programme, nonassociated
 from archfem.limit.collapse import warn_lost_solution
 from archfem.limit.linear_programme import RigidBlocks
@@ -488,6 +489,46 @@ def test_without_a_solution_the_bound_is_the_answer(monkeypatch):
     assert f"was found; it is at most {upper:.4g} times 1 kN" in unknown.sentence
     assert "; it is at least" in replace(found, upper=np.inf).sentence
     assert np.isnan(found.joints["N"]).all()
+
+
+@pytest.mark.usefixtures("few_starts")
+@pytest.mark.parametrize("solved", [0, 3, None])
+def test_an_interrupted_search_leaves_the_least_factor_so_far(monkeypatch, caplog, solved):
+    """Each solution is an upper bound; without any it is the factor with dilatancy."""
+    structure, find, made = wall(HALVES, 0.5), nonassociated.find_solution, []
+    upper = af.collapse_factor(structure, live=SIDEWAYS).factor
+    whole = af.collapse_factor(structure, live=SIDEWAYS, friction="nonassociated")
+
+    def stop(programme, forces):
+        if programme.friction[0] == 0.5:  # none on the way to all of the friction
+            made.append(forces)
+            if len(made) > (solved or 0):
+                raise KeyboardInterrupt
+        return find(programme, forces)
+
+    if solved is None:
+        monkeypatch.setattr(nonassociated, "_follow_friction", stop_at_once)
+    monkeypatch.setattr(nonassociated, "find_solution", stop)
+    with pytest.raises(Interrupted) as raised:
+        af.collapse_factor(structure, live=SIDEWAYS, friction="nonassociated")
+    found = raised.value.last
+    assert found.solutions.interrupted
+    assert found.live == (SIDEWAYS,)
+    assert str(found.solutions).startswith("the search was interrupted: ")
+    assert "no lower bound is known" in str(found.solutions)
+    if solved:
+        check(structure, SIDEWAYS, found)
+        assert found.factor >= whole.factor * (1.0 - 1e-9)
+        assert "(least found)" in found.sentence
+        assert "the search was interrupted after 3 starting states; run it to its" in caplog.text
+    else:
+        assert found.outcome is Outcome.BRACKETED
+        assert found.upper == pytest.approx(upper)
+        assert "the factor is only a bound; the search was interrupted: " in caplog.text
+
+
+def stop_at_once(*_):
+    raise KeyboardInterrupt
 
 
 @pytest.mark.usefixtures("few_starts")
