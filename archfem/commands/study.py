@@ -10,7 +10,7 @@ import xarray as xr
 from archfem._display import DOUBT_MARK
 from archfem._files import DERIVED, create_result_folder, hash_content, replace_results
 from archfem.commands.cli import ExitCode
-from archfem.errors import InvalidInput
+from archfem.errors import Interrupted, InvalidInput
 from archfem.studies.result_store import RESULT_FILES, format_table, status
 
 if TYPE_CHECKING:
@@ -31,7 +31,11 @@ def study(options: argparse.Namespace) -> int:
     definition = Study.read(options.case, options.changes, own_code=options.own_code)
     folder = create_result_folder(options.out)
     print(f"{definition.title}: {len(definition.points)} points", flush=True)
-    table = definition.run(folder, workers=options.workers, client=options.scheduler)
+    interruption = None
+    try:
+        table = definition.run(folder, workers=options.workers, client=options.scheduler)
+    except Interrupted as error:
+        table, interruption = error.last, error
     print(status(folder))
     errors = table["error"].values.ravel().tolist()
     for error in sorted({error for error in errors if error}):
@@ -43,13 +47,15 @@ def study(options: argparse.Namespace) -> int:
     for name in ("study.txt", "study.png", *RESULT_FILES):
         if (folder / name).is_file():
             print(f"wrote {folder / name}")
+    if interruption is not None:
+        raise interruption
     return 1 if all(errors) else ExitCode.DOUBTFUL if any(errors) else 0
 
 
 def _write_results(definition: "Study", table: xr.Dataset, folder: Path) -> None:
     """Print and write the table of a study, draw it, and write the findings of a comparison."""
     from archfem.studies.comparison import file_name, study_table, write_finding
-    from archfem.studies.study import Comparison
+    from archfem.studies.study import NOT_COMPUTED, Comparison
     from archfem.view.studies import draw_findings, draw_study
     from archfem.view.style import write_files
 
@@ -60,11 +66,13 @@ def _write_results(definition: "Study", table: xr.Dataset, folder: Path) -> None
     if isinstance(definition, Comparison) and definition.statements:
         text = f"{definition.answers(table)}\n\n{text}"
     print(text)
-    write_files({"study.txt": f"{definition.title}\n\n{text}"}, folder)
+    left = table["error"].values.ravel().tolist().count(NOT_COMPUTED)
+    title = definition.title + f", interrupted: {left} points are not computed" * (left > 0)
+    write_files({"study.txt": f"{title}\n\n{text}"}, folder)
     factors = {name: finding.factors for name, finding in findings.items() if finding.scales}
     try:
         if isinstance(definition, Comparison) and factors:
-            picture = draw_study(factors, definition.reduction, definition.title)
+            picture = draw_study(factors, definition.reduction, title)
         else:
             picture = draw_findings(table)
         write_files({"study.png": picture}, folder)

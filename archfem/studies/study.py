@@ -20,7 +20,7 @@ from archfem.cases.run import Run, carry_out, replace_run
 from archfem.cases.toml_file import check_table, read_tables, refuse_unknown
 from archfem.dynamics.analysis import Analysis
 from archfem.dynamics.history import Ending
-from archfem.errors import ArchfemError, InvalidInput, logger
+from archfem.errors import ArchfemError, Interrupted, InvalidInput, logger
 from archfem.motion.motion import Motion
 from archfem.studies.comparison import (
     Finding,
@@ -41,7 +41,7 @@ from archfem.studies.parameter_space import (
     list_varied_keys,
     parameter_axes,
 )
-from archfem.studies.process_pool import Row, evaluate_points
+from archfem.studies.process_pool import Row, evaluate_points, make_row
 from archfem.studies.result_store import Progress, Store, build_table, status
 from archfem.studies.statements import Statement, column_label, read_statements, statement_table
 
@@ -51,6 +51,9 @@ STUDY_KEYS: Mapping[str, Any] = {
     **{"columns": dict, "statements": [dict]},
 }
 STUDIED_CASE_KEYS: Mapping[str, Any] = {"case": str, "set": [str]}
+
+# Error of points that Ctrl-C left
+NOT_COMPUTED = "an interruption of the study"
 
 
 @validate_methods
@@ -194,7 +197,8 @@ class Study:
                 answers.
             StudyStopped: the disk is full, the scheduler was lost, or no worker starts; finished
                 points are kept.
-            KeyboardInterrupt: on Ctrl-C; finished points are kept.
+            KeyboardInterrupt: on Ctrl-C; finished points are kept, and their table. `last` of an
+                `Interrupted` is that table, once a point has finished.
         """
         store = None if folder is None else Store(Path(folder))
         with ExitStack() as stack:
@@ -203,10 +207,16 @@ class Study:
             else:
                 stack.enter_context(store.lock())
                 shared = store.shared.resolve()
-            rows = self._collect_rows(store, shared, workers, client)
+            interruption = None
+            try:
+                rows = self._collect_rows(store, shared, workers, client)
+            except Interrupted as error:
+                rows, interruption = error.last, error
             table = build_table(self.axes, rows, self.evaluator.units, self._attributes)
             if store is not None:
                 store.write_table(table)
+        if interruption is not None:
+            raise Interrupted(table) from interruption
         return table
 
     status = staticmethod(status)
@@ -238,14 +248,20 @@ class Study:
         log = None if store is None else store.log
         evaluation = self._evaluate(points, shared, client, workers=workers, log=log)
         # closed on Ctrl-C too, which ends the workers
-        with closing(progress), closing(evaluation) as finished:
-            for number, row in finished:
-                rows[digests[number]] = row
-                if store is not None:
-                    self._store(store, number, digests[number], row)
-                scales = row["found"].get("scale")  # of the runs of an IDA
-                runs = len(scales) if isinstance(scales, list) else 0
-                progress.add(failed=bool(row["error"]), runs=runs)
+        try:
+            with closing(progress), closing(evaluation) as finished:
+                for number, row in finished:
+                    rows[digests[number]] = row
+                    if store is not None:
+                        self._store(store, number, digests[number], row)
+                    scales = row["found"].get("scale")  # of the runs of an IDA
+                    runs = len(scales) if isinstance(scales, list) else 0
+                    progress.add(failed=bool(row["error"]), runs=runs)
+        except KeyboardInterrupt as error:
+            if not rows:
+                raise KeyboardInterrupt from error
+            left = make_row({}, NOT_COMPUTED)
+            raise Interrupted([rows.get(digest, left) for digest in digests]) from error
         return [rows[digest] for digest in digests]
 
     def _store(self, store: Store, number: int, digest: str, row: Row) -> None:

@@ -462,6 +462,39 @@ def test_status_states_the_progress_of_a_study(study_file, tmp_path, capsys):
     assert af.studies.Status(4, 2, 1, 0.5).remaining == pytest.approx(4.0)
 
 
+def test_an_interrupted_study_writes_the_table_of_what_is_done(
+    study_file, tmp_path, monkeypatch, capsys
+):
+    """Two of six points are stored; before the first there is no table, and the rest continues."""
+    folder, store, stored = tmp_path / "out", af.Study._store, []
+
+    def stop(*given):
+        if len(stored) == most:
+            raise KeyboardInterrupt
+        stored.append(given)
+        store(*given)
+
+    command = ["study", "--own-code", str(study_file), "--out", str(folder), "--workers", "1"]
+    most, evaluate = 0, "archfem.studies.process_pool.evaluate_point"
+    with monkeypatch.context() as patch:
+        patch.setattr(evaluate, stop)
+        assert af.commands.main(command) == 130
+    assert not (folder / "results.csv").exists()
+    monkeypatch.setattr(af.Study, "_store", stop)
+    most = 2
+    assert af.commands.main(command) == 130
+    said = capsys.readouterr().out
+    assert "in doubt: 3 of 6 points ended in an interruption of the study" in said
+    text = (folder / "study.txt").read_text(encoding="utf-8")
+    assert text.startswith("six rings, interrupted: 3 points are not computed\n")
+    errors = pd.read_csv(folder / "results.csv")["error"].fillna("").tolist()
+    assert errors == [""] * 3 + ["an interruption of the study"] * 3
+    most = 9
+    assert af.commands.main(command) == 3
+    assert len(stored) == 6  # none twice
+    assert (folder / "study.txt").read_text(encoding="utf-8").startswith("six rings\n")
+
+
 def test_a_search_counts_its_runs(tmp_path):
     """Two of four motions took 10 runs each, in 40 s with 4 runs of the third: 16 are left."""
     known = {"running": True, "runs": 24, "run_rate": 24 / 40, "runs_left": 16.0}
