@@ -6,13 +6,13 @@ and `report` are therefore bound when they are called, through one table that a 
 
 import io
 import sys
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from enum import StrEnum
 from html import escape
 from importlib import import_module
 from multiprocessing import parent_process
 from time import monotonic
-from typing import Any, ClassVar, Self, TypeVar
+from typing import Any, ClassVar, NamedTuple, Self, TypeVar
 
 from tqdm import tqdm
 
@@ -112,12 +112,23 @@ def write_progress_line(name: str, text: str) -> None:
         sys.stderr.flush()
 
 
+class Reached(NamedTuple):
+    """How far a worker of a study is."""
+
+    share: float  # of its outermost search or motion, 0 if it is unknown
+    text: str
+
+
+# Sends how far a worker is to its driver
+send_progress: Callable[[Reached], None] | None = None
+
+
 class ProgressReport:
     """Progress of a search of five seconds and more: a bar on a terminal, elsewhere lines.
 
     The total is None if it is unknown. A line of a search within another one begins with the texts
     of the outer ones, and is written however short the inner one is. Motions within a search are
-    shown rarely, and those of worker processes not at all.
+    shown rarely. A worker of a study sends the lines to its driver.
     """
 
     _open: ClassVar[list["ProgressReport"]] = []  # from the outermost to the innermost
@@ -127,6 +138,7 @@ class ProgressReport:
         look: dict[str, Any] = {"bar_format": layout, "desc": name, "leave": False}
         self._bar = tqdm(total=total, disable=None, delay=PROGRESS_INTERVAL, **look)
         self._name, self._text, self._rarely = name, "", rarely
+        self._done, self._total = 0.0, total  # the bar counts nothing where it is disabled
         self._shown = self._drawn = monotonic()
 
     def __enter__(self) -> Self:
@@ -141,16 +153,22 @@ class ProgressReport:
         """Show a text, and count the steps done since the last one."""
         now = monotonic()
         self._bar.update(done)
+        self._done += done
         # a motion shows thousands of texts a second
         self._bar.set_postfix_str(text, refresh=not self._rarely or now - self._drawn > 0.1)
         self._drawn = now if now - self._drawn > 0.1 else self._drawn
         self._text, first = text, (*self._open, self)[0]
-        if self._rarely and parent_process() is not None:
+        if self._rarely and parent_process() is not None and send_progress is None:
             return
         interval = MOTION_INTERVAL if self._rarely else PROGRESS_INTERVAL
         if self._bar.disable and now - first._shown >= interval:
             inner = [f"{each._name}: {each._text}" for each in self._open[1:] if each._text]
-            write_progress_line(first._name, "; ".join(filter(None, [first._text, *inner])))
+            words = "; ".join(filter(None, [first._text, *inner]))
+            if send_progress is None:
+                write_progress_line(first._name, words)
+            else:
+                share = first._done / first._total if first._total else 0.0
+                send_progress(Reached(share, f"{first._name}: {words}"))
             first._shown = now
 
 

@@ -34,8 +34,8 @@ def study(options: argparse.Namespace) -> int:
     interruption = None
     try:
         table = definition.run(folder, workers=options.workers, client=options.scheduler)
-    except Interrupted as error:
-        table, interruption = error.last, error
+    except Interrupted as stop:
+        table, interruption = stop.last, stop
     print(status(folder))
     errors = table["error"].values.ravel().tolist()
     for error in sorted({error for error in errors if error}):

@@ -35,7 +35,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from archfem import _numba
+from archfem import _display, _numba
+from archfem._display import Reached
 from archfem._files import temporary_folder
 from archfem._validation import check_integer
 from archfem.cases.provenance import describe_version
@@ -55,6 +56,9 @@ MAX_DEATHS_PER_POINT = 3
 START_METHOD = "forkserver" if "forkserver" in get_all_start_methods() else "spawn"
 
 _evaluation_lock = threading.Lock()
+
+# How far workers are, by the number of their points
+reached: dict[int, Reached] = {}
 
 
 def make_row(found: dict[str, Any], error: str = "", *, ours: bool = True) -> Row:
@@ -212,13 +216,13 @@ class Worker:
         with suppress(OSError):
             self.pipe.send_bytes(task.message)
 
-    def receive(self) -> Row | _numba.CompilationNotice | None:
-        """Receive the row of the task, or what it compiles first; None if the worker has died."""
+    def receive(self) -> Row | _numba.CompilationNotice | Reached | None:
+        """Receive the row of the task, or a notice before; None if the worker has died."""
         try:
-            received: tuple[Row, list[str]] | _numba.CompilationNotice = self.pipe.recv()
+            received: Any = self.pipe.recv()
         except (EOFError, OSError, pickle.UnpicklingError):
             return None
-        if isinstance(received, _numba.CompilationNotice):
+        if isinstance(received, _numba.CompilationNotice | Reached):
             return received
         row, self.warnings = received
         self.task = None
@@ -277,6 +281,7 @@ class WorkerPool:
         self._kill()
         for worker in self._workers:
             worker.end()
+        reached.clear()
         atexit.unregister(self._kill)
 
     def _kill(self) -> None:
@@ -302,11 +307,15 @@ class WorkerPool:
         task = worker.task
         assert task is not None
         row = worker.receive()
+        if isinstance(row, Reached):
+            reached[task.number] = row
+            return None
         if isinstance(row, _numba.CompilationNotice):
             if row.part not in self._compiled:  # one worker compiles, and the others wait
                 row.write()
             self._compiled.add(row.part)
             return None
+        reached.pop(task.number, None)
         self._warnings.log(worker.warnings)
         worker.warnings = []
         if row is not None:
@@ -371,7 +380,7 @@ def _serve(pipe: Connection, log: str, shared: Path | None) -> None:
     with open(log, "a") as file:
         for stream in (1, 2):
             os.dup2(file.fileno(), stream)
-    _numba.send_notice = pipe.send  # the driver says it once for all workers
+    _numba.send_notice = _display.send_progress = pipe.send  # the driver says it for all workers
     np.random.seed()  # noqa: NPY002  (for users' functions: all workers would draw the same)
     with suppress(EOFError, OSError), threadpool_limits(1), share_results(shared):
         while True:

@@ -29,7 +29,7 @@ from archfem.cases.provenance import describe_version
 from archfem.errors import InvalidInput, StudyStopped, logger
 from archfem.studies.evaluators import Evaluator
 from archfem.studies.parameter_space import PAIR_KEY, Axis, StudyPoint
-from archfem.studies.process_pool import Row, evaluate_points
+from archfem.studies.process_pool import Row, evaluate_points, reached
 from archfem.studies.shared_results import count_results
 from archfem.units import in_si_unit
 
@@ -273,13 +273,16 @@ class Progress:
         return Status(self._total, done, self._failed, running=True, runs=runs, **rates)
 
     def _report(self) -> None:
-        """Show the progress at intervals until it is closed, on the bar or in lines of a file."""
+        """Show the progress until it is closed, on the bar or in lines, each of some progress."""
+        shown: Any = None
         while not self._closed.wait(PROGRESS_INTERVAL if self._bar.disable else 1.0):
-            status = self._status
+            status, slowest = self._status, [each.text for each in sorted(reached.values())[:1]]
+            words = "; ".join([str(status), *slowest])
             if not self._bar.disable:
-                self._bar.set_postfix_str(str(status).partition(", ")[2])
-            else:
-                write_progress_line(self._name, str(status))
+                self._bar.set_postfix_str(words.partition(", ")[2])
+            elif (state := (status.done, status.runs, slowest)) != shown:
+                write_progress_line(self._name, words)
+                shown = state
 
 
 def evaluate_with_progress(

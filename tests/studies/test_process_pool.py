@@ -7,13 +7,15 @@ import subprocess
 import sys
 import time
 from contextlib import contextmanager
-from multiprocessing import forkserver
+from multiprocessing import Pipe, forkserver
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 import archfem as af
-from archfem.studies import process_pool
+from archfem import _display
+from archfem.studies import process_pool, result_store
 
 
 def lives(process):
@@ -178,6 +180,34 @@ def test_no_worker_outlives_a_driver_that_is_ended(small_ring, tmp_path, finders
         time.sleep(0.05)
     driver.wait(timeout=20.0)
     assert all_end([*begun, *workers], within=5.0)  # long before their points would
+
+
+def test_lines_of_progress_are_of_the_slowest_motion_and_none_comes_twice(monkeypatch):
+    """Two workers send how far they are; without it hundreds of lines said the same."""
+    lines, pool = [], process_pool.WorkerPool(process_pool.TaskQueue([], None), 2, os.devnull)
+    monkeypatch.setattr(result_store, "write_progress_line", lambda *line: lines.append(line[1]))
+    monkeypatch.setattr(result_store, "PROGRESS_INTERVAL", 0.005)
+    monkeypatch.setattr(_display, "MOTION_INTERVAL", 0.0)
+    progress = result_store.Progress(2, 0, 0, name="pairs")
+    for number, (name, time_reached) in enumerate([("first", 12.0), ("second", 3.0)]):
+        worker = object.__new__(process_pool.Worker)
+        worker.task, (worker.pipe, remote) = SimpleNamespace(number=number), Pipe()
+        monkeypatch.setattr(_display, "send_progress", remote.send)
+        with _display.ProgressReport(name, 20.0, rarely=True) as motion:
+            motion.show(f"{time_reached:g} of 20 s", time_reached)
+        assert pool._receive(worker) is None
+        until = time.monotonic() + 10.0
+        while not (lines and f"; {name}: " in lines[-1]) and time.monotonic() < until:
+            time.sleep(0.01)
+    time.sleep(0.05)
+    pool.close()
+    progress.close()
+    assert lines[-1] == (
+        "0 of 2 points done, 0 failed, time known when the first has ended, running; "
+        "second: 3 of 20 s"
+    )
+    assert len(lines) == len(set(lines))
+    assert not process_pool.reached
 
 
 def test_repeated_warnings_are_counted(caplog):
