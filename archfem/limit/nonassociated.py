@@ -272,22 +272,45 @@ class NonassociatedBounds:
         return bool(factors[-1] - factors[-2] > 3.0 * usual + MAX_SUDDEN_RISE * abs(factors[-1]))
 
 
+# The last programme that was searched as it is, and what it led to
+_searched: list[tuple[Programme, tuple[Optimum | None, NonassociatedBounds]]] = []
+
+
 def search_nonassociated(
     programme: Programme, start: Optimum | None, scale: float
 ) -> tuple[Optimum | None, NonassociatedBounds]:
     """Search from many starts for the state of largest objective that slides without dilatancy.
 
-    A symmetric structure that is pushed to the left is searched as if it were pushed to the right.
+    A symmetric structure that is pushed to the left is searched as if it were pushed to the right,
+    unless it has just been searched so.
     """
     if (mirror := _find_mirror(programme)) is None:
-        return _search(programme, start, scale)
+        _searched.clear()
+        found = _search(programme, start, scale)
+        if not found[1].interrupted:
+            _searched.append((programme, found))
+        return found
     assert programme.columns is not None
     pushed = replace(programme, columns=-programme.columns)
-    state, bounds = _search(pushed, pushed.solve(), scale)
+    known = [found for searched, found in _searched if _are_equal(searched, pushed)]
+    state, bounds = known[0] if known else _search(pushed, pushed.solve(), scale)
     if state is not None:
         motion, forces = mirror[0] @ state.multipliers, mirror[1] @ state.forces
         state = replace(state, forces=forces, multipliers=motion)
     return state, bounds
+
+
+def _are_equal(one: Programme, other: Programme) -> bool:
+    """Return whether two programmes of growing loads are of the same blocks, joints and loads."""
+    parts = []
+    for each in (one, other):
+        if each.limits or each.force_cost is not None or each.columns is None:
+            return False
+        blocks, crushing = each.blocks, np.zeros(0) if each.crushing is None else each.crushing
+        dense = [matrix.toarray() for matrix in (blocks.balance, each.columns)]
+        shape = [blocks.structure.normals, blocks.structure.centroids]
+        parts.append([each.load, each.friction, each.cohesion, crushing, *dense, *shape])
+    return all(map(np.array_equal, *parts))
 
 
 def _find_mirror(programme: Programme) -> tuple[sparse.csr_matrix, sparse.csr_matrix] | None:

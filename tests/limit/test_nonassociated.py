@@ -319,6 +319,29 @@ def test_a_symmetric_wall_is_as_strong_to_both_sides():
 
 
 @pytest.mark.usefixtures("few_starts")
+def test_a_symmetric_structure_is_searched_once_for_both_senses(monkeypatch):
+    """With another friction or strength, or of another shape, it is searched anew."""
+    searched, search = [], nonassociated._search
+    monkeypatch.setattr(
+        nonassociated, "_search", lambda *given: [searched.append(1), search(*given)][1]
+    )
+    right, left = SIDEWAYS, af.BodyForce(-1.0)
+    given = {"friction": "nonassociated"}
+    for structure, live, strength, count in (
+        (wall(HALVES, 0.5), right, None, 1),
+        (wall(HALVES, 0.5), left, None, 0),
+        (wall(HALVES, 0.5), left, 1e6, 1),
+        (wall(HALVES, 0.4), left, None, 1),
+        (wall(HALVES, 0.4, height=0.2), left, None, 1),
+    ):
+        searched.clear()
+        found = af.collapse_factor(structure, live=live, strength=strength, **given)
+        assert len(searched) == count
+        if strength is None:
+            check(structure, live, found)
+
+
+@pytest.mark.usefixtures("few_starts")
 def test_from_the_weakest_of_the_starts_the_search_goes_down(caplog):
     """A wedge of this wall that does not slide is found from no start with much friction."""
     least = af.collapse_factor(wall(DOOR_WALL, 0.6), live=SIDEWAYS, friction="nonassociated")
