@@ -529,8 +529,10 @@ def replace_run(case: Case, folder: Path) -> Iterator[Path]:
         draft = _start_draft(case, folder, inputs)
         try:
             yield draft
-        except BaseException:
-            _keep_partial_results(folder, draft, inputs)
+        except BaseException as error:
+            kept = _keep_partial_results(folder, draft, inputs)
+            if isinstance(error, KeyboardInterrupt) and not kept:
+                logger.warning("interrupted before there was a result: nothing is kept")
             raise
         _files.publish_draft(folder, "run", inputs)
 
@@ -608,8 +610,8 @@ def _publish_run(run: Run, folder: Path, draft: Path, inputs: str) -> Run:
     return replace(run, path=place)
 
 
-def _keep_partial_results(folder: Path, draft: Path, inputs: str) -> None:
-    """Publish the results of a run that failed, unless the folder has those of another run."""
+def _keep_partial_results(folder: Path, draft: Path, inputs: str) -> bool:
+    """Publish results of a run that failed, if any, unless the folder has those of another run."""
     files = [path for path in _files.list_files(draft) if path.name != CASE_FILE]
     new = [path for path in files if not is_linked(path, folder / path.relative_to(draft))]
     if new and "run" not in _files.intact_file_list(folder):
@@ -619,6 +621,8 @@ def _keep_partial_results(folder: Path, draft: Path, inputs: str) -> None:
         _warn_of_draft(folder, draft)
     else:
         shutil.rmtree(draft, ignore_errors=True)
+        return False
+    return True
 
 
 def _warn_of_draft(folder: Path, draft: Path) -> None:

@@ -347,6 +347,16 @@ def test_sigterm_interrupts_where_gmsh_is_loaded():
     assert (ran.stdout, said) == ("130\n", ["archfem: interrupted"])
 
 
+def test_a_run_without_a_result_says_that_nothing_is_kept(column, tmp_path, monkeypatch, caplog):
+    def stop(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("archfem.cases.run.dead_load_of_case", stop)
+    assert af.commands.main(["run", str(column), "--out", str(tmp_path / "out")]) == 130
+    assert "interrupted before there was a result: nothing is kept" in caplog.text
+    assert not list((tmp_path / "out").glob("*"))
+
+
 def test_an_interrupted_search_without_dilatancy_keeps_or_says_its_bound(
     column, tmp_path, unplotted, monkeypatch, capsys
 ):
