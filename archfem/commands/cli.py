@@ -35,7 +35,7 @@ EXIT_CODES = (
     "says why (energy that drifts, a fidelity that is wrong, fill that only tension holds, sliding "
     f"that dilates); {ExitCode.INTERRUPTED}, ended by Ctrl-C, and 143, "
     "by SIGTERM: what was computed is kept in the folder of --out, of `rate` whole vehicles and "
-    "variations alone."
+    "variations alone, of `assess` nothing."
 )
 
 
