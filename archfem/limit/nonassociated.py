@@ -272,8 +272,8 @@ class NonassociatedBounds:
         return bool(factors[-1] - factors[-2] > 3.0 * usual + MAX_SUDDEN_RISE * abs(factors[-1]))
 
 
-# The last programme that was searched as it is, and what it led to
-_searched: list[tuple[Programme, tuple[Optimum | None, NonassociatedBounds]]] = []
+# The last search of a programme as it is, by `_key_of`
+_searched: dict[bytes, tuple[Optimum | None, NonassociatedBounds]] = {}
 
 
 def search_nonassociated(
@@ -286,31 +286,28 @@ def search_nonassociated(
     """
     if (mirror := _find_mirror(programme)) is None:
         _searched.clear()
-        found = _search(programme, start, scale)
-        if not found[1].interrupted:
-            _searched.append((programme, found))
-        return found
+        state, bounds = _search(programme, start, scale)
+        if not bounds.interrupted:
+            _searched[_key_of(programme)] = state, bounds
+        return state, bounds
     assert programme.columns is not None
     pushed = replace(programme, columns=-programme.columns)
-    known = [found for searched, found in _searched if _are_equal(searched, pushed)]
-    state, bounds = known[0] if known else _search(pushed, pushed.solve(), scale)
+    known = _searched.get(_key_of(pushed))
+    state, bounds = known or _search(pushed, pushed.solve(), scale)
     if state is not None:
         motion, forces = mirror[0] @ state.multipliers, mirror[1] @ state.forces
         state = replace(state, forces=forces, multipliers=motion)
     return state, bounds
 
 
-def _are_equal(one: Programme, other: Programme) -> bool:
-    """Return whether two programmes of growing loads are of the same blocks, joints and loads."""
-    parts = []
-    for each in (one, other):
-        if each.limits or each.force_cost is not None or each.columns is None:
-            return False
-        blocks, crushing = each.blocks, np.zeros(0) if each.crushing is None else each.crushing
-        dense = [matrix.toarray() for matrix in (blocks.balance, each.columns)]
-        shape = [blocks.structure.normals, blocks.structure.centroids]
-        parts.append([each.load, each.friction, each.cohesion, crushing, *dense, *shape])
-    return all(map(np.array_equal, *parts))
+def _key_of(programme: Programme) -> bytes:
+    """Return the blocks, joints and loads of a programme; "" if not loads alone grow."""
+    blocks, columns = programme.blocks, programme.columns
+    if programme.limits or programme.force_cost is not None or columns is None:
+        return b""
+    parts = [programme.load, programme.friction, programme.cohesion, programme.crushing]
+    parts += [blocks.balance.toarray(), blocks.structure.normals, blocks.structure.centroids]
+    return b"".join(np.array(each, float).tobytes() for each in (*parts, 0.0 + columns.toarray()))
 
 
 def _find_mirror(programme: Programme) -> tuple[sparse.csr_matrix, sparse.csr_matrix] | None:
