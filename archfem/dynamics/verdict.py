@@ -28,7 +28,7 @@ from archfem.limit.mechanism_count import (
     leave_out_walls,
 )
 from archfem.limit.mechanism_kinematics import first_verified_mechanism
-from archfem.masonry.parts import find_directions, is_on_back
+from archfem.masonry.parts import find_backs, find_directions
 from archfem.masonry.standing import find_bodies, list_own_stones
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import Structure, join_names
@@ -218,13 +218,13 @@ def doubt_unassessed_joints(joints: xr.Dataset, structure: Structure) -> list[Do
     # large displacements follow every stone: there only joints at rings and piers matter
     is_large, blocks = joints.attrs.get("displacements") == "large", structure.blocks
     touches = [(*joint.blocks, joint.ends) for joint in structure.joints]
-    directions = find_directions(blocks, touches)
+    backs = find_backs(blocks, touches, find_directions(blocks, touches))
     # what lies on the back of a ring, or bears nothing at rest, is no hinge
     out = judged | structure.heads | joints["open"].isel(time=0).values
     left_out = [
         number
-        for number, (a, b, ends) in enumerate(touches)
-        if not (out[number] or soft & {a, b} or is_on_back(blocks[a], blocks[b], ends, directions))
+        for number, (a, b, _) in enumerate(touches)
+        if not (out[number] or soft & {a, b} or number in backs)
         and (not is_large or carrying & {blocks[a].role, blocks[b].role})
     ]
     own = joints.isel(joint=left_out)

@@ -10,7 +10,7 @@ from archfem._validation import check_type, validate_arguments
 from archfem.errors import InvalidInput, InvalidStructure
 from archfem.masonry.block import Block
 from archfem.masonry.materials import Contact
-from archfem.masonry.parts import Direction, assign_roles, find_directions, is_on_back
+from archfem.masonry.parts import Direction, assign_roles, find_backs, find_directions
 from archfem.masonry.structure import CONTACT_TOLERANCE, Joint, Structure
 from archfem.units import G
 
@@ -63,11 +63,12 @@ def assembled(
     of = contact if callable(contact) else lambda *_: contact
     across: dict[str, list[Joint]] = {part: [] for part in directions}
     others = []
-    for a, b, ends in touches:
+    backs = find_backs(blocks, touches, directions)
+    for number, (a, b, ends) in enumerate(touches):
         if {a, b} not in joined:
             owner = _select_owner(blocks[a], blocks[b], ends, directions)
             part, role = owner.part, owner.role
-            if role == "ring" and is_on_back(blocks[a], blocks[b], ends, directions):
+            if role == "ring" and number in backs:
                 part, role = f"extrados of {part}", "other"
             (x0, y0), (x1, y1) = ends.tolist()
             law = of(blocks[a], blocks[b])

@@ -32,6 +32,9 @@ PART_ROLES = ("ring", "pier", "other")
 # 0.4. Rings of five stones, with 2.8 and 0.26, bore 1.1 to 1.5 times the push of rings of many.
 MAX_SPAN, MAX_HOLLOW = 2.5, 0.25
 
+# Cosine of the angle up to which faces of a springing are parallel [-]
+PARALLEL = 0.98
+
 
 class Member(Protocol):
     """A block or joint as a member of a part."""
@@ -287,6 +290,11 @@ class Direction:
     centre: Array | None  # of the fitted circle (2,) [m]; None if straight
     upright: bool  # of a straight one: vertical instead of horizontal
 
+    @property
+    def is_upright(self) -> bool:
+        """Whether it is straight and vertical."""
+        return self.centre is None and self.upright
+
     def outward(self, place: Array) -> Array:
         """Return the unit vector (2,) from the inner to the outer face, rightwards in a pier."""
         if self.centre is None:
@@ -329,18 +337,46 @@ def find_directions(
     return {part: _fit_direction(np.array(places), roles[part]) for part, places in stones.items()}
 
 
-def is_on_back(a: Block, b: Block, line: Array, directions: Mapping[str, Direction]) -> bool:
-    """Return whether a joint of two free stones is along the outer face of a ring, no hinge of it.
+def find_backs(
+    blocks: Sequence[Block],
+    lines: Iterable[tuple[int, int, Array]],
+    directions: Mapping[str, Direction],
+) -> set[int]:
+    """Return the numbers of joints of free stones along outer faces of rings, no hinges of these.
 
-    The other stone, of a spandrel or a pier, is beyond it. A flat bed below a springing is not.
+    A stone of a spandrel or a pier is beyond. Faces across the ring are of its back too, as
+    shoulders of a keystone, where the next voussoir is on that side; or where they turn away from
+    the springing on that side. A flat bed below a springing is not.
     """
-    ring, other = (a, b) if a.role == "ring" else (b, a)
-    direction, middle = directions.get(ring.part), line.mean(axis=0)
-    if ring.role != "ring" or other.role == "ring" or other.fixed or direction is None:
-        return False
-    has_back = direction.centre is not None or not direction.upright  # an upright one has none
-    beyond = direction.outward(middle) @ (other.centroid - middle) > 0.0
-    return bool(has_back and beyond) and not direction.separates(line)
+    backs, voussoirs = set[int](), set[tuple[int, bool]]()
+    # faces across the ring by side of a stone: height over it, tangent, number, if of a support
+    across: dict[tuple[int, bool], list[tuple[float, Array, int, bool]]] = {}
+    for number, (a, b, line) in enumerate(lines):
+        for k, next_to in ((a, b), (b, a)):
+            stone, near = blocks[k], blocks[next_to]
+            way, middle = directions.get(stone.part), line.mean(axis=0)
+            # an upright ring has no back
+            if way is None or stone.role != "ring" or stone.fixed or way.is_upright:
+                continue
+            outward, tangent = way.outward(middle), line[1] - line[0]
+            if near.part == stone.part and not near.fixed:
+                along = rotate(way.outward(stone.centroid), 0.5 * np.pi)
+                voussoirs.add((k, bool((near.centroid - stone.centroid) @ along > 0.0)))
+            elif near.role != "ring" and way.separates(line):
+                tangent, away = tangent / np.linalg.norm(tangent), middle - stone.centroid
+                normal = rotate(tangent, 0.5 * np.pi)
+                side = (away @ normal) * (rotate(outward, 0.5 * np.pi) @ normal) > 0.0
+                face = outward @ away, tangent, number, near.fixed
+                across.setdefault((k, bool(side)), []).append(face)
+            elif near.role != "ring" and not near.fixed and outward @ (near.centroid - middle) > 0:
+                backs.add(number)
+    for key, faces in across.items():
+        lowest = min(faces, key=lambda face: face[0])[1]
+        for _, tangent, number, is_support in faces:
+            # parallel faces are a springing on several stones
+            if not is_support and (key in voussoirs or abs(tangent @ lowest) < PARALLEL):
+                backs.add(number)
+    return backs
 
 
 def _fit_direction(places: Array, role: str) -> Direction:
