@@ -86,7 +86,7 @@ class Collapse(ResultDisplay):
         motion: velocities of all blocks' centroids and rotations (n_blocks, 3) [m/s, m/s, rad/s].
             They are scaled so that the fastest corner has 1 m/s, or follow a settlement. Zero where
             nothing moves. Where the structure does not stand: the motion of its fall under its
-            weight.
+            weight; where no state without dilatancy was found: that of the bound `upper`.
         solutions: bounds on all solutions where sliding is without dilatancy; else None.
         soil: pressure of the fill on each piece of a stone's face, with its least and largest
             possible values [Pa]; the number of the block, the piece's ends and the sense of the
@@ -188,7 +188,8 @@ class Collapse(ResultDisplay):
     @property
     def _headline(self) -> str:
         """The name of the mechanism in place of the outcome, or after it."""
-        name = self.mechanism_name if self.outcome is not Outcome.SETTLES else ""
+        unnamed = Outcome.SETTLES, Outcome.BRACKETED
+        name = self.mechanism_name if self.outcome not in unnamed else ""
         if self.outcome is Outcome.COLLAPSES and name:
             return name
         return f"{self.outcome.sentence}: {name}" if name else self.outcome.sentence
@@ -381,7 +382,11 @@ def _solve_loads(
     crushes = check_options(structure, friction, strength)
     result = replace(result, strength=crushes, live=actions, dead=stays, structure=structure)
     if result.outcome is Outcome.BRACKETED:
-        logger.warning("%s: the factor is only a bound; %s", result.sentence, result.solutions)
+        logger.warning(
+            "%s: the factor is only a bound, whose mechanism dilates; %s; a pushover finds a state "
+            "of elastic joints, or a friction 1 %% higher or lower one nearby",
+            *(result.sentence, result.solutions),
+        )
     if result.solutions is not None and result.solutions.interrupted:
         raise Interrupted(result)
     return result
@@ -497,7 +502,8 @@ def _solve_collapse(
         warn_dilatancy(structure)
         optimum, solutions = search_nonassociated(programme, associated, scale)
     if optimum is None:
-        result = _read_without_optimum(stones, dead, unbounded, fall, solutions)
+        shown = associated if support is None else None
+        result = _read_without_optimum(stones, dead, unbounded, fall, solutions, shown)
         return replace(result, solutions=solutions)
     result = _read_result(stones, programme, bounded, scale * optimum.value, optimum, support)
     result = replace(result, solutions=solutions)
@@ -545,6 +551,7 @@ def _read_without_optimum(
     unbounded: Outcome,
     fall: Optimum,
     solutions: NonassociatedBounds | None,
+    associated: Optimum | None,
 ) -> Collapse:
     """Return the result where no factor limits the load, or none was found between its bounds."""
     at_rest = replace(fall, multipliers=np.zeros_like(fall.multipliers))
@@ -552,7 +559,8 @@ def _read_without_optimum(
     bound = upper if unbounded is Outcome.LOCKS else lower
     if not np.isfinite(bound):
         return _read_result(stones, dead, unbounded, np.inf, at_rest)
-    result = _read_result(stones, dead, Outcome.BRACKETED, bound, _without_forces(at_rest))
+    shown = _without_forces(associated or at_rest)
+    result = _read_result(stones, dead, Outcome.BRACKETED, bound, shown)
     return replace(result, upper=upper)
 
 

@@ -57,6 +57,9 @@ GAP_TOLERANCE = 1e-7
 # The same with crushing, whose cuts leave objectives uncertain by 2e-5 or so [-]
 CRUSHING_GAP_TOLERANCE = 1e-4
 
+# Preference for a weak objective, as a share of it, first and where that holds the gap open [-]
+WEAK_PREFERENCE, LEAST_PREFERENCE = 1e-4, 1e-6
+
 # Shear resistance added so that round-off cannot make a programme infeasible [mean block weights]
 RESISTANCE_MARGIN = 1e-8
 
@@ -81,14 +84,18 @@ def find_solution(
     programme: Programme, forces: Array, max_alternations: int = 30
 ) -> AlternatingIterate | None:
     """Find a solution without dilatancy from given forces; None if the duality gap stagnates."""
-    smallest = np.inf
+    smallest, preference = np.inf, WEAK_PREFERENCE
     for _ in range(max_alternations):  # most end within three
-        iterate = _alternate(programme, programme, forces)
+        iterate = _alternate(programme, programme, forces, preference=preference)
         if iterate is None or iterate.converged:
             return iterate
-        if iterate.gap > (1.0 - GAP_TOLERANCE) * smallest:
-            return None
-        smallest, forces = iterate.gap, iterate.state.forces
+        forces, stagnates = iterate.state.forces, iterate.gap > (1.0 - GAP_TOLERANCE) * smallest
+        smallest = iterate.gap
+        if stagnates:
+            # the preference may hold a gap of that share of the objective open
+            if preference < WEAK_PREFERENCE or smallest > preference * abs(iterate.state.value):
+                return None
+            smallest, preference = np.inf, LEAST_PREFERENCE
     return None
 
 
@@ -114,7 +121,11 @@ def descend(
 
 
 def _alternate(
-    programme: Programme, restricted: Programme, forces: Array, factor: Array | None = None
+    programme: Programme,
+    restricted: Programme,
+    forces: Array,
+    factor: Array | None = None,
+    preference: float = WEAK_PREFERENCE,
 ) -> AlternatingIterate | None:
     """Find the mechanism dual to forces, then the forces of least gap for its slips."""
     resistance = shear_resistance(programme, normal_forces(forces)) + RESISTANCE_MARGIN
@@ -125,7 +136,7 @@ def _alternate(
         slips = np.abs(mechanism_gaps(programme, mechanism.multipliers).reshape(3, -1)[2])
         # Random slips lead away from where the search stands, some of them in joints that stick.
         changed = slips if factor is None else factor * (slips + 0.1 * slips.max())
-        state = _minimise_gap(restricted, changed)
+        state = _minimise_gap(restricted, changed, preference)
     except DidNotConverge:  # round-off left no state
         return None
     if state is None:
@@ -140,9 +151,9 @@ def _alternate(
     return AlternatingIterate(pair, gap, gap <= tolerance)
 
 
-def _minimise_gap(programme: Programme, slips: Array, preference: float = 1e-4) -> Optimum | None:
+def _minimise_gap(programme: Programme, slips: Array, preference: float) -> Optimum | None:
     """Return the forces of least gap for given slips; ties go to the largest objective."""
-    # The small `preference` for a weak objective decides between states of the same gap.
+    # The small `preference` for a weak objective decides between states of nearly the same gap.
     dissipation = friction_coefficients(programme) * slips
     cost = np.concatenate([dissipation, dissipation, np.zeros(len(dissipation))])
     if programme.crushing is not None:  # one state alone, for which the crushing cuts converge

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -512,6 +513,26 @@ def test_without_a_solution_the_bound_is_the_answer(monkeypatch):
     assert f"was found; it is at most {upper:.4g} times 1 kN" in unknown.sentence
     assert "; it is at least" in replace(found, upper=np.inf).sentence
     assert np.isnan(found.joints["N"]).all()
+    # what is shown is the mechanism of the upper bound
+    dilating = af.collapse_factor(structure, live=push)
+    np.testing.assert_allclose(found.motion, dilating.motion, atol=1e-9)
+    assert found.hinges == dilating.hinges
+
+
+GATEWAY = Path(__file__).parent / "gateway.geojson"
+
+
+@pytest.mark.parametrize("push", [1.0, -1.0])
+def test_states_of_a_surveyed_gateway_are_found(push):
+    """A preference for weak states held gaps of 1e-7 open, behind which a state is."""
+    structure = af.masonry.surveyed(GATEWAY, snap=6e-3, width=0.6)
+    live = af.BodyForce(push)
+    found = af.collapse_factor(structure, live=live, friction="nonassociated")
+    assert found.outcome is Outcome.COLLAPSES
+    assert found.solutions.starts[1] > 2
+    assert 0.11 < found.factor < found.solutions.bracket[1]
+    assert max(found.solutions.excess, found.solutions.opening) < 1e-6
+    assert found.solutions.gap < EXACT
 
 
 @pytest.mark.usefixtures("few_starts")
