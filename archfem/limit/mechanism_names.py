@@ -220,15 +220,25 @@ class NamedMotion:
             if is_low and len(self.moving) > 1 and not is_whole:
                 stones = f"{count(len(self.moving), 'stone')}, turning and sliding"
                 main = self.main_hinges
-                rings = [self.structure.joints[k].role == "ring" for k in np.flatnonzero(main)]
-                if sum(rings) > 2:  # no wedge has the hinges of an arch
-                    return f"mechanism of {stones}, with hinges at {self._list_joints(main)}"
+                rings = main & [joint.role == "ring" for joint in self.structure.joints]
+                if rings.sum() > 2:  # no wedge has the hinges of an arch
+                    text = f"mechanism of {stones}, with hinges at {self._list_joints(rings)}"
+                    return text + self._say_overturning(main & ~rings)
                 return f"toe wedge of {stones}"
             return f"combined overturning and sliding of {subject}"
         about = f"about the toe of {self._label([mover])}"
         if is_low:
             return f"{'' if is_whole else 'toe wedge '}overturning {about}"
         return f"rocking of {subject} {about}"
+
+    def _say_overturning(self, hinges: Flags) -> str:
+        """Say which parts have a hinge on a support among some joints."""
+        feet = [
+            self.structure.joints[number].part
+            for number in np.flatnonzero(hinges)
+            if any(self.structure.blocks[k].fixed for k in self.structure.pairs[number])
+        ]
+        return "".join(f"; {part} overturns about its toe" for part in dict.fromkeys(feet))
 
     def _describe_moving(self, base: Sequence[tuple[int, int, int]]) -> tuple[str, bool, bool]:
         """Say which blocks move; whether they are on a support, and are all above their base."""

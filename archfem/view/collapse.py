@@ -50,6 +50,9 @@ from archfem.view.style import (
     white_halo,
 )
 
+# Share of the largest turn of a hinge from which one is drawn [-]
+LEAST_TURN = 0.05
+
 
 @validate_arguments
 def draw_collapse(structure: Structure, found: Collapse) -> Figure:
@@ -77,7 +80,8 @@ def _draw_mechanism(axes: Axes, structure: Structure, found: Collapse, factors: 
         )
     if found.motion.any():
         motion = scale_motion(structure, found.motion)
-        _draw_motion(axes, outline_moving_blocks(structure, motion), "mechanism")
+        dilates = " with dilatancy" * (found.outcome is Outcome.BRACKETED)
+        _draw_motion(axes, outline_moving_blocks(structure, motion), f"mechanism{dilates}")
         # on the undeformed joints, whose x is that of the text
         _mark_hinges(axes, structure, found, 0.0 * motion, {"label": "hinge", "ms": 7.5})
         _mark_sliding(axes, structure, found.sliding)
@@ -468,9 +472,13 @@ def _mark_hinges(
     motion: Array,
     style: dict[str, Any],
 ) -> None:
-    """Mark each hinge at the face where its blocks stay in contact, displaced."""
-    points = []
-    for number, side in found.hinges:
+    """Mark each hinge that turns visibly, where its blocks stay in contact, displaced."""
+    points, pairs = [], structure.pairs[[number for number, _ in found.hinges]]
+    velocity = found.motion if isinstance(found, Collapse) else found.path.velocity
+    turns = np.abs(np.diff(velocity[pairs, 2], axis=1))[:, 0]
+    for (number, side), turn in zip(found.hinges, turns, strict=True):
+        if turn < LEAST_TURN * turns.max():
+            continue
         joint = structure.joints[number]
         end = joint.ends[0 if side == "intrados" else 1]
         matrix = rigid_motion_matrix(end[None, :], structure.blocks[joint.lower].centroid)[0]

@@ -209,8 +209,6 @@ def test_an_arch_in_a_wall_is_named_by_its_hinges_and_no_toe_wedge():
     contact = af.Contact(1e9, 4e8, friction=0.6)
     portal = af.masonry.assembled(blocks, contact, width=0.6)
     found = af.collapse_factor(portal, live=af.BodyForce(1.0))
-    words = (
-        r"mechanism of \d+ stones, turning and sliding, with hinges at arch, joints 2, 5 and 8; "
-    )
+    words = r"mechanism of \d+ stones, turning and sliding, with hinges at arch, joints 2, 5 and 8"
     assert found.factor == pytest.approx(0.25602317, rel=1e-6)
-    assert re.fullmatch(f"{words}ground to 1 pier 0", found.mechanism_name)
+    assert re.fullmatch(f"{words}; pier 1 overturns about its toe", found.mechanism_name)

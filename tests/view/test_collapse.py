@@ -54,6 +54,29 @@ def test_collapse_shows_thrust_line_hinges_and_moved_blocks(ring):
     figure.draw_without_rendering()
 
 
+def test_a_hinge_that_hardly_turns_is_not_marked(ring):
+    """It turns by 1/25 of the largest turn: walls in bond have dozens."""
+    found = af.collapse_factor(ring, live=af.BodyForce(1.0))
+    motion = found.motion.copy()
+    still = next(k for k in range(1, 17) if k not in {joint for joint, _ in found.hinges})
+    joint = ring.joints[still]
+    turns = np.abs(
+        [
+            motion[ring.joints[k].higher, 2] - motion[ring.joints[k].lower, 2]
+            for k, _ in found.hinges
+        ]
+    )
+    motion[joint.higher, 2] += 0.04 * turns.max()
+    more = replace(found, motion=motion, hinges=(*found.hinges, (still, "intrados")))
+    assert len(lines_of(draw_collapse(ring, more).axes[0])["hinge"]) == 4
+
+
+def test_without_a_state_the_mechanism_of_the_bound_is_drawn(ring):
+    found = af.collapse_factor(ring, live=af.BodyForce(1.0))
+    axes = draw_collapse(ring, replace(found, outcome=af.limit.Outcome.BRACKETED)).axes[0]
+    assert "mechanism with dilatancy" in axes.get_legend_handles_labels()[1]
+
+
 def test_a_load_that_never_overturns_shows_no_mechanism(ring):
     found = af.collapse_factor(ring, live=[af.PointLoad(x, (0.0, -1e3)) for x in (-1.4, 1.4)])
     axes = draw_collapse(ring, found).axes[0]
