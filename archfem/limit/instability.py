@@ -7,6 +7,7 @@ lets the structure stand is the cause, and the least change of it the remedy.
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from itertools import combinations
 
 import numpy as np
 from scipy import sparse
@@ -15,7 +16,7 @@ from archfem._typing import Array
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.limit.linear_programme import Programme, RigidBlocks
 from archfem.limit.self_weight import is_balanced, refuse_bonds, self_weight_programme
-from archfem.masonry.block import as_point, say_place
+from archfem.masonry.block import Block, as_point, say_place
 from archfem.masonry.structure import CONTACT_TOLERANCE, Structure, join_joint_names
 
 
@@ -52,6 +53,10 @@ def explain_instability(structure: Structure) -> str | None:
     falling = np.array(rigid.free)[speeds > 1e-6 * speeds.max()]
     # depth, as a multiple of that given, and friction from which more does not help [-]
     unlimited = 1e3
+    ways = [sliding and f"slide ({sliding})", turning and f"hinge ({turning})"]
+    moves = f"joints {' and '.join(filter(None, ways))}"
+    if cut := _name_cut_ring(structure):
+        return f"{moves}: {cut}"
     if _stands(dead, friction=unlimited):
         least = _least_value(dead, "friction", float(dead.blocks.structure.friction.min()), 10.0)
         text = f"joints slide ({sliding}): it stands from a coefficient of friction of {least:.2g}"
@@ -66,8 +71,7 @@ def explain_instability(structure: Structure) -> str | None:
         )
     missing = _name_interruption(rigid, falling)
     if _stands(dead, friction=unlimited, depth=unlimited):
-        moves = [sliding and f"slide ({sliding})", turning and f"hinge ({turning})"]
-        return f"joints {' and '.join(filter(None, moves))}: " + (
+        return f"{moves}: " + (
             missing
             or "a stone or a support is missing, or it needs both more friction and deeper joints"
         )
@@ -133,6 +137,29 @@ def name_free_end(structure: Structure, falling: Collection[int]) -> str:
     return ""
 
 
+def _name_cut_ring(structure: Structure) -> str:
+    """Return where a stone of a ring is missing between two others; empty for nowhere."""
+    blocks, owners = structure.blocks, [joint.role != "other" for joint in structure.joints]
+    across = np.bincount(structure.pairs[owners].ravel(), minlength=len(blocks))
+    ends = [k for k in structure.free if blocks[k].role == "ring" and across[k] < 2]
+    for one, other in combinations(ends, 2):
+        size = np.hypot(*np.ptp(blocks[one].points, axis=0))
+        near = blocks[one].distance_to(blocks[other]) <= 1.5 * size
+        if near and blocks[one].part == blocks[other].part:
+            return f"the ring {_say_gap(blocks[one], blocks[other])}"
+    return ""
+
+
+def _say_gap(block: Block, other: Block) -> str:
+    """Return that something is interrupted between two stones, and the remedy."""
+    gap, stone = block.distance_to(other), np.ptp(block.points, axis=0).min()
+    remedy = "add the stone between them, which may be on an ignored layer"
+    if gap < 0.25 * stone:
+        remedy = "close the joint between them, by faces that touch"
+    place = say_place(as_point(block.centroid))
+    return f"is interrupted, {gap:.3g} m from '{block.name}' at {place} to '{other.name}': {remedy}"
+
+
 def _name_interruption(structure: Structure, moving: Sequence[int]) -> str:
     """Return where a chain of moving blocks ends: at a gap, or at nothing; empty if nowhere."""
     near: dict[int, set[int]] = {number: set() for number in range(len(structure.blocks))}
@@ -142,8 +169,7 @@ def _name_interruption(structure: Structure, moving: Sequence[int]) -> str:
     blocks = structure.blocks
     # a block that touches a support alone may hang below it, and ends no chain
     ends = [n for n in moving if len(near[n]) == 1 and not any(blocks[k].fixed for k in near[n])]
-    named = [f"'{blocks[n].name}' at {say_place(as_point(blocks[n].centroid))}" for n in ends]
-    for end, name in zip(ends, named, strict=True):
+    for end in ends:
         own = (end, *near[end], *_find_supports(structure, near, [end]))
         others = [n for n in near if n not in own]
         others = [n for n in others if blocks[n].fixed or len(near[n]) == 1]
@@ -151,16 +177,10 @@ def _name_interruption(structure: Structure, moving: Sequence[int]) -> str:
         other = min(gaps, key=gaps.__getitem__, default=end)
         # a missing stone is hardly larger than the one beside it
         if other != end and gaps[other] <= 1.5 * np.hypot(*np.ptp(blocks[end].points, axis=0)):
-            stone = np.ptp(blocks[end].points, axis=0).min()
-            remedy = "add the stone between them, which may be on an ignored layer"
-            if gaps[other] < 0.25 * stone:
-                remedy = "close the joint between them, by faces that touch"
-            return (
-                f"it is interrupted, {gaps[other]:.3g} m from {name} to '{blocks[other].name}': "
-                f"{remedy}"
-            )
+            return f"it {_say_gap(blocks[end], blocks[other])}"
     if not ends:
         return ""
+    named = [f"'{blocks[n].name}' at {say_place(as_point(blocks[n].centroid))}" for n in ends]
     held = _find_supports(structure, near, ends)
     only = f", and only '{blocks[held[0]].name}' holds the others" if len(held) == 1 else ""
     rest = f"{' and '.join(named[:2])} rest{'s' * (len(ends) == 1)} on nothing"

@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -133,6 +134,20 @@ def test_an_arch_without_its_keystone_is_said_to_be_interrupted():
         assert "interrupted, 0." in ring
         assert "m from 'voussoir 4' at " in ring
         assert " to 'voussoir 6': add the stone between them" in ring
+
+
+def test_a_ring_in_masonry_without_a_voussoir_is_said_to_be_interrupted():
+    """Masonry beside it leaves a state of more friction, which is no remedy.
+
+    Between the stones beside it is the chord of a ninth of 64° at the intrados of 2.4 m.
+    """
+    survey = af.masonry.read_outlines(Path(__file__).parent / "gateway.geojson", snap=6e-3)
+    blocks = [block for block in survey.blocks if block.name != "V6r"]
+    text = explain_instability(af.masonry.assembled(blocks, af.Contact(1e10, 4e9, 0.6)))
+    assert re.match(
+        r"joints slide \(.*\): the ring is interrupted, 0\.298 m from 'V[57]r' at ", text
+    )
+    assert re.search(r" to 'V[57]r': add the stone between them, which may be on an ign", text)
 
 
 def test_a_gap_far_below_a_stone_is_a_joint_to_close():
