@@ -50,7 +50,8 @@ def _draw_as_read(options: argparse.Namespace, error: str) -> Path | None:
     """Draw the drawing of a case in the current folder; None where it has none."""
     path = Path(options.case)
     given = find_drawing(read_settings(path, options.changes), path.parent)
-    if given is None:
+    # errors of the drawing name it, or a structure that does not stand
+    if given is None or not (given["path"].name in error or "does not stand" in error):
         return None
     from archfem.view.sketch import draw_outlines
     from archfem.view.style import save

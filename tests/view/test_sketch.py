@@ -125,6 +125,15 @@ def test_a_failed_check_says_where_the_picture_is(tmp_path, capsys, monkeypatch)
     assert picture.stat().st_size > 1000
     picture.unlink()
     # a sound drawing, a missing one, and a case without one have none
+    draw(tmp_path / "two.dxf", {"left": (0.0, 1.0), "right": (1.0, 2.0)})
+    bonded = '[contacts."stone to stone"]\ntension = "0.1 MPa"\ncohesion = "0.2 MPa"\n'
+    case.write_text(f'{CASE}{bonded}[model]\nfidelity = "rigid"\ndisplacements = "large"\n')
+    assert af.commands.main(["check", str(case)]) == 1
+    said = capsys.readouterr().err
+    assert (
+        "as at 'left 1 to right 1' of contact 'stone to stone': leave these out, or give " in said
+    )
+    assert "wrote" not in said
     (tmp_path / "two.dxf").unlink()
     assert af.commands.main(["check", str(case)]) == 1
     case.write_text('[structure]\nshape = "column"\n')
