@@ -345,7 +345,8 @@ def _read_finish(table: dict[str, Any], section: str) -> dict[str, Any]:
     finish = check_choice(table.pop("finish"), f"{section}.finish", CONDITIONS)
     if both := sorted({*FINISHED_KEYS, "law"}.intersection(table)):
         raise InvalidInput(
-            f"{section} has a finish and {join_names(both)}, which follows from it: leave out one"
+            f"{section} has a finish and {join_names(both)}, which follows from it: leave out one "
+            f"(remove = ['{section}.finish'] leaves out that of a base)"
         )
     return {key: getattr(usual_law(finish), key) for key in FINISHED_KEYS}
 

@@ -544,6 +544,48 @@ fidelity = "rigid"
     ), said
 
 
+def draw_named(path, stones, layer="NAMES"):
+    """Write outlines of 1 m with their names as texts, and an axis."""
+    drawing = ezdxf.new(units=ezdxf.units.MM)
+    space = drawing.modelspace()
+    for name, points in stones.items():
+        space.add_lwpolyline(points, close=True, dxfattribs={"layer": "WALL"})
+        if name:
+            place = np.mean(points, axis=0) + np.array([0.0, 100.0])
+            space.add_text(name, dxfattribs={"layer": layer, "insert": tuple(place)})
+    space.add_line((0, 0), (0, 9000), dxfattribs={"layer": "AXES"})
+    drawing.saveas(path)
+    return path
+
+
+def test_what_ignored_layers_hold_is_said(tmp_path):
+    stones = {f"S{k}": square(0, 1000 * k, 1000) for k in range(3)}
+    path = draw_named(tmp_path / "a.dxf", stones)
+    ignore = af.masonry.Layer(ignore=True)
+    layers = {"WALL": af.masonry.Layer(role="pier"), "AXES": ignore}
+    said = str(af.read_outlines(path, layers=layers | {"NAMES": ignore}))
+    assert said.endswith(
+        "ignored layers: 'AXES' with 0 outlines, 1 LINE, 'NAMES' with 0 outlines, 3 TEXT, one text "
+        "in each of 3 outlines: if it is the stone's name, leave the layer out of "
+        "[structure.layers]"
+    )
+    survey = af.read_outlines(path, layers=layers)
+    assert [block.name for block in survey.blocks] == [*stones]
+
+
+def test_stones_drawn_twice_and_crossed_outlines_keep_their_names(tmp_path):
+    """A pier around its stones overlaps them; a name is within the hull of a crossed outline."""
+    stones = {f"S{k}": square(0, 1000 * k, 1000) for k in range(3)}
+    whole = [(0, 0), (1000, 0), (1000, 3000), (0, 3000)]
+    path = draw_named(tmp_path / "a.dxf", stones | {"": whole})
+    layers = {"WALL": af.masonry.Layer(role="pier"), "AXES": af.masonry.Layer(ignore=True)}
+    with pytest.raises(af.InvalidStructure, match=r"'S\d' and 'WALL 4' overlap|'WALL 4' and 'S\d'"):
+        af.read_outlines(path, layers=layers)
+    stones["S2"] = [(0, 2000), (1000, 3000), (1000, 2000), (0, 3000)]
+    with pytest.raises(af.InvalidStructure, match="outline of 'S2' crosses"):
+        af.read_outlines(draw_named(path, stones), layers=layers)
+
+
 def test_a_stone_on_an_ignored_layer_is_a_doubt(tmp_path, capsys):
     """A filling between two posts and a lintel; a frame, and notes in and off stones, are none."""
 

@@ -324,11 +324,25 @@ def _read_dxf(
     # what many stones have in common, as their material, is the name of none
     said = Counter(text for text, _ in texts)
     texts = [each for each in texts if said[each[0]] == 1]
-    counts = Counter[str]()
-    for outline in outlines:
+    inside, counts = _find_texts(outlines, texts), Counter[str]()
+    for outline, words in zip(outlines, inside, strict=True):
         counts[outline.layer] += 1
         if len(outline.points):
-            yield replace(outline, name=_block_name(outline, texts, counts[outline.layer]))
+            yield replace(outline, name=_block_name(outline, words, counts[outline.layer]))
+
+
+def _find_texts(outlines: Sequence[Outline], texts: Sequence[tuple[str, Array]]) -> list[list[str]]:
+    """Return the texts inside each outline: each in the smallest one of those around it."""
+    import shapely
+
+    shapes = np.array([shapely.Polygon(each.points) for each in outlines])
+    # an outline that crosses itself has its text, if it is within its hull
+    shapes = np.where(shapely.is_valid(shapes), shapes, shapely.convex_hull(shapes))
+    areas, inside = shapely.area(shapes), [list[str]() for _ in outlines]
+    for words, (x, y) in texts:
+        if len(around := np.flatnonzero(shapely.contains_xy(shapes, x, y))):
+            inside[around[np.argmin(areas[around])]].append(words)
+    return inside
 
 
 def _find_strays(read: Sequence[Entity], layers: Collection[str]) -> Iterator[str]:
@@ -401,12 +415,8 @@ def _read_polyline(
     return Outline(_check_polygon(points, where, factor), where, layer, frame=frame)
 
 
-def _block_name(outline: Outline, texts: list[tuple[str, Array]], number: int) -> str:
+def _block_name(outline: Outline, inside: Sequence[str], number: int) -> str:
     """Return the text inside an outline, else its layer and number."""
-    import shapely
-
-    polygon = shapely.Polygon(outline.points)
-    inside = [words for words, (x, y) in texts if shapely.contains_xy(polygon, x, y)]
     if len(inside) > 1:
         raise InvalidInput(
             f"{outline.name} has the texts {inside} in it: leave the one that is its name, and "

@@ -52,6 +52,7 @@ from archfem.masonry.survey.drawings import (
     read_physical_curves,
     read_polylines,
 )
+from archfem.masonry.survey.dxf import POLYLINES, load_dxf
 from archfem.units import G, in_unit
 
 # Gaps and contacts up to this multiple of the tolerance are taken for errors of the survey [-]
@@ -101,6 +102,7 @@ class Survey:
         moved: largest displacement of a vertex by snapping [m].
         frame: unit of the coordinates.
         ignored: number of outlines on each ignored layer, and as "layer (hidden)" of hidden ones.
+        held: other things on ignored layers of a DXF file, in words.
         lost: ignored outlines that lie between stones as one does: layer, place and the share of
             the circumference that touches them [-].
     """
@@ -110,10 +112,14 @@ class Survey:
     moved: float
     frame: Frame
     ignored: Mapping[str, int]
+    held: Mapping[str, str]
     lost: tuple[tuple[str, str, float], ...] = ()
 
     def __str__(self) -> str:
-        counts = [f"'{layer}' with {count} outlines" for layer, count in self.ignored.items()]
+        counts = [
+            f"'{layer}' with {count} outlines{self.held.get(layer, '')}"
+            for layer, count in self.ignored.items()
+        ]
         moved = self.frame.length(round(self.moved, 9))  # less than a nanometre is round-off
         return (
             f"drawing: {_say_size(self.size)}, read in {self.frame.unit}, corners moved by up to "
@@ -178,7 +184,32 @@ def read_outlines(
     except (InvalidInput, InvalidStructure) as error:
         raise type(error)(f"{path}: {error}") from error
     lost = tuple(_find_lost(Path(path), unit, ignored, outlines, snap))
-    return Survey(made, _measure(outlines), moved, outlines[0].frame, ignored, lost)
+    held = _describe_ignored(Path(path), ignored, outlines)
+    return Survey(made, _measure(outlines), moved, outlines[0].frame, ignored, held, lost)
+
+
+def _describe_ignored(
+    path: Path, ignored: Counter[str], outlines: Sequence[Outline]
+) -> dict[str, str]:
+    """Describe what ignored layers of a DXF file hold beside outlines: see `Survey`."""
+    if path.suffix.lower() != ".dxf" or not ignored:
+        return {}
+    import shapely
+
+    words = dict[str, str]()
+    stones = shapely.make_valid(np.array([shapely.Polygon(each.drawn) for each in outlines]))
+    others = [each for each in load_dxf(path, Counter())[0] if each.kind not in POLYLINES]
+    for layer in ignored:
+        own = [each for each in others if each.layer == layer]
+        words[layer] = "".join(f", {n} {kind}" for kind, n in Counter(x.kind for x in own).items())
+        texts = np.array([each.points[0][:2] for each in own if each.text]).reshape(-1, 2)
+        inside = shapely.contains_xy(stones[:, None], *texts.T).sum(axis=1)
+        if (named := np.count_nonzero(inside == 1)) > 0.5 * len(stones):
+            words[layer] += (
+                f", one text in each of {named} outlines: if it is the stone's name, leave the "
+                "layer out of [structure.layers]"
+            )
+    return words
 
 
 def _find_lost(
