@@ -296,7 +296,10 @@ def test_a_finish_is_read_and_written():
     [
         ({"finish": "polished"}, "finish.* 'polished'"),
         ({"finish": "hewn", "closure": 1e-4}, "has a finish and closure, which follows from it"),
-        ({"finish": "hewn", "shear_stiffness": 1e9}, "has a finish and shear_stiffness"),
+        (
+            {"finish": "hewn", "shear_stiffness": 1e9},
+            r"leave out one \(remove = \['contacts.stone to stone.finish'\]",
+        ),
     ],
 )
 def test_a_finish_is_refused_beside_what_follows_from_it(contact, says):
