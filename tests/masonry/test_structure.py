@@ -269,6 +269,24 @@ def test_a_wall_across_its_plane_is_a_strip_and_the_whole_less_its_openings():
     assert wall.transverse_push == (pytest.approx(min(pushes)), "all of it")
 
 
+@pytest.mark.parametrize(
+    ("breadths", "levels"),
+    [((3.0, 1.0), [0.0, 1.0, 2.0, 3.0]), ((2.0, 2.0), [0.0, 1.0, 1.4, 2.0, 2.6, 3.0])],
+)
+def test_courses_across_the_plane_are_between_beds_over_most_of_the_length(breadths, levels):
+    """Two stacks side by side, with beds at 1 and 2 m, and at 1.4 and 2.6 m."""
+    blocks = [af.Block(((0, -1), (4, -1), (4, 0), (0, 0)), af.STONE, "ground", fixed=True)]
+    for left, breadth, beds in ((0.0, breadths[0], (1, 2)), (breadths[0], breadths[1], (1.4, 2.6))):
+        for a, b in pairwise((0, *beds, 3)):
+            outline = ((left, a), (left + breadth, a), (left + breadth, b), (left, b))
+            blocks.append(af.Block(outline, af.STONE, f"{left} {a}", part="wall", role="pier"))
+    wall = af.masonry.assembled(blocks, af.Contact(1e9, 4e8, friction=0.7), width=0.6)
+    for each in af.masonry.columns_across(wall).values():
+        tops = [0.0, *(block.points[:, 1].max() for block in each.blocks[1:])]
+        assert tops == pytest.approx(levels)
+        assert each.weight / each.width == pytest.approx(0.6 * 3.0 * 20e3)
+
+
 def test_the_tip_of_a_gable_is_one_block_with_the_course_below_it_across_the_plane():
     """A triangle of eight courses: the upper ones weigh 1, 3, 5 and 7, the lower ones 9 to 15."""
     half, height, thick = 2.0, 4.0, 0.5

@@ -219,10 +219,11 @@ def column(
 def columns_across(wall: Structure) -> dict[str, Structure]:
     """Return a wall across its plane, held by nothing else: a strip of it, and the whole.
 
-    Both are as broad as the wall is thick, and have its courses, one at each bed of a stone. A
-    course of the whole weighs as much as that of the wall, less its openings; its joints are as
-    long as the wall. A course of less than a fifth of the median weight, as the tip of a gable, is
-    one block with the course below it.
+    Both are as broad as the wall is thick, and have its courses: from one bed over most of its
+    length to the next or, without any, one at each bed of a stone. A course of the whole weighs as
+    much as that of the wall, less its openings; its joints are as long as the wall. A course of
+    less than a fifth of the median weight, as the tip of a gable, is one block with the course
+    below it. The strip is as high as the wall, and passes over openings.
 
     Args:
         wall: structure in its plane; its width is the thickness of the wall.
@@ -238,6 +239,13 @@ def columns_across(wall: Structure) -> dict[str, Structure]:
     ends = np.array([[block.points.min(axis=0), block.points.max(axis=0)] for block in blocks])
     merged, length = merge_levels(ends[..., 1]), float(np.ptp(ends[..., 0]))
     levels, low, high = np.unique(merged), merged[:, :1], merged[:, 1:]
+    above, below, across = (
+        np.ptp(ends[..., 0], axis=1) @ met
+        for met in (low == levels, high == levels, (low < levels) & (levels < high))
+    )
+    through = np.minimum(above, below) > across  # not those of the stones of an arch
+    through[[0, -1]] = True
+    levels = levels[through] if through.sum() > 2 else levels
     covered = np.clip(high, levels[:-1], levels[1:]) - np.clip(low, levels[:-1], levels[1:])
     weights = np.array([[block.area * block.material.unit_weight] for block in blocks])
     courses = (weights / (high - low) * covered).sum(axis=0)
