@@ -187,6 +187,8 @@ class AttachedLoad:
         point: where it acts, at rest (x, y) [m].
         weight: that acts downwards and, as a mass, is accelerated with the block [N].
         force: constant force without mass, up positive (2,) [N].
+        passive: whether the force, as that of a tie, acts against horizontal forces alone, and not
+            in the sense in which these push.
 
     Raises:
         InvalidInput: a value is no number, above 1e9 N, or the weight is negative.
@@ -196,6 +198,7 @@ class AttachedLoad:
     point: tuple[Metres, Metres]
     weight: Newtons = 0.0
     force: tuple[Newtons, Newtons] = (0.0, 0.0)
+    passive: bool = False
 
     def __post_init__(self) -> None:
         """Check that the values are metres and newtons."""

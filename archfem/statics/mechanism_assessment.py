@@ -336,6 +336,12 @@ def kinematic_assessment(  # noqa: PLR0913  (the factors of the codes are argume
         check_between(value, f"{name} [-]", 1.0, most, ends="[]")
     structure = structure_of(structure)
     check_assessable(structure, friction, loads)
+    loads = [
+        replace(load, force=(0.0, 0.0))
+        if load.passive and load.force[0] * direction > 0.0
+        else load
+        for load in loads
+    ]
     search = _Search(
         *(structure, spectrum, float(direction), friction, part, blocks, tuple(loads), rules),
         *(confidence_factor, q),
@@ -563,11 +569,12 @@ class _Oscillator:
                 "all along the motion the pressures of the fill on the stones are those of the "
                 "weights as built: that the fill stays in place is not checked"
             )
-        if any(any(load.force) for load in self.placed.loads):
+        if forces := [load.force for load in self.placed.loads if any(load.force)]:
+            pushes = any(force[0] * self.placed.direction > 0.0 for force in forces)
             found.append(
                 "constant forces have no mass, so that they are not pushed, and count from the "
                 "start of the motion to its end; attach only those whose presence is verified up "
-                "to collapse"
+                "to collapse" + "; one pushes in this sense: a tie is `passive = true`" * pushes
             )
         if factor < (1.0 - 1e-3) * collapse:
             found.append(

@@ -136,6 +136,21 @@ def test_a_wall_with_a_tie(storeys, verified):
     assert found.alpha_0 > 1.5 * storeys.alpha_0
 
 
+def test_a_passive_tie_resists_in_one_sense_and_pushes_in_none():
+    """A strip of 0.5 × 4 m and 40 kN, with 2 kN at 3 m: α = (W b / 2 ± T 3) / (W h / 2)."""
+    strip, tie = af.column(breadth=0.5, heights=[2.0, 2.0]), ("block 2", (0.0, 3.0))
+    for passive, pushed in ((True, 0.5 / 4.0), (False, (40e3 * 0.25 - 2e3 * 3.0) / (40e3 * 2.0))):
+        load = af.masonry.AttachedLoad(*tie, force=(-2e3, 0.0), passive=passive)
+        right, left = (
+            af.kinematic_assessment(strip, SPECTRUM, direction=sense, loads=[load])
+            for sense in (1.0, -1.0)
+        )
+        assert right.alpha_0 == pytest.approx((40e3 * 0.25 + 2e3 * 3.0) / (40e3 * 2.0), rel=1e-4)
+        assert left.alpha_0 == pytest.approx(pushed, rel=1e-4)
+        says = [any("pushes in this sense" in note for note in x.notes) for x in (right, left)]
+        assert says == [False, not passive]
+
+
 def test_a_portal(verified):
     """Columns b x h rock about their corners, the lintel moves with their tops: α = tan(β - θ)."""
     b, h, span = 0.5, 2.5, 3.0
