@@ -22,6 +22,7 @@ from archfem.dynamics.verdict import (
     Verdict,
     brief_mechanism_remarks,
     detect_mechanisms,
+    doubt_soft_joints,
     doubt_unassessed_joints,
     extremes_remark,
     find_farthest,
@@ -189,8 +190,9 @@ class History(ResultDisplay):
         model of small displacements; damping that drags loose blocks; a missed tolerance of the
         steps; constant steps that are long for sliding; a fidelity that does not suit a block; a
         predicted error above its tolerance; a run that was broken off; soft blocks that fall in one
-        piece; a stack that as one rigid body falls, stands or moves otherwise; and joints between
-        stones that fail and are not assessed. The last need the structure.
+        piece; a stack that as one rigid body falls, stands or moves otherwise; joints between
+        stones that fail and are not assessed; and soft joints that let blocks rock before they
+        hinge. The last two need the structure.
         """
         stored = read_doubts(str(self.dataset.attrs.get("doubts", "[]")))
         return (*stored, *self._doubts_of_run)
@@ -200,6 +202,9 @@ class History(ResultDisplay):
         """Doubts of a run broken off, and of joints that fail and, by roles, are not assessed."""
         joints, structure = self.joints, self.structure
         doubts = [] if structure is None else doubt_unassessed_joints(joints, structure)
+        if structure is not None and (fall := self.fall) is not None:
+            soft = doubt_soft_joints(joints, structure, fall)
+            doubts += [doubt for doubt in soft if not any(self.mechanisms.values())]
         if not self.ending.is_complete:
             cause = f"the run {self.outcome.partition(':')[0]}, and what comes after is not known"
             doubts.append(Doubt(cause, "run the motion again, to its end"))

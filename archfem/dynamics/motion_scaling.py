@@ -41,6 +41,7 @@ from archfem.dynamics.scale_search import (
 from archfem.dynamics.schemes import EffectiveDamping, Viscous
 from archfem.dynamics.solvers.integrator import Stepper
 from archfem.dynamics.time_history import time_history
+from archfem.dynamics.verdict import ROCKS_SOFTLY
 from archfem.dynamics.verdict_range import VerdictRange
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.joints.criteria import Criteria
@@ -174,8 +175,9 @@ class CollapseScale:
         said, first = say_bracket("stands", self, met), self.as_one
         if first is None:
             return said
-        one = f"as one rigid body it {describe_first_fall(first, self.pga)}"
-        return f"{one}; in courses it {said}" if first.scale <= self.held else f"{said}; {one}"
+        rocks = f"rocks from {first.rocks:#.3g} × on and " * (first.rocks < inf)
+        one = f"as one rigid body it {rocks}{describe_first_fall(first, self.pga)}"
+        return f"{one}; in courses it {said}" if first.scale < least else f"{said}; {one}"
 
     def __repr__(self) -> str:
         """Return the sentence, how closely scales were run, and what was varied."""
@@ -267,8 +269,13 @@ class CollapseScale:
 
     @property
     def moves(self) -> float:
-        """Smallest scale at which failed joints let blocks move [-]; infinite for none."""
-        return min((run.scale for run in self._runs if run.mechanisms.get("verified")), default=inf)
+        """Smallest scale at which failed or soft joints let blocks move [-]; infinite for none."""
+        moving = (
+            run.scale
+            for run in self._runs
+            if run.mechanisms.get("verified") or any(x.words == ROCKS_SOFTLY for x in run.doubts)
+        )
+        return min(moving, default=inf)
 
     @property
     def moves_in_all(self) -> bool:

@@ -1,6 +1,6 @@
 """Verdict of a run: outcome, doubts, displacements, and the first mechanism by each definition."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,7 +9,7 @@ import xarray as xr
 from archfem._display import DOUBT_MARK
 from archfem._threads import single_threaded
 from archfem._typing import Array
-from archfem.dynamics.collapse_state import CollapseState
+from archfem.dynamics.collapse_state import DISLOCATION, CollapseState, shallowest_part
 from archfem.joints.criteria import (
     Criteria,
     assessed_joints,
@@ -48,6 +48,12 @@ MECHANISM_DEFINITIONS = (
 PUBLISHED_DEFINITION = "Demirel and Aldemir"
 
 ALL_DEFINITIONS = (*MECHANISM_DEFINITIONS, PUBLISHED_DEFINITION)
+
+# Words of the doubt of a motion without a mechanism, with |e| and the displacement
+ROCKS_SOFTLY = (
+    "no joints permit a mechanism, with |e| up to {:.3g}, though a corner moved by {:mm}: joints "
+    "as soft as these let blocks rock before |e| counts as a hinge"
+)
 
 # What a run without doubts still leaves open
 NO_RANGE = "one motion, one set of properties: range not computed"
@@ -245,6 +251,21 @@ def doubt_unassessed_joints(joints: xr.Dataset, structure: Structure) -> list[Do
         cause += f"; with them counted, {total_duration_remark(counted)}"
     parts = join_names([f"'{part}'" for part in dict.fromkeys(own["part"].values.astype(str))])
     return [Doubt(cause, f"give the blocks of part {parts} role='pier' or 'ring', and they count")]
+
+
+def doubt_soft_joints(
+    joints: xr.Dataset, structure: Structure, fall: CollapseState
+) -> Iterator[Doubt]:
+    """Yield the doubt of a run in which blocks are displaced, and no criterion has a mechanism.
+
+    An elastic joint without tension is open over half of its depth at |e| = 1/3. Where it is soft,
+    the moment about a displaced structure has its maximum before the joint counts as a hinge.
+    """
+    largest = float(abs(assessed_joints(joints)["eccentricity"]).max())
+    moved, limit = fall.displacement, DISLOCATION * shallowest_part(structure)[0]
+    if fall.time is None and moved > limit and largest > 1.0 / 3.0:
+        remedy = "count hinges from a smaller |e|, `criteria.hinge`, and see `archfem limit`"
+        yield Doubt(ROCKS_SOFTLY, remedy, (largest, moved))
 
 
 def find_farthest(

@@ -23,6 +23,7 @@ from archfem.dynamics.scale_search import (
     ScaledRun,
     search_scales,
 )
+from archfem.dynamics.verdict import ROCKS_SOFTLY
 from archfem.errors import logger as log
 from archfem.models.model import Doubt
 from archfem.motion.motion import admissible_range
@@ -429,7 +430,12 @@ def test_collapse_is_between_a_stable_and_a_falling_run_at_every_step():
             "as one rigid body it first falls at 0.950 × the motion; in courses it stands at 1.00",
             "< 0.950",
         ),
-        (1.8, "stands at 1.00 × the motion, falls at 2.00 ×", "1.00"),
+        (
+            1.8,
+            "as one rigid body it first falls at 1.80 × the motion; in courses it stands at 1.00",
+            "1.00",
+        ),
+        (2.2, "stands at 1.00 × the motion, falls at 2.00 ×", "1.00"),
         (inf, "stands at 1.00 × the motion, falls at 2.00 ×", "1.00"),
     ):
         searched = replace(found, as_one=FirstFall(one, None))
@@ -466,6 +472,9 @@ def test_smaller_scales_at_which_it_is_dislocated_are_said():
     rests = [replace(run, mechanisms={"verified": k > 1}) for k, run in enumerate(found.runs)]
     said = str(CollapseScale({0.005: replace(found, runs=tuple(rests))}))
     assert said.startswith("stands at 1.30 × the motion, a mechanism at 1.20 ×, falls at 1.40 ×")
+    rocks = Doubt(ROCKS_SOFTLY, "", (0.44, 0.1))
+    soft = [replace(run, doubts=(rocks,) * (k > 1)) for k, run in enumerate(found.runs)]
+    assert str(CollapseScale({0.005: replace(found, runs=tuple(soft))})).startswith(said[:56])
     bound = CollapseScale({0.005: replace(found, runs=(*runs[:1], runs[1], found.runs[-1]))})
     assert "; stands at every smaller scale that was run" in str(bound)
 

@@ -58,6 +58,7 @@ class FirstFall(NamedTuple):
 
     scale: float  # infinite where it falls at none [-]
     again: tuple[float, float] | None  # least and largest beyond, at which it stands [-]
+    rocks: float = inf  # from which it rocks, by the horizontal peak alone [-]
 
 
 @dataclass(frozen=True)
@@ -98,7 +99,8 @@ class RockingBody:
             return None
         after = zip(scales[first:], found[first:], strict=True)
         again = [scale for scale, x in after if x and x.time == inf]
-        return FirstFall([*scales, inf][first], (again[0], again[-1]) if again else None)
+        ends, rocks = (again[0], again[-1]) if again else None, self.start / max(motion.pga, 1e-3)
+        return FirstFall([*scales, inf][first], ends, rocks)
 
     def _rock_on(self, ground: Array, scale: float = 1.0) -> Rocking | None:
         """Return the response to a multiple of a sampled motion; None if the body slides."""
