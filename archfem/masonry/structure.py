@@ -681,6 +681,9 @@ def describe_piers(structure: Structure) -> dict[str, str]:
             for joint in structure.joints
             if joint.role == "ring" and part in {parts[number].part for number in joint.blocks}
         ]
-        high = f" and {min(clear):.3g} m high to the ring" if clear else ""
-        piers[part] = f"{min(joint.depth for joint in own):.4g} m broad{high}"
+        tops = [block.points[:, 1].max() for block in parts if block.part == part]
+        broad, tall = min(joint.depth for joint in own), max(tops, default=np.inf) - base
+        high = f", more than {tall:.3g} m high" * bool(broad > tall)
+        high = f" and {min(clear):.3g} m high to the ring" if clear else high
+        piers[part] = f"{broad:.4g} m broad{high}"
     return piers

@@ -8,7 +8,7 @@ import pytest
 
 import archfem as af
 from archfem.masonry.standing import describe_carried
-from archfem.masonry.structure import find_clear_spans, merge_levels
+from archfem.masonry.structure import describe_spans, find_clear_spans, merge_levels
 
 SQUARE = ((0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (0.0, 1.0))
 
@@ -314,6 +314,12 @@ def test_the_tip_of_a_gable_is_one_block_with_the_course_below_it_across_the_pla
     assert 0.98 < found / (1.5 * thick / height) < 1.0
     # its weight is no load, which would act higher
     assert not describe_carried(whole)
+
+
+@pytest.mark.parametrize(("breadth", "said"), [(0.65, ""), (65.0, ", more than 6.8 m high")])
+def test_a_column_broader_than_high_is_said_to_be_so(breadth, said):
+    strip = af.column(breadth=breadth, heights=[3.4, 3.4])
+    assert describe_spans(strip) == f"no ring; 'column' {breadth:g} m broad{said}"
 
 
 def test_a_portal_on_feet_of_uneven_height_turns_across_the_plane_from_the_ground():
