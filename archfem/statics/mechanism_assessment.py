@@ -337,10 +337,8 @@ def kinematic_assessment(  # noqa: PLR0913  (the factors of the codes are argume
     structure = structure_of(structure)
     check_assessable(structure, friction, loads)
     loads = [
-        replace(load, force=(0.0, 0.0))
-        if load.passive and load.force[0] * direction > 0.0
-        else load
-        for load in loads
+        replace(x, force=(0.0, 0.0)) if x.passive and x.force[0] * direction > 0.0 else x
+        for x in loads
     ]
     search = _Search(
         *(structure, spectrum, float(direction), friction, part, blocks, tuple(loads), rules),
