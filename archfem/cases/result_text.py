@@ -21,7 +21,7 @@ from archfem.cases.defaults import (
     describe_friction_margin,
     explain_defaults,
 )
-from archfem.cases.run import MOTION_VARIABLE, DeadLoadResult
+from archfem.cases.run import DeadLoadResult
 from archfem.dynamics.accuracy import Accuracy
 from archfem.dynamics.collapse_state import FALLEN_STATES
 from archfem.dynamics.history import Ending, History
@@ -129,10 +129,7 @@ def tabulate_runs(runs: Mapping[str, History]) -> ResultTable:
         size = abs(joints["eccentricity"])
         apart = joints["open"].any("time")
         largest = size.max("time").where(~apart, 0.5)  # |e| is undefined while a joint is open
-        # long steps take the mean of the ground's acceleration, and end beside its peaks
-        motion = run.dataset[MOTION_VARIABLE]
-        passed = motion.values[: 1 + round(run.time[-1] / motion.attrs["dt"])]
-        horizontal, vertical = np.abs(passed).max(axis=0)
+        horizontal, vertical = run.dataset["peak_ground"].values
         row = [name, verdict.outcome, str(len(verdict.doubts) or "none")]
         row += [f"{horizontal:.2f} m/s²", f"{vertical:.2f} m/s²", format_ratio(float(size.max()))]
         row.append(str(joints["name"].values[int(largest.values.argmax())]))

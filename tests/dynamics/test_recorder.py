@@ -54,6 +54,20 @@ def test_a_long_run_needs_little_more_memory_than_its_record(tmp_path):
     assert 1024 * (long_peak - peak) / (long_size - size) < 140
 
 
+@pytest.mark.parametrize(("steps", "peaks"), [(6, (3.0, 1.0)), (2, (2.0, 0.5))])
+def test_peaks_of_the_ground_between_the_steps_are_recorded(steps, peaks):
+    """Samples of 5 ms; steps of 20 ms, of which the second or sixth ends the run, beside peaks."""
+    level, up = np.zeros((2, 25))
+    level[[2, 14]], up[[3, 10]] = (2.0, -3.0), (0.5, 1.0)
+    model = af.build(af.column(breadth=0.6, heights=[1.0]), fidelity="rigid")
+    ends = iter([None] * (steps - 1) + ["enough"])
+    motion = af.Motion(level, 0.005, up)
+    run = af.time_history(model, motion, dt=0.02, until=lambda *_: next(ends))
+    assert run.time[-1] == pytest.approx(0.02 * steps)
+    assert run.dataset["ground"].values[:, 0] == pytest.approx(0.0)
+    assert run.dataset["peak_ground"].values == pytest.approx(peaks)
+
+
 def test_recorded_quantities_have_their_dimensions_and_values(run, model, motion):
     assert run.joints["eccentricity"].dims == ("time", "joint")
     assert run.joints.sizes == {"time": 601, "joint": 18}

@@ -509,3 +509,22 @@ def test_a_support_spreads_below_a_press():
     large = af.build(ring, fidelity="rigid", displacements="large")
     with pytest.raises(af.InvalidInput, match="small displacements"):
         af.pushover(large, spread, dead=[press])
+
+
+@pytest.mark.parametrize(("stiffness", "factor"), [(50e6, 0.037855), (200e6, 0.060848)])
+def test_a_strip_on_soil_turns_under_a_smaller_push(stiffness, factor):
+    """By hand: N (e d - 2 θ) / 2 m of a strip of 0.4 × 4 m is largest at (0.5 - e)³ = 8 N / 9 k d³.
+
+    There θ = 2 N / (9 k d² (0.5 - e)²); on rigid ground 0.1 g turn it. The ground is broader.
+    """
+    stiff, soil = af.Contact(1e10, 4e9, 0.6), af.Contact(stiffness, 0.5 * stiffness, 0.6)
+    strip = af.column(breadth=0.4, heights=[2.0, 2.0], contact=stiff)
+    ground = replace(strip.blocks[0], outline=((-2, -1), (2, -1), (2, 0), (-2, 0)))
+    joints = replace(strip.joints[0], contact=soil), *strip.joints[1:]
+    strip = replace(strip, blocks=(ground, *strip.blocks[1:]), joints=joints)
+    model = af.build(strip, fidelity="rigid", displacements="large")
+    found = af.pushover(model, af.BodyForce(1.0)).factor
+    left = (8.0 * strip.weight / (9.0 * stiffness * 0.4**3)) ** (1.0 / 3.0)
+    turn = 2.0 * strip.weight / (9.0 * stiffness * 0.4**2 * left**2)
+    assert ((0.5 - left) * 0.4 - 2.0 * turn) / 2.0 == pytest.approx(factor, rel=1e-4)
+    assert found == pytest.approx(factor, rel=5e-3)
