@@ -30,6 +30,7 @@ from archfem.errors import InvalidInput
 from archfem.limit.mechanism_count import Mechanism
 from archfem.models.model import Doubt
 from archfem.motion.motion import Motion
+from archfem.statics.equilibrium import doubt_pieces
 from archfem.view.style import Files
 
 # Modules of studies are slow to import, and imported where they are needed.
@@ -103,6 +104,7 @@ def scale(options: argparse.Namespace) -> int:
         write_progress_line("scale", f"{len(made)} runs of the interrupted search are kept")
     with record_doubts(case.structure) as doubts:
         found = search(case.analysis, motion, made=made)
+        doubts += doubt_pieces(case.structure)
     files: Files = {**answers.state_scale(found, motion, doubts)}
     doubts += found.doubts
     text = "\n".join([f"{motion.name}: {found}", *mark_remarks(doubts), "", found.table()])

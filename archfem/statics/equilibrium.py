@@ -29,12 +29,14 @@ from archfem.joints.contact_law import LARGEST_CLOSING, ContactLaw
 from archfem.joints.criteria import assessed_joints
 from archfem.joints.resultants import joint_dataset, select_joint
 from archfem.limit.collapse import stands
+from archfem.limit.fill_strength import Fill
 from archfem.limit.instability import explain_instability, name_free_end
 from archfem.limit.linear_programme import NoEquilibrium
+from archfem.limit.self_weight import self_weight_programme
 from archfem.masonry.backfill import jointed_fill
 from archfem.masonry.block import Block, as_point, say_place
 from archfem.masonry.construction import Stage, resolve_stages
-from archfem.masonry.loads import BodyForce
+from archfem.masonry.loads import BodyForce, PointLoad
 from archfem.masonry.parts import find_undivided
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import (
@@ -58,7 +60,7 @@ from archfem.statics.relaxation import (
     solve_local,
     solve_or_relax,
 )
-from archfem.units import MPa, format_mm, kPa, mm
+from archfem.units import MPa, format_mm, kN, kPa, mm
 
 # Median depth of a ring's joints above which a wrong unit is likely [m]: of arches that span more
 # than 60 m the deepest are about that
@@ -476,7 +478,7 @@ def dead_load_doubts(dead: Equilibrium, friction: float | None = None) -> tuple[
     structure, joints = dead.model.structure, assessed_joints(dead.joints)
     ratio, names = joints["friction"], joints["name"].values
     limit = 1.0 if friction is None else friction  # rough faces of stone slide at 0.6 to 0.75
-    doubts = structure_doubts(structure)
+    doubts = [*structure_doubts(structure), *doubt_pieces(structure)]
     if (steep := (ratio > limit).values).any():
         reason = (
             f"under dead load |V| / N is {float(ratio.max()):.3g} in "
@@ -510,7 +512,7 @@ def structure_doubts(structure: Structure) -> list[Doubt]:
     remedy = "if so, give it that part, in a drawing by its layer"
     parts = [Doubt(cause, remedy) for cause in structure.misplaced.values()]
     sizes = [*_doubt_slope(structure), *_doubt_depth(structure), *_doubt_undivided(structure)]
-    return [*fixed, *parts, *sizes, *fill_doubts(structure)]
+    return [*fixed, *parts, *sizes, *_doubt_whole_fill(structure)]
 
 
 def _doubt_depth(structure: Structure) -> list[Doubt]:
@@ -658,8 +660,50 @@ def _doubt_support(structure: Structure, numbers: Sequence[int], part: str) -> D
 SOIL_ANGLE, SOIL_COHESION = 30.0, 5e3
 
 
-@lru_cache(maxsize=8)
 def fill_doubts(structure: Structure) -> tuple[Doubt, ...]:
+    """Return a doubt about a fill of runs, in one piece or in several."""
+    return _doubt_whole_fill(structure) or doubt_pieces(structure)
+
+
+@lru_cache(maxsize=8)
+def doubt_pieces(structure: Structure, most: float = 2.0) -> tuple[Doubt, ...]:
+    """Return a doubt where pieces of fill are so coarse that they lock a ring.
+
+    A push on the stones of rings alone fails them at a factor that pieces raise over all of their
+    passive pressure: for five bridges by 1.2 to 1.8 in pieces of 1.6 times the depth of the ring or
+    less, by 1.8 to 15 in those of three times that depth or more.
+    """
+    grain = np.array([block.grain for block in structure.blocks])
+    laws = [joint.contact for joint in structure.joints if grain[list(joint.blocks)].all()]
+    rings = [k for k in structure.free if structure.blocks[k].role == "ring"]
+    if not laws or not rings:
+        return ()
+    loads = [PointLoad(x, (1.0 * kN, 0.0), y) for x, y in structure.centroids[rings]]
+    angle = float(np.degrees(np.arctan(laws[0].coefficient)))
+    pressure = Fill(friction_angle=angle, cohesion=laws[0].cohesion, mobilisation=1.0)
+    factors = []
+    for fill in (None, pressure):
+        stones, dead = self_weight_programme(structure, "coulomb", None, fill)
+        try:
+            found = dead.with_load_factor(stones.load(loads)).solve(forces=False)
+        except NoEquilibrium:  # it does not stand, as others say
+            return ()
+        factors.append(np.inf if found is None else -found.value)
+    if (ratio := factors[0] / factors[1]) <= most or np.isnan(ratio):
+        return ()
+    return (
+        Doubt(
+            "coarse pieces of fill lock the ring: a push on its stones alone fails it at {:.3g} "
+            f"times the push with all passive pressure of the fill, and fine pieces at {most:g} "
+            "times or less: runs and pushovers stand longer than the structure",
+            "cut smaller pieces, such as half the size",
+            (float(ratio),),
+        ),
+    )
+
+
+@lru_cache(maxsize=8)
+def _doubt_whole_fill(structure: Structure) -> tuple[Doubt, ...]:
     """Return a doubt where fill in one piece holds itself as no soil does.
 
     Fill in one piece carries tension. Cut into pieces whose joints carry none, with the strength of

@@ -573,6 +573,28 @@ def test_fill_in_pieces_answers_itself():
     assert fill_doubts(pieces) == ()
 
 
+def test_pieces_as_large_as_the_fill_is_deep_lock_the_ring_and_words_say_by_how_much():
+    """A plastic fill of this strength bounds the push on the ring: no fill beside it bears more."""
+    walls = WALLS | {"length": 4.0}
+    bridge, soil = arch_bridge(**walls), {"friction_angle": 30.0, "cohesion": 5e3}
+    stones = [k for k in bridge.free if bridge.blocks[k].role == "ring"]
+    push = [af.PointLoad(x, (1e3, 0.0), y) for x, y in bridge.centroids[stones]]
+    coarse, fine = (af.masonry.jointed_fill(bridge, size, **soil) for size in (2.5, 0.9))
+    plastic = af.limit.PlasticFill(**soil, gap=0.1)
+    most = af.collapse_factor(bridge, live=push, fill=plastic).upper
+    factors = [af.collapse_factor(cut, live=push).factor for cut in (coarse, fine)]
+    (doubt,) = fill_doubts(coarse)
+    assert factors[0] > 1.7 * most
+    assert factors[1] < 1.3 * most
+    fill = af.limit.Fill(**soil, mobilisation=1.0)
+    ratio = factors[0] / af.collapse_factor(bridge, live=push, fill=fill).factor
+    assert f"fails it at {ratio:.3g} times the push with all passive pressure" in str(doubt)
+    assert "half the size" in doubt.remedy
+    assert fill_doubts(fine) == ()
+    # limit analysis with the strength of a fill does not depend on its pieces
+    assert structure_doubts(coarse) == []
+
+
 def test_every_answer_of_a_bridge_has_the_doubt_of_its_fill(tmp_path, capsys):
     """Check, limit analysis, a run, and the range of its verdict; and no answer with sidewalls."""
     path = tmp_path / "bridge.toml"
