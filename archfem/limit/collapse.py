@@ -374,7 +374,7 @@ def _solve_loads(
         if result.outcome is Outcome.COLLAPSES and not isinstance(loads, Settlement):
             stones.warn_of_lost_loads(loads, stays, result.factor)
     if np.isinf(result.factor):
-        warn_locking(structure, friction)
+        warn_locking(structure, friction, fill)
     if friction is None:
         warn_idle_joints(result)
     warn_bonds(structure, result)
@@ -708,13 +708,13 @@ def warn_sliding(names: Sequence[str], factor: float) -> None:
         )
 
 
-def warn_locking(structure: Structure, friction: str | None) -> None:
+def warn_locking(structure: Structure, friction: str | None, fill: object) -> None:
     """Warn of a fill in pieces, which associated flow may lock so that no load is too large."""
-    if friction is not None and any(block.grain for block in structure.blocks):
+    if friction is not None and fill is None and any(block.grain for block in structure.blocks):
         logger.warning(
             "an infinite factor is that of a fill in pieces which dilates by tan φ as it slides: "
             "it may lock between the stones, as soil does not; cut smaller pieces, or give "
-            "fill=af.limit.Fill(…) for the structure before it was cut"
+            "fill=af.limit.Fill(…)"
         )
 
 

@@ -649,7 +649,7 @@ def collapse_factors(
         elif associated[row] is not None:  # the whole search, or a bound
             factors[row] = collapse_factor(stones.whole, live=list(row), **options).factor
     if np.inf in factors.values():
-        warn_locking(stones.whole, options["friction"])
+        warn_locking(stones.whole, options["friction"], options["fill"])
     return factors
 
 

@@ -6,6 +6,7 @@ from math import radians, sqrt, tan
 import numpy as np
 import pytest
 import shapely
+from backfilled import arch_bridge
 
 import archfem as af
 from archfem.masonry import BACKFILL, SOIL_TO_STONE, jointed_fill
@@ -196,6 +197,20 @@ def test_between_fixed_walls_pieces_that_dilate_bear_any_load(caplog):
     caplog.clear()
     af.collapse_factor(fill, live=load, friction=None)
     assert not caplog.text
+
+
+def test_of_a_vehicle_on_given_fill_no_pieces_lock_whether_it_is_cut_or_not(caplog):
+    """Both have the same factors, infinite where no axle reaches a stone that moves."""
+    bridge = arch_bridge()
+    pieces = jointed_fill(bridge, 1.0, friction_angle=30.0, cohesion=5e3)
+    given = {"fill": af.limit.Fill(friction_angle=30.0), "strength": 5e6}
+    factors = [
+        af.limit.moving_load(each, [50e3, 50e3], spacings=[1.5], **given).factors["factor"].values
+        for each in (bridge, pieces)
+    ]
+    assert np.isinf(factors[0]).any()
+    assert factors[1] == pytest.approx(factors[0], rel=1e-6)
+    assert "lock" not in caplog.text
 
 
 @pytest.mark.slow
