@@ -30,7 +30,7 @@ from archfem.statics.mechanism_assessment import (
     kinematic_assessment,
 )
 from archfem.statics.pushover import Pushover, Stop, pushover
-from archfem.units import MPa, kN, warn_if_in_g
+from archfem.units import G, MPa, kN, warn_if_in_g
 
 # Least weight of the heaviest axle of a vehicle that a case may give without its unit [N]: those of
 # lorries in kg are less
@@ -330,11 +330,13 @@ def parse_rating(table: Any) -> Table:
         if isinstance(each, dict):
             options["vehicle"] = vehicle = read_object(Vehicle, each, "rating.vehicle")
             has_unit = all(isinstance(weight, str) for weight in each["axles"])
-            if not has_unit and 1.0 < max(vehicle.axles) < LIGHT_AXLE:  # 1 N is a load of studies
+            heaviest = max(vehicle.axles)
+            if not has_unit and 1.0 < heaviest < LIGHT_AXLE:  # 1 N is a load of studies
+                mass = heaviest * (1e3 if heaviest < 100.0 else 1.0)  # tonnes, or kg
                 raise InvalidInput(
                     f"rating.vehicle '{vehicle.name}': axles = {each['axles']} are in N, and the "
-                    f"heaviest, {max(vehicle.axles) / kN:g} kN, is that of a cart: give units, as "
-                    'in "88.29 kN" for a mass of 9000 kg'
+                    f"heaviest, {heaviest / kN:g} kN, is that of a cart: give units, as "
+                    f'in "{mass * G / kN:.4g} kN" for a mass of {mass:g} kg'
                 )
     return options
 

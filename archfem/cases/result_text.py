@@ -36,7 +36,7 @@ from archfem.limit.rating import Rating
 from archfem.limit.thickness import minimum_thickness
 from archfem.masonry.loads import Action, Settlement, describe_massless
 from archfem.masonry.ring_thickness import Ring
-from archfem.masonry.standing import describe_carried
+from archfem.masonry.standing import describe_carried, find_bodies
 from archfem.masonry.structure import (
     UNCHECKED_ACROSS,
     Structure,
@@ -328,13 +328,13 @@ def note_masses(
 ) -> list[str]:
     """Return notes on loads that are not pushed as weights are, and on masses at other heights."""
     words = [describe_massless(live, dead), describe_carried(structure)]
-    if parapets:
+    if parapets and not any("parapet" in name.lower() for name in find_bodies(structure)):
         points = np.concatenate([structure.blocks[number].points for number in structure.free])
         weight = parapets * float(np.ptp(points[:, 0]))
         words.append(
             f"parapets of [rating], {parapets / kN:g} kN/m, are left out here: {weight / kN:.3g} "
-            f"kN, {weight / structure.weight:.1%} of the weight; as bodies of [structure.standing] "
-            "they weigh and are pushed"
+            f"kN, {weight / structure.weight:.1%} of the weight; as a body "
+            "[structure.standing.parapets] they weigh and are pushed"
         )
     return [f"{NOTE_MARK}{each}" for each in words if each]
 

@@ -34,9 +34,17 @@ from archfem.dynamics.history import FILE_KIND, Ending, History, partial_history
 from archfem.dynamics.schemes import Viscous
 from archfem.dynamics.slip_error import least_compression
 from archfem.dynamics.time_history import time_history
-from archfem.errors import ArchfemError, DidNotConverge, InvalidInput, filter_log, logger
+from archfem.errors import (
+    ArchfemError,
+    DidNotConverge,
+    InvalidInput,
+    filter_log,
+    keep_warnings,
+    logger,
+)
 from archfem.joints.criteria import assessed_joints
-from archfem.limit.collapse import Collapse
+from archfem.limit.collapse import Collapse, stands
+from archfem.limit.fill_strength import Fill
 from archfem.masonry.stiffness_ratio import soften_joints
 from archfem.models.model import Doubt
 from archfem.motion.motion import Motion
@@ -153,6 +161,10 @@ class DeadLoadResult:
             words += " of its sides, as a stone does, and is left out"
             remedy = "if it is a stone, draw it on the layer of its part"
             lost = [Doubt(words, remedy, each) for each in survey.lost] if survey else []
+        fill, given = self.case.limit.fill, self.case.limit.resistance
+        if isinstance(fill, Fill) and not stands(self.case.structure, **given):
+            words = "limit analysis with the fill of [limit] finds no equilibrium under dead load"
+            lost.append(Doubt(words, "check the thickness of rings and piers, and the fill"))
         return (*self.dead.model.doubts, *lost, *dead_load_doubts(self.dead, friction))
 
     @cached_property
@@ -487,7 +499,8 @@ def _compare_start(
     analysis, dead = other
     try:
         cut = motion.cut(0.0, 0.5)
-        run = time_history(analysis, cut, start=dead, damping=at_rest.damping[0])
+        with keep_warnings():  # which are of this model, and not of the run
+            run = time_history(analysis, cut, start=dead, damping=at_rest.damping[0])
         if run.ending is Ending.INTERRUPTED:
             raise KeyboardInterrupt
     except ArchfemError:  # it has no equilibrium at some step: no comparison

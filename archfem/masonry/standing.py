@@ -140,8 +140,9 @@ class StandingBody:
         beyond = [x for x, each in zip(places, below, strict=True) if each.count(None) == len(each)]
         if beyond:
             raise InvalidInput(
-                f"'{self.name}': its axle at x = {beyond[0]:.4g} m is beyond the structure: give "
-                "only the axles on the bridge, with their spacings and x halfway between them"
+                f"'{self.name}': its axle at x = {beyond[0]:.4g} m is beyond the structure: make "
+                "the sidewalls longer; or give only the axles on the bridge, with their spacings "
+                "and x halfway between them"
             )
         return max(tops)
 
@@ -219,10 +220,16 @@ def _stand(structure: Structure, body: StandingBody) -> Structure:
     level = block.points[:, 1].min() + CONTACT_TOLERANCE * structure.size
     stands = sum(float(np.ptp(ends[:, 0])) for *_, ends in touches if ends[:, 1].max() < level)
     if stands < base - 4.0 * len(touches) * CONTACT_TOLERANCE * structure.size:
+        reason = (
+            f"top of the structure beside x = {body.x:.4g} m is not level: make it shorter, move "
+            "it, or give the structure a fill or a paving"
+        )
+        corners = np.concatenate([each.points[:, 0] for each in structure.blocks])
+        for end, over in ((corners.min(), -1.0), (corners.max(), 1.0)):
+            if (over * (body.feet - end)).max() > 0.0:
+                reason = f"structure ends at x = {end:.4g} m: make the sidewalls longer, or move it"
         raise InvalidInput(
-            f"'{body.name}' stands on {stands:.4g} m of its {base:.4g} m, as the top of the "
-            f"structure beside x = {body.x:.4g} m is not level: make it shorter, move it, or give "
-            "the structure a fill or a paving"
+            f"'{body.name}' stands on {stands:.4g} m of its {base:.4g} m, as the {reason}"
         )
     joints = [
         Joint((a, b), as_point(ends[0]), as_point(ends[1]), body.contact, "", body.name, "other")

@@ -281,6 +281,9 @@ def test_parapets_of_a_rating_that_a_push_leaves_out_are_noted(tmp_path, capsys)
         assert capsys.readouterr().out.count(note) == count
     assert note in (out / "limit" / "limit.txt").read_text()
     assert note.removeprefix("note: ") in (out / "limit" / "limit.json").read_text()
-    path.write_text(format_tables(tables | {"rating": {"vehicle": "LM1"}}))
-    main(["limit", str(path), "--out", str(out / "limit")])
-    assert "note: parapets" not in capsys.readouterr().out
+    body = {"x": 0.0, "length": 0.6, "weight": "1.2 kN", "centre_of_gravity": 0.5}
+    tables["structure"]["standing"] = {"parapets": body}
+    for given in (tables | {"rating": {"vehicle": "LM1"}}, tables):
+        path.write_text(format_tables(given))
+        main(["limit", str(path), "--out", str(out / "limit")])
+        assert "note: parapets" not in capsys.readouterr().out

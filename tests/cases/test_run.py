@@ -183,7 +183,7 @@ def test_a_run_and_its_dead_load_take_no_more_time_than_has_passed(small):
     assert rest.seconds + run.seconds < perf_counter() - begin
 
 
-def test_a_run_is_compared_with_a_finer_one_over_its_first_half_second(stack, monkeypatch):
+def test_a_run_is_compared_with_a_finer_one_over_its_first_half_second(stack, monkeypatch, caplog):
     """By the largest |e| of each joint, until either run ends; 0.03 is in no doubt."""
     begun = []
 
@@ -198,6 +198,7 @@ def test_a_run_is_compared_with_a_finer_one_over_its_first_half_second(stack, mo
     def doubts(coarse, finer, softened=None):
         def run(analysis, motion, **_):
             begun.append(motion)
+            run_module.logger.warning("of the other model")
             return {"faces": finer, "soft": softened}[analysis]
 
         monkeypatch.setattr(run_module, "time_history", run)
@@ -233,6 +234,7 @@ def test_a_run_is_compared_with_a_finer_one_over_its_first_half_second(stack, mo
     assert doubts(coarse, far, softened=history((0.0, 0.0), (0.1, -0.2074))) == []
     assert len(begun) == 1
     assert len(doubts(coarse, far, softened=history((0.0, 0.0), (0.1, -0.2076)))) == 1
+    assert not caplog.text
 
 
 def test_some_models_have_no_finer_one_to_compare_with(small, monkeypatch):

@@ -175,7 +175,7 @@ def test_a_body_stands_on_all_that_is_level_below_it_and_on_other_bodies():
     [
         ({"x": 40.0}, "beside the structure"),
         ({"width": 3.0}, "the structure has 1 m"),
-        ({"length": 1.5}, "not level"),
+        ({"length": 1.5}, "stands on 0.95 m of its 1.5 m, as the structure ends at x = 0 m"),
         ({"weight": 1e12}, "give newtons"),
         ({"length": 0.0}, "length"),
         ({"axles": [1e4]}, "either its weight, or axles"),
@@ -306,6 +306,11 @@ def test_an_axle_beyond_the_end_of_a_bridge_is_named_with_its_place():
     axles = {"axles": [90e3, 90e3, 70e3], "spacings": [1.0, 2.0], "width": 2.0}
     lorry = StandingBody(x=end - 1.0, length=0.3, centre_of_gravity=1.2, name="lorry", **axles)
     # halfway between axles 3 m apart is 1.5 m before the last
-    said = f"its axle at x = {end + 0.5:.4g} m is beyond the structure: give only the axles on"
+    said = f"its axle at x = {end + 0.5:.4g} m is beyond the structure: make the sidewalls"
     with pytest.raises(af.errors.InvalidInput, match=said):
         carrying(bridge, [lorry])
+    # a wheel of which a third is beyond the end
+    single = StandingBody(x=end - 0.05, length=0.3, weight=9e3, centre_of_gravity=1.2)
+    said = f"stands on 0.2 m of its 0.3 m, as the structure ends at x = {end:.4g} m: make the side"
+    with pytest.raises(af.errors.InvalidInput, match=said):
+        carrying(bridge, [single])
