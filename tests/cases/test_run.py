@@ -269,3 +269,22 @@ def test_modules_of_a_case_are_among_its_files(tmp_path):
     settings = {"extensions": ["laws.py", "a_package"], "structure": {"file": "stones.dxf"}}
     found = provenance.list_input_files(settings, tmp_path)
     assert found == [tmp_path / "stones.dxf", tmp_path / "laws.py"]
+
+
+@pytest.mark.parametrize(("thickness", "count"), [(0.05, 1), (0.6, 0)])
+def test_a_ring_that_only_its_elastic_fill_holds_up_is_a_doubt(thickness, count):
+    """By limit analysis with the fill of [limit], of which a run without a push makes no use."""
+    sides = {"state": "fixed", "length": 2.0, "height": 1.0, "above": 1.5}
+    arch = {"span": 6.0, "rise": 1.5, "thickness": thickness, "voussoirs": 9}
+    structure = {"shape": "bridge", "arches": {"arch": arch}, "backfill": {"cover": 0.4}}
+    structure["sidewalls"] = {**sides, "left wall": {}, "right wall": {}}
+    case = af.Case.of(
+        {
+            "structure": structure,
+            "model": {"fidelity": "rigid", "cells": [1, 1]},
+            "limit": {"fill": {"friction_angle": 30.0}},
+        }
+    )
+    assert af.stands(case.structure, **case.limit.resistance) == (not count)
+    doubts = [str(doubt) for doubt in af.cases.DeadLoadResult.of(case).doubts]
+    assert sum("finds no equilibrium under dead load" in doubt for doubt in doubts) == count
