@@ -26,7 +26,7 @@ from archfem.cases.report.doubts import (
     peak_of_ground,
     spans_run,
 )
-from archfem.cases.report.motion_rules import check_motions
+from archfem.cases.report.motion_rules import check_motions, find_rule
 from archfem.cases.report.report_data import SHOWN_RESULTS, ReportData
 from archfem.cases.report.scales import describe_scales, find_first_failures, say_fragile
 from archfem.cases.report.study_findings import read_study, say_what_changes
@@ -115,14 +115,16 @@ def list_facts(data: ReportData) -> list[tuple[str, str]]:
 
 def _say_plainly(data: ReportData, doubtful: Sequence[str]) -> Iterator[str]:
     """Yield the answer for a client: whether it survives, from where on not, and what decides."""
+    checks = list_checks(data)
+    failed = [check for check in checks if check.least < 1.0]
+    found = dict.fromkeys(_judge_check(data, check)[0] for check in failed or checks)
+    assessed = [f"by the kinematic assessment {words}" for words in found]
     if data.runs:
-        yield from _say_survival(data, doubtful)
+        yield from _say_survival(data, doubtful, assessed if failed else [])
         yield from _say_first_failures(data)
         yield from say_fragile(data)
         yield _say_what_decides(data.verdict_ranges)
-    # of each direction
-    for found in dict.fromkeys(_judge_check(data, check)[0] for check in list_checks(data)):
-        yield f"by the kinematic assessment {found}"
+    yield from [] if data.runs and failed else assessed
     for name, stated in data.statements.items():
         yield from (pushes := [*_say_pushes(data, name, stated)])
         if name == "rating":
@@ -173,21 +175,42 @@ def _is_of_norm(data: ReportData, text: str) -> bool:
     return any(key in norm and words in text for key, words in codes.items())
 
 
-def _say_survival(data: ReportData, doubtful: Sequence[str]) -> Iterator[str]:
-    """Yield whether it survives the motions, and how often with other properties."""
+def _say_survival(
+    data: ReportData, doubtful: Sequence[str], failed: Sequence[str]
+) -> Iterator[str]:
+    """Yield whether it survives the motions, if they are enough, and how often with other properties.
+
+    The same sentence has assessments that fail.
+    """
     verdicts, (_, answer) = [run.verdict for run in data.runs.values()], _find_worst(data)
     in_doubt = " (in doubt, as below)" * (HISTORIES in doubtful)
+    survives, few = answer.startswith("survives"), _say_too_few(data)
+    answer = f"it {answer}{in_doubt}"
+    if survives and few:
+        answer = f"not decided{in_doubt}, as {few}"
+    answer = f", {'but' if survives and not few else 'and'} ".join([answer, *failed])
     sizes = [x.displacement for x in verdicts if x.outcome in COLLAPSE_STATES[:2]]
     known = bool(sizes) and np.isfinite(sizes).all()
     moved = f", and moves by {Ends.of(sizes):mm}" if known else ""
     beside = any(scale <= 1.0 for scale, *_ in _say_across(data))
-    lead = f"in its plane{in_doubt} it" if beside else f"it {answer}{in_doubt}: it"
+    lead = f"in its plane{in_doubt} it" if beside else f"{answer}: it"
     yield f"{lead} {'; it '.join(_describe_outcomes(data))}{moved}"
+    yield from failed if beside else ()
     ranges = sorted(data.verdict_ranges, key=lambda x: (x.falls.sum(), x.dislocated.sum()))
     for found in ranges[-1:]:
         motion = found.dataset.attrs.get("motion")
         under = f", under '{motion}'" * (len(data.runs) > 1 and bool(motion))
         yield f"with other plausible properties it {found.count}{under}"
+
+
+def _say_too_few(data: ReportData) -> str:
+    """Say of which number the motions that were run are a part; "" if they are enough."""
+    count, rule, norm = len(data.runs), find_rule(data), data.case.report.get("norm", "")
+    total = count + len(data.missing)
+    words = [f"{count} of {total} motions {'were' if count > 1 else 'was'} run"] * (count < total)
+    if rule and count < rule.fewest:
+        words.append(f"{norm} (from memory) asks for {rule.fewest} motions at least")
+    return join_words(words)
 
 
 def _find_worst(data: ReportData) -> tuple[str, str]:
@@ -537,13 +560,14 @@ def _list_ranges_of_steps(data: ReportData) -> Iterator[str]:
 
 def _describe_outcomes(data: ReportData) -> Iterator[str]:
     """Yield each outcome with the motions that lead to it, and the largest displacement."""
+    total = len(data.runs) + len(data.missing)
     for outcome, (verb, _) in _VERBS.items():
         names = [name for name, run in data.runs.items() if run.verdict.outcome == outcome]
         if not names:
             continue
         of = f"of {_describe_peaks(data.runs[name] for name in names)}"
-        under = f"{len(names)} of {len(data.runs)} motions {of}: {', '.join(names)}"
-        if len(names) == len(data.runs):
+        under = f"{len(names)} of {total} motions {of}: {', '.join(names)}"
+        if len(names) == total:
             under = f"all {len(names)} motions {of}"
             under = under if len(names) > 1 else f"the motion '{names[0]}' {of}"
         fall = "; whether it falls was not computed" if outcome == "mechanism" else ""
