@@ -67,6 +67,7 @@ class Ratios(NamedTuple):
     moved: float | None = None  # by displacements, of what passes at rest
     bodies: float | None = None  # with one weight a body, where it is less
     bounded: bool = False  # whether they are upper bounds, by which it fails and does not pass
+    floor: float | None = None  # of another mechanism that may move at the same push
 
     @property
     def name(self) -> str:
@@ -88,6 +89,7 @@ class Ratios(NamedTuple):
     def beside(self) -> str:
         """The other ratios, in brackets."""
         texts = {"by displacements": self.moved, "with one weight a body": self.bodies}
+        texts |= {"with e* = 1": self.floor}
         each = "; ".join(
             f"{format_ratio(x)} {words}" for words, x in texts.items() if x is not None
         )
@@ -209,7 +211,7 @@ def state_ratings(
             if not np.isnan(each.factor):
                 at += "".join(f"; {x}" for x in (each.say_range(), flips) if x)
             factor = "-" if np.isnan(each.factor) else format_ratio(each.factor, 4)
-            row = Row("rating", demand, f"{words}{at}", factor, {"outcome": words})
+            row = Row("rating", demand, f"{words}{at}", factor, {"passes": bool(each.passes)})
             rows.append((each.factor, row))
     sentences = [repr(first)]
     if not np.isnan(first.factor):
@@ -269,7 +271,8 @@ def list_ratios(found: KinematicAssessment) -> list[tuple[AssessmentCheck, Ratio
         moved = check.moved if check.at_rest and not over else None
         bodies = check.bodies if (check.bodies or np.inf) < 0.999 * check.least else None
         needed, linear = over.needed if over else "", check.unit != "m"
-        ratios = Ratios(check.name, (), *ends, needed, linear, moved, bodies, check.bounded)
+        least = None if over else check.floor
+        ratios = Ratios(check.name, (), *ends, needed, linear, moved, bodies, check.bounded, least)
         listed.append((check, ratios))
     return listed
 

@@ -116,6 +116,7 @@ class AssessmentCheck:
         bodies: ratio with one weight for each body that moves as one, at its centroid; None where
             each body has one anyhow.
         bounded: whether the ratio is an upper bound, by which a check fails and does not pass.
+        floor: least ratio of all mechanisms of this α₀, that of e* = 1; None where it is the first.
     """
 
     name: str
@@ -128,6 +129,7 @@ class AssessmentCheck:
     over_fill: FillRange | None = None
     bodies: float | None = None
     bounded: bool = False
+    floor: float | None = None
 
     @property
     def passes(self) -> bool:

@@ -72,7 +72,7 @@ from archfem.statics.first_mechanism import (
     select_joints,
     take_fill_as_loads,
 )
-from archfem.units import STANDARD_GRAVITY
+from archfem.units import STANDARD_GRAVITY, kN
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -211,11 +211,12 @@ class KinematicAssessment(ResultDisplay):
             sliding = list_or_count([names[k] for k in self.sliding])
             many = not hinges and sliding and slides_anywhere(self.structure, self.alpha_0)
             vanishes = f", d_0* = {self.d_0_star:.4g} m, T_s = {self.T_s:.3f} s"
+            weight = self.M_star * self.structure.gravity / self.e_star / kN
             lines += [
                 f"{name_mechanism(self.structure, self.path.velocity)}{ONE_OF_MANY * bool(many)}; "
                 f"hinges: {hinges or 'none'}; sliding: {sliding or 'none'}",
-                f"alpha_0 = {self.alpha_0:.4g}, e* = {self.e_star:.3f}, M* = {self.M_star:.4g} kg"
-                f"{' of this body' * bool(many)}, "
+                f"alpha_0 = {self.alpha_0:.4g}, e* = {self.e_star:.3f} of the {weight:.4g} kN that "
+                f"move, M* = {self.M_star:.4g} kg{' of this body' * bool(many)}, "
                 f"a_0* = {self.a_0_star:.4g} m/s² ({self.a_0_star / STANDARD_GRAVITY:.3f} g)"
                 f"{vanishes if np.isfinite(self.d_0_star) else ''}",
             ]
@@ -612,8 +613,10 @@ class _Oscillator:
         """Why a ratio may be too high: another code's spectrum, a fill left out, other joints."""
         found = self.given.rules.doubt(self.given.spectrum)
         if self.searched:
-            share = f"its linear ratio is e* = {self.e_star:.3g} times that of this one at least"
-            words = f"whatever moves at this alpha_0, {share}"
+            words = (
+                f"whatever moves at this alpha_0, its linear ratio is {self.linear.floor:.3g} at "
+                "least, that of e* = 1"
+            )
             found += [self.searched, Doubt(words, values=(UPPER_BOUND,))]
         if self.fill and self.placed.fill is None and self.path is not None:
             words = "the fill counts as weight and mass on the stones, without its pressure on them"
@@ -627,27 +630,37 @@ class _Oscillator:
             found.append(Doubt(words, remedy, (UPPER_BOUND,)))
         return found
 
+    @cached_property
+    def linear(self) -> AssessmentCheck:
+        """Linear check with a behaviour factor q."""
+        confidence, q = self.given.confidence_factor, self.given.q
+        ground = float(spectral_acceleration(self.given.spectrum, np.zeros(1), 0.05)[0])
+        capacity = q / confidence * (np.inf if self.path is None else float(self.curve["a"][0]))
+        ratio = capacity / ground
+        source = "Circolare 7/2019, C8.7.1.2.1.5 and C8.7.1.2.1.7, eq. C8.7.1.8"
+        return AssessmentCheck(
+            *(f"linear, q = {q:g}, FC = {confidence:g}", capacity, ground, "m/s²", ratio, np.nan),
+            source,
+            bounded=self.bounded_at_rest,
+            floor=self.e_star * ratio if self.searched else None,
+        )
+
     def assess(self) -> KinematicAssessment:
-        """Return the assessment, the linear check with a behaviour factor q."""
+        """Return the assessment by the weights of blocks, or by one for each body."""
         curve, path, structure = self.curve, self.path, self.placed.structure
-        given, confidence, q = self.given, self.given.confidence_factor, self.given.q
-        ground = float(spectral_acceleration(given.spectrum, np.zeros(1), 0.05)[0])
+        given = self.given
         alpha_0, a_0, d_0, secant = np.inf, np.inf, np.inf, np.nan
         mass, control, displacement = 0.0, "", None
         if path is not None:
             alpha_0, a_0 = float(curve["alpha"][0]), float(curve["a"][0])
             mass = self.e_star * (self.weights[0].sum() / structure.gravity)
             control = structure.blocks[self.control].name
-            starts = a_0 / confidence / ground  # ratio at which it is set in motion
             if len(path.factors) > 1:
-                displacement = self._check_displacement(starts)
+                # by the ratio at which it is set in motion
+                displacement = self._check_displacement(self.linear.ratio / given.q)
             if path.end is PathEnd.FALLS:
                 d_0 = float(curve["d"][-1])
                 secant = self._secant_period(0.16 * d_0)
-        name = f"linear, q = {q:g}, FC = {confidence:g}"
-        capacity = q * a_0 / confidence
-        source = "Circolare 7/2019, C8.7.1.2.1.5 and C8.7.1.2.1.7, eq. C8.7.1.8"
-        linear = AssessmentCheck(name, capacity, ground, "m/s²", capacity / ground, np.nan, source)
         found = KinematicAssessment(
             structure,
             given.spectrum,
@@ -659,10 +672,10 @@ class _Oscillator:
             d_0,
             secant,
             curve,
-            replace(linear, bounded=self.bounded_at_rest),
+            self.linear,
             displacement,
             given.rules,
-            confidence,
+            given.confidence_factor,
             control,
             path,
             tuple(self.notes(alpha_0)),

@@ -392,7 +392,12 @@ def test_a_wedge_of_a_wall_in_bond_has_the_linear_check_alone(wedge, verified):
     assert "there is no displacement check" in found.notes[0]
     first, second = (doubt.cause for doubt in found.doubts)
     assert first.startswith("alpha_0 is an upper bound, the least that a search")
-    assert f"its linear ratio is e* = {share:.3g} times that of this one" in second
+    # of e* = 1, as a_0* = alpha_0 g / e*
+    least = 2.0 * factor * G / 1.35 / found.linear.demand
+    assert f"whatever moves at this alpha_0, its linear ratio is {least:.3g} at least" in second
+    assert found.linear.floor == pytest.approx(least, rel=1e-6)
+    assert f"; {least:.3g} with e* = 1), by linear" in describe_margin([found])
+    assert f"e* = {share:.3f} of the {weights[moves].sum() / 1e3:.4g} kN that move" in str(found)
     assert all(UPPER_BOUND in doubt.values for doubt in found.doubts)
     assert found.linear.bounded
     assert "nan" not in str(found) + found.table()
