@@ -344,6 +344,7 @@ def draw_kinematic_assessment(found: KinematicAssessment) -> Figure:
         figure = structure_figure(found.structure)
         _draw_displaced_mechanism(figure.add_subplot(), found)
         add_legend_below(figure, 2)
+        figure.draw_without_rendering()  # the first layout cuts off a title over what moves upwards
         return figure
     wide, high = structure_figure(found.structure).get_size_inches()
     wide = max(wide, 0.75 * Size.COLUMN)

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 
 import archfem as af
 from archfem._files import replace_results
+from archfem.cases import answers
 from archfem.cases.case import case_of
 from archfem.cases.defaults import list_finish_ranges
 from archfem.cases.report import conclusion, report_data, response, sections
@@ -359,6 +360,18 @@ def test_a_table_of_runs_has_the_largest_of_each(runs):
     assert rows[-1]["residual"] == "-"
 
 
+@pytest.mark.parametrize("ended", ["finished", "met", "parted"])
+def test_numbers_of_joints_say_until_when_where_loose_blocks_followed(ended, runs):
+    run = runs["first"]
+    run = replace(run, dataset=run.dataset.assign_attrs(ended=ended))
+    table, until = tabulate_runs({"first": run}), " until 0.10 s" * (ended != "finished")
+    row = dict(zip(table.head, table.rows[0], strict=True))
+    for key, values in ("max |e|", run.joints["eccentricity"]), ("max V/N", run.joints["friction"]):
+        assert row[key] == f"{float(abs(values).max()):.3f}{until}"
+    data = SimpleNamespace(dead=run.joints.isel(time=0))
+    assert ("until 0.10 s, before" in response._tabulate_joints(data, run).caption) is bool(until)
+
+
 def test_an_open_joint_is_the_most_eccentric_unless_another_exceeds_its_edge(runs):
     """|e| of 0.5 stands for it."""
     run = runs["first"]
@@ -480,3 +493,32 @@ def test_supports_are_judged_by_the_first_record_and_iterations_by_the_largest(p
     assert f"{later:.4f}" != "1.0000"
     assert row[3] == f"≤ {int(run.dataset['iterations'].max())}"
     assert (row[0], row[-1]) == ("first", run.outcome)
+
+
+@pytest.mark.parametrize("moves", [True, False])
+def test_caption_and_definitions_of_an_assessment_are_of_what_was_computed(moves):
+    """To the left it has no finite motion, and to the right only where it moves."""
+    checks = [answers.Ratios("linear", ("right", "left"), 1.5, 1.5, linear=True)]
+    checks += [answers.Ratios("NTC-2018 SLV", ("right",), 1.2, 1.2)] * moves
+    rows = [answers.Row("assessment", "-", "-", "-", each._asdict()) for each in checks]
+    texts = [f"{way}: kinematic assessment of a wall\nlinear: passes" for way in ("right", "left")]
+    texts[0] += "\nNTC-2018 SLV: capacity 0.1 m" * moves
+    files = ["assessment_0.png", "assessment_1.png"]
+    data = SimpleNamespace(
+        read_text=lambda _: "\n\n".join(["least margin 1.2", *texts]),
+        files=[*files, "assessment.txt"],
+        statements={"assessment": answers.Statement([], rows)},
+        case=SimpleNamespace(assessment=SimpleNamespace(options={})),
+        read_figure=lambda name, caption: [(name, caption)],
+    )
+    _, table, *figures = sections._build_assessment(data)
+    begins = "Mechanism as it begins, {}; it has no curve, as it has no displacement check."
+    curve = "(a) Mechanism at the displacement capacity, and (b) capacity curve with demand, right."
+    drawn = [(files[0], curve), (files[1], begins.format("left"))]
+    assert figures == (drawn if moves else [(files[0], begins.format("right"))])
+    names = {name for name, _ in table.rows}
+    assert ({"d_0*", "T", "NTC-2018 SLV"} <= names) is moves
+    assert "T_s" not in names
+    words = str(table.rows)
+    assert ("displacement" in words) is moves
+    assert "e* = g M* / Σ P, with the weights P that move alone" in words

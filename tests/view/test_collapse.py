@@ -172,7 +172,11 @@ def test_an_assessment_shows_moved_blocks_curve_and_demand(coarse_ring):
 def test_an_assessment_without_a_finite_motion_shows_the_mechanism_as_it_begins():
     wall = bonded_wall(7, half=1.0)
     found = af.kinematic_assessment(wall, af.Eurocode8(ag=0.3, ground="B"))
-    (axes,) = draw_kinematic_assessment(found).axes
+    figure = draw_kinematic_assessment(found)
+    (axes,) = figure.axes
+    # the mechanism rises above the wall, and the title stays within the page
+    figure.draw_without_rendering()
+    assert axes.title.get_window_extent().y1 < figure.dpi * figure.get_figheight()
     moved = np.abs(found.path.velocity).max(axis=1) > 1e-3
     assert len(axes.collections[1].get_paths()) == moved.sum() > 10
     assert axes.collections[1].get_label() == "mechanism as it begins"

@@ -323,21 +323,28 @@ def _build_assessment(data: ReportData) -> list[Any]:
     """Build text and pictures of kinematic assessments from the files of the folder."""
     if (text := data.read_text("assessment.txt")) is None:
         return []
-    caption = "(a) Mechanism at the displacement capacity, and (b) capacity curve with demand."
     texts = text.split("\n\n")
     names = sorted(name for name in data.files if name.startswith("assessment_"))
     checks = read_numbers(Ratios, data.statements.get("assessment"))
+    moved = {way for each in checks if not each.linear for way in each.directions}
+    captions = dict[str, str]()
+    for name in names:  # numbered as the texts behind the margin
+        way = texts[1 + int(name[len("assessment_") : -len(".png")])].partition(": kinematic ")[0]
+        drawn = f"Mechanism as it begins, {way}; it has no curve, as it has no displacement check"
+        if way in moved:
+            drawn = "(a) Mechanism at the displacement capacity, and (b) capacity curve with demand"
+            drawn += f", {way}"
+        captions[name] = f"{drawn}."
     if len(names) == 2 and all(len(each.directions) == 2 for each in checks):
-        names = names[:1]
+        del captions[names[1]]
         mirrored = "\nleft: the mirror image, with the same numbers"
         texts = [texts[0], texts[1] + mirrored, *texts[3:]]
-        caption = f"{caption[:-1]}, to the right."
-    figures = [figure for name in names for figure in data.read_figure(name, caption)]
-    return [TextBlock("\n\n".join(texts), "lines"), _define_assessment(data), *figures]
+    figures = [figure for each in captions.items() for figure in data.read_figure(*each)]
+    return [TextBlock("\n\n".join(texts), "lines"), _define_assessment(data, text), *figures]
 
 
-def _define_assessment(data: ReportData) -> Grid:
-    """Tabulate the quantities of a kinematic assessment, their rules, and codes that are mixed."""
+def _define_assessment(data: ReportData, text: str) -> Grid:
+    """Tabulate the quantities of a kinematic assessment that were computed, and their rules."""
     state = data.case.assessment.options.get("limit_state", "NTC-2018 SLV")
     rules = state if isinstance(state, LimitState) else LIMIT_STATES[state]
     demand = f"the displacement spectrum, {100.0 * rules.damping:g} % damped, up to T"
@@ -345,18 +352,21 @@ def _define_assessment(data: ReportData) -> Grid:
         f"{rules.period_factor:g} π √(d / a*(d)) at d = {rules.secant_share * rules.share:g} d_0*, "
         "with a* divided by FC; 2 π in place of it is the secant period"
     )
+    takes_part = "M* = (Σ P δ)² / (g Σ P δ²), e* = g M* / Σ P, with the weights P that move alone"
+    checked = f"capacity {rules.share:g} d_0*; demand {demand}; {rules.source}"
     rows = [
         ("alpha_0", "multiple of the weights, as horizontal forces, that begins the mechanism"),
-        ("e*, M*", "share and mass that take part: M* = (Σ P δ)² / (g Σ P δ²), e* = g M* / Σ P"),
-        ("a_0*, d_0*", "acceleration that begins it, and displacement at which it resists nothing"),
+        ("e*, M*", f"share and mass that take part: {takes_part}"),
+        ("a_0*", "acceleration that begins it"),
         (
             "linear",
             "q a_0* / FC against the spectrum at T = 0, which small arches pass that fall in runs",
         ),
-        ("T_s", "secant period at 0.16 d_0*, that of NTC-2008"),
-        ("T", period),
-        (rules.name, f"capacity {rules.share:g} d_0*; demand {demand}; {rules.source}"),
     ]
+    if f"\n{rules.name}: " in text:  # what moves
+        rows.append(("d_0*", "displacement at which it resists nothing, or the end of its motion"))
+        rows += [("T_s", "secant period at 0.16 d_0*, that of NTC-2008")] * ("T_s" in text)
+        rows += [("T", period), (rules.name, checked)]
     return Grid((), rows, "Quantities of the assessment; Circolare 7/2019, C8.7.1.2.1")
 
 
