@@ -123,8 +123,10 @@ def _read_damping(given: str | Table) -> Viscous | EffectiveDamping:
     return read_object(cls, table, "analysis.damping")
 
 
-def _write_damping(damping: Viscous | EffectiveDamping) -> dict[str, Any]:
-    """Return the table of damping."""
+def _write_damping(damping: Viscous | EffectiveDamping) -> str | dict[str, Any]:
+    """Return the table of damping, or the word whose values are defaults."""
+    if damping == EffectiveDamping():
+        return "effective"
     table = {"ratio": damping.ratio, **write_value(damping)}
     return table | ({"modes": "effective"} if isinstance(damping, EffectiveDamping) else {})
 

@@ -410,8 +410,10 @@ class _PresetNames:
         """Sections [materials] and [contacts]; presets as they are need no table."""
         sections: dict[str, Any] = {}
         for (section, name), item in self.objects.items():
-            if PRESETS[section].get(name) != item:
-                table = {key: x for key, x in _list_fields(item).items() if key != "name"}
+            if (usual := PRESETS[section].get(name, type(item))) != item:
+                # what equals the default of reading is not given
+                own = _list_fields(item).items()
+                table = {k: x for k, x in own if k != "name" and x != getattr(usual, k, None)}
                 if isinstance(item, Material) and item.strength == STONE.strength:
                     # a changed copy of the preset, whose own values remain defaults
                     table = {key: x for key, x in table.items() if x != getattr(STONE, key)}
@@ -484,8 +486,8 @@ def _write_argument(value: Any, names: _PresetNames) -> Any:
 
 def _write_blocks(structure: Structure, names: _PresetNames) -> dict[str, Any]:
     """Return all blocks and joints; the most frequent material and contact stand once."""
-    section: dict[str, Any] = {"shape": "blocks"}
-    section |= {"width": structure.width, "gravity": structure.gravity}
+    sizes = {key: x for key, x in given_fields(structure).items() if key in ("width", "gravity")}
+    section: dict[str, Any] = {"shape": "blocks", **sizes}
     rows: dict[str, list[dict[str, Any]]] = {
         "blocks": [_write_argument(block, names) for block in structure.blocks],
         "joints": [_write_argument(joint, names) for joint in structure.joints],

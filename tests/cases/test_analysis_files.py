@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 import archfem as af
+from archfem.cases.report.inputs import tabulate_inputs
+from archfem.cases.report.report_data import ReportData
 from archfem.cases.toml_file import format_tables, parse_tables
 from archfem.joints import DryJoint
 from archfem.joints.own_law import registered_laws
@@ -46,6 +48,26 @@ def test_shipped_cases_are_read_as_they_were_written(path, tmp_path):
     assert again == analysis
     assert again.fingerprint == analysis.fingerprint
     assert read_again(again, tmp_path / "twice").fingerprint == analysis.fingerprint
+
+
+@pytest.mark.parametrize(
+    ("gravity", "width", "ratio", "mark"), [(9.81, 1.0, 0.05, "default"), (9.7, 1.3, 0.02, "given")]
+)
+def test_what_equals_its_default_is_not_written_and_not_given(
+    gravity, width, ratio, mark, tmp_path
+):
+    blocks = [af.Block(((0, -1), (1, -1), (1, 0), (0, 0)), af.STONE, "ground", fixed=True)]
+    blocks.append(af.Block(((0, 0), (1, 0), (1, 2), (0, 2)), af.STONE, "stone", part="pier"))
+    stack = replace(assembled(blocks, af.Contact(1.48e9, 0.3e9, 0.7), width=width), gravity=gravity)
+    damping = af.EffectiveDamping(ratio)
+    analysis = af.Analysis(stack, fidelity="rigid", damping=damping)
+    case = af.Case.read(analysis.write(tmp_path / "stack.toml"))
+    assert case.analysis == analysis
+    marks = {row[0]: row[-1] for row in tabulate_inputs(ReportData(case, {})).rows}
+    assert {marks[name] for name in ("gravity", "width")} == {mark}
+    assert (case.settings["analysis"]["damping"] == "effective") is (mark == "default")
+    assert (marks["contact: k_n"], marks["contact: μ"]) == ("given", "given")
+    assert not {"contact: cohesion", "contact: dilatancy"} & marks.keys()
 
 
 def test_a_shape_is_written_by_its_lengths(tmp_path):
