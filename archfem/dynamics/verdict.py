@@ -199,6 +199,13 @@ def brief_mechanism_remarks(
 
 def total_duration_remark(joints: xr.Dataset) -> str:
     """Return a sentence on the total and the longest time with enough failed joints."""
+    subject, *durations = _measure_failures(joints)
+    total, longest = map(duration_text, durations)
+    return f"{subject} for {total} in all, {longest} at the longest"
+
+
+def _measure_failures(joints: xr.Dataset) -> tuple[str, float, float]:
+    """Return in words that enough joints fail at once, and for how long in all, at the longest."""
     flags = has_counted_mechanism(joints).expand_dims(joint=[0])
     steps = step_lengths(flags["time"].values)
     total = float(steps[flags.transpose("joint", "time").values[0]].sum())
@@ -207,7 +214,7 @@ def total_duration_remark(joints: xr.Dataset) -> str:
     subject = f"{required}{word} joints and more fail at once"
     if required == 1:
         subject = f"one{word} joint or more fails"
-    return f"{subject} for {duration_text(total)} in all, {duration_text(longest)} at the longest"
+    return subject, total, longest
 
 
 def _adjective_of_joints(joints: xr.Dataset) -> str:
@@ -239,18 +246,21 @@ def doubt_unassessed_joints(joints: xr.Dataset, structure: Structure) -> list[Do
     own = own.isel(joint=lasts & flags.any("time").values)
     if not own.sizes["joint"]:
         return []
-    texts = [
-        f"{one['name'].item()} (|e| {float(abs(one['eccentricity']).max()):.3f}, "
-        f"V/N {float(one['friction'].max()):.3g}{', open' if one['open'].any() else ''})"
-        for one in (own.isel(joint=number) for number in range(own.sizes["joint"]))
-    ]
-    cause = f"joints that are not assessed fail: {join_names(texts, '; ')}"
+    sizes = abs(own["eccentricity"]).max("time").fillna(0.5)  # open throughout
+    one = own.isel(joint=int(sizes.values.argmax()))
+    opens = ", open" * bool(one["open"].any())
+    friction = float(one["friction"].max())
+    example = f"{one['name'].item()} (|e| {float(sizes.max()):.3f}, V/N {friction:.3g}{opens})"
+    words, values = "joints that are not assessed fail: {}", list[float]([own.sizes["joint"]])
     counted = joints.isel(joint=judged | np.isin(joints["joint"], own["joint"]))
     counted.coords["judged"] = ("joint", np.full(counted.sizes["joint"], True))
     if has_counted_mechanism(counted).any():
-        cause += f"; with them counted, {total_duration_remark(counted)}"
+        subject, *durations = _measure_failures(counted)
+        words += f"; with them counted, {subject} for {{:.3g}} s in all, {{:.3g}} s at the longest"
+        values += durations
     parts = join_names([f"'{part}'" for part in dict.fromkeys(own["part"].values.astype(str))])
-    return [Doubt(cause, f"give the blocks of part {parts} role='pier' or 'ring', and they count")]
+    remedy = f"give the blocks of part {parts} role='pier' or 'ring', and they count"
+    return [Doubt(words, remedy, tuple(values), example=example)]
 
 
 def doubt_soft_joints(

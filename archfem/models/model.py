@@ -165,16 +165,18 @@ class Doubt:
     remedy: str = ""  # what to do about it
     values: tuple[Any, ...] = ()  # numbers, the ends of their ranges over several runs, and names
     place: str = ""  # of which of several runs, in words
+    example: str = ""  # one of what was found, by name
 
     @property
     def cause(self) -> str:
-        """What was found, with the values."""
+        """What was found, with the values and an example."""
         values = (x if isinstance(x, str) else Ends(list_ends(x)) for x in self.values)
-        return self.words.format(*values) if self.values else self.words
+        text = self.words.format(*values) if self.values else self.words
+        return f"{text}; for example {self.example}" if self.example else text
 
     @property
     def kind(self) -> tuple[str, ...]:
-        """What doubts that differ in numbers alone have in common."""
+        """What doubts that differ in numbers and examples alone have in common."""
         return (self.words, *(x for x in self.values if isinstance(x, str)))
 
     def __str__(self) -> str:
