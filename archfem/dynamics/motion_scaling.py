@@ -21,6 +21,7 @@ from archfem.dynamics.rigid_body.rocking_body import (
     FirstFall,
     describe_first_fall,
     find_first_fall,
+    say_again,
     say_scale,
 )
 from archfem.dynamics.scale_search import (
@@ -49,7 +50,6 @@ from archfem.masonry.structure import Structure, join_names
 from archfem.models.model import Doubt, Model
 from archfem.motion.motion import Motion, admissible_range
 from archfem.statics.equilibrium import Equilibrium, dead_load
-from archfem.units import Ends
 
 # Step of a search that is given none, and the least to which it is shortened for sliding [s]
 OWN_STEP, LEAST_STEP = 0.005, 0.0005
@@ -167,7 +167,7 @@ class CollapseScale:
             at = f"first falls at {self.upper:#.3g} ×" if self.upper < inf else "falls at no scale"
             met = f"{met}, {'the other' if len(self.searches) == 2 else 'the last'} time step {at}"
         if self.above:
-            met = f"{met}, and stands again at {Ends.of(self.above):#.3g} ×"
+            met = f"{met}, and {say_again(self.above)}"
         if self.dislocated < inf:
             met = f"dislocated at {self.dislocated:#.3g} ×, {met}"
         if self.moves <= max(self._stood):

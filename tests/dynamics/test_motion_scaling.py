@@ -402,9 +402,9 @@ def test_collapse_is_between_a_stable_and_a_falling_run_at_every_step():
     assert found.bracket(0.005).upper == 2.5
     assert str(found) == (
         "stands at 1.00 × the motion, falls at 2.00 × the motion, the other time step first falls "
-        "at 2.50 ×, and stands again at 2.70 to 3.00 ×; stands at every smaller scale that was "
-        "run: from 0.500 × on they are up to a factor of 2.00 apart, and none between was run; "
-        "varied were the scale and the time step (10, 5 ms), and no property"
+        "at 2.50 ×, and stands again at some scales from 2.70 to 3.00 ×; stands at every "
+        "smaller scale that was run: from 0.500 × on they are up to a factor of 2.00 apart, and "
+        "none between was run; varied were the scale and the time step (10, 5 ms), and no property"
     )
     assert [str(doubt) for doubt in found.doubts] == [
         "by 10 ms: it is not monotonic: above a fall it survives 3.00 × the motion",

@@ -9,6 +9,7 @@ from archfem.cases.report.doubts import peak_of_ground
 from archfem.cases.report.report_data import ReportData
 from archfem.dynamics.collapse_state import COLLAPSE_STATES
 from archfem.dynamics.monitor import PULLED
+from archfem.dynamics.rigid_body.rocking_body import say_again
 from archfem.dynamics.scale_search import UNFINISHED
 from archfem.masonry.structure import join_words
 from archfem.units import Ends
@@ -106,14 +107,15 @@ def describe_scales(data: ReportData) -> Iterator[tuple[float, list[str]]]:
     if _bound(first) < first.held:
         met = min(met, _bound(first))
         words = f"below {_bound(first):#.3g} as one rigid body ({words} in courses)"
-    words += f" on '{first.motion}', PGA {first.pga:.2f} g" + ", which it fails" * (met <= 1.0)
+    words += f" on '{first.motion}', then of PGA {_bound(first) * first.pga:.3g} g"
+    words += ", which it fails" * (met <= 1.0)
     words += f", of {len(made)} motions" * (len(made) > 1)
     less = {"moves": " or less" * first.moves_in_all}
     ends = [f"{_STATES[x][0]} at {scale:#.3g} ×{less.get(x, '')}" for x, scale in states.items()]
     if not {"falls", "mechanism"} & states.keys():
         ends += ["falls at none"]
     elif first.again:  # a crossing is not claimed
-        ends += [f"stands again at {Ends.of(first.again):#.3g} ×"]
+        ends += [say_again(first.again)]
     first_at = f"of the scales that were run it first {join_words(ends)}"
     texts = [words, first_at, *_say_as_one(searches)]
     # a search without a scale that holds may have the least of all

@@ -12,7 +12,7 @@ References:
     Housner, Bull. Seismol. Soc. Am. 53 (1963) 403.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import cos, hypot, inf, isfinite, log, pi, sin
 from typing import NamedTuple
@@ -194,11 +194,17 @@ def say_scale(scale: float, pga: float | None, of: str = "the motion") -> str:
     return f"{scale * pga / STANDARD_GRAVITY:#.3g} g ({scale:#.3g} × {of})"
 
 
+def say_again(scales: Sequence[float]) -> str:
+    """Say at which scales beyond a fall a structure stands, which it need not between them."""
+    ends = f"{Ends.of(scales):#.3g} ×"
+    return f"stands again at {'some scales from ' * (' to ' in ends)}{ends}"
+
+
 def describe_first_fall(first: FirstFall, pga: float | None = None, of: str = "the motion") -> str:
     """Say at which scales of a motion a body falls, and stands again."""
     falls = f"first falls at {say_scale(first.scale, pga, of)}"
     falls = falls if first.scale < inf else "falls at none"
-    return falls + (f", and stands again at {Ends(first.again):#.3g} ×" if first.again else "")
+    return falls + (f", and {say_again(first.again)}" if first.again else "")
 
 
 def doubt_courses(structure: Structure, fall: CollapseState, motion: Motion) -> Iterator[Doubt]:
