@@ -130,10 +130,12 @@ def tabulate_runs(runs: Mapping[str, History]) -> ResultTable:
         apart = joints["open"].any("time")
         largest = size.max("time").where(~apart, 0.5)  # |e| is undefined while a joint is open
         horizontal, vertical = run.dataset["peak_ground"].values
+        until = f" until {run.time[-1]:.2f} s" * run.ending.is_loose
         row = [name, verdict.outcome, str(len(verdict.doubts) or "none")]
-        row += [f"{horizontal:.2f} m/s²", f"{vertical:.2f} m/s²", format_ratio(float(size.max()))]
+        row += [f"{horizontal:.2f} m/s²", f"{vertical:.2f} m/s²"]
+        row.append(f"{format_ratio(float(size.max()))}{until}")
         row.append(str(joints["name"].values[int(largest.values.argmax())]))
-        row.append(format_ratio(float(joints["friction"].max())))
+        row.append(f"{format_ratio(float(joints['friction'].max()))}{until}")
         row.append(f"{int(apart.sum())} joints" if apart.any() else "-")
         sizes = [format_mm(verdict.displacement), format_mm(verdict.residual)]
         sizes[1] += " (moving)" * (verdict.fall is not None and not verdict.fall.resting)
@@ -565,11 +567,16 @@ def describe_accuracy(accuracy: Accuracy) -> str:
 
 
 def describe_run(
-    structure: Structure, run: History, dead: xr.Dataset, max_joints: int | None = None
+    structure: Structure,
+    run: History,
+    dead: xr.Dataset,
+    max_joints: int | None = None,
+    across: str = "",
 ) -> str:
     """Describe a run: verdict, quality of the numbers, joints, and use of strength.
 
-    With `max_joints` the table has as many joints, those of the largest |e|.
+    With `max_joints` the table has as many joints, those of the largest |e|. The headline ends with
+    a fall across the plane.
     """
     strength = utilisation_text(structure, run.joints)
     whole = tabulate_joints(run.joints, dead)
@@ -582,7 +589,9 @@ def describe_run(
         table = ResultTable(whole.head, [whole.rows[k] for k in worst]).text
         table += f"\n{max_joints} of {len(whole.rows)} joints, those of the largest |e|: "
         table += "summary.txt has all"
-    return "\n\n".join([str(run.verdict), describe_run_quality(run), table, strength])
+    head, line, verdict = str(run.verdict).partition("\n")
+    verdict = f"{head}{across}{line}{verdict}"
+    return "\n\n".join([verdict, describe_run_quality(run), table, strength])
 
 
 def describe_run_quality(run: History) -> str:

@@ -26,6 +26,7 @@ from archfem.dynamics.collapse_state import DISLOCATION, CollapseState, shallowe
 from archfem.dynamics.history import Ending
 from archfem.dynamics.motion_scaling import CollapseScale, collapse_scale, mechanism_scales
 from archfem.dynamics.scale_search import KeptRuns, MechanismScales, ScaledRun
+from archfem.dynamics.walls_across import check_across
 from archfem.errors import InvalidInput
 from archfem.limit.mechanism_count import Mechanism
 from archfem.models.model import Doubt
@@ -69,12 +70,15 @@ def verdict(options: argparse.Namespace) -> int:
     folder = None if options.out is None else path_inside(Path(options.out), "variations")
     sampling = {"workers": options.workers, "samples": options.samples, "folder": folder}
     computed = verdict_range(case.analysis, motion, fidelity="rigid", **sampling)
-    own: Files = {"verdict_range.nc": computed.save, "verdict_range.txt": str(computed)}
+    _, falls = check_across(case.structure, {motion.name: motion})
+    head, line, text = str(computed).partition("\n")
+    text = f"{head}{falls}{line}{text}"
+    own: Files = {"verdict_range.nc": computed.save, "verdict_range.txt": text}
 
     def draw() -> Files:
         return own | {"verdict_range.png": computed.plot()}
 
-    write_results("verdict", case, options.out, str(computed), draw, options.pair)
+    write_results("verdict", case, options.out, text, draw, options.pair)
     return ExitCode.DOUBTFUL if computed.doubts else 0
 
 

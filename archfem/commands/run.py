@@ -42,8 +42,7 @@ from archfem.cases.toml_file import format_tables, parse_change
 from archfem.commands.cli import ExitCode
 from archfem.commands.tools import print_motions, show_both_senses
 from archfem.dynamics.history import Ending, History
-from archfem.dynamics.rigid_body.rocking_body import describe_first_fall
-from archfem.dynamics.walls_across import describe_falls_across, find_falls_across
+from archfem.dynamics.walls_across import check_across
 from archfem.errors import (
     ArchfemError,
     DidNotConverge,
@@ -520,23 +519,16 @@ def print_results(case: Case, found: Iterable[Result], folder: Path) -> tuple[st
     if case.suite is not None:
         _print_pairs(suite, runs, at_rest, folder)
     verdict = result_text.describe_verdicts(runs.values()) if runs else ""
-    if motions and case.structure.heads.any():
-        verdict += print_falls_across(case.structure, motions)
+    verdict += _print_across(case.structure, motions)
     return verdict, any([of_limit, at_rest.doubts, *(run.doubts for run in runs.values())])
 
 
-def print_falls_across(structure: Structure, motions: Mapping[str, Motion]) -> str:
+def _print_across(structure: Structure, motions: Mapping[str, Motion]) -> str:
     """Print at which scales a wall falls across its plane; return the least below 1 in words."""
-    try:
-        found = find_falls_across(structure, motions)
-    except ArchfemError as error:  # what was run is kept
-        logger.warning("the wall was not checked against the motions across its plane: %s", error)
-        return ""
-    print(describe_falls_across(found, motions))
-    body, (first, name) = min(found.items(), key=lambda fall: fall[1][0].scale)
-    of = f"'{name}'" if len(motions) > 1 else "the motion"
-    falls = f"; across its plane the {body} {describe_first_fall(first, motions[name].pga, of)}"
-    return falls * (first.scale <= 1.0)
+    line, falls = check_across(structure, motions)
+    if line:
+        print(line)
+    return falls
 
 
 def _print_limit(
@@ -593,8 +585,9 @@ def _print_run(run: Run, at_rest: DeadLoadResult) -> None:
         print(f"wrote {run.path}")
     defaults = describe_defaults(run.case)
     given = run.case.structure, history, at_rest.dead.joints
+    _, falls = check_across(run.case.structure, {motion.name: motion})
     said, text = (
-        "\n\n".join(filter(None, [result_text.describe_run(*given, count), defaults]))
+        "\n\n".join(filter(None, [result_text.describe_run(*given, count, falls), defaults]))
         for count in (MAX_PRINTED_JOINTS, None)
     )
     print(said)

@@ -109,7 +109,7 @@ def follow_fall(
     origin, _ = model.rigid_motions(start.q, start.velocity)
     tilts = ending is Ending.FINISHED and is_overturning(model, state)
     doubts: list[Doubt] = []
-    if tilts or ending in (Ending.PARTED, Ending.MET):
+    if tilts or ending.is_loose:
         try:
             dataset, frames = simulate_fall(model, state, motion, rocking_ratio, whole)
         except KeyboardInterrupt:  # before the first step

@@ -81,6 +81,11 @@ class Ending(StrEnum):
         """Whether the run was neither interrupted nor failed."""
         return self not in (Ending.INTERRUPTED, Ending.FAILED)
 
+    @property
+    def is_loose(self) -> bool:
+        """Whether loose blocks were followed from there on, without joints."""
+        return self in (Ending.PARTED, Ending.MET)
+
 
 def _read_number(value: Any) -> float:
     """Return a number; a text that looks like one is none."""

@@ -315,7 +315,7 @@ def _run_steps(
             progress.show(f"{time:.3g} of {motion.duration:.3g} s", round(time - before, 6))
             if reason is not None:
                 when = f"at {recorder.state.time:.4g} s"
-                if ending in (Ending.PARTED, Ending.MET):
+                if ending.is_loose:
                     when = f"with joints {when}, and went on with loose blocks,"
                 return ending, f"ended {when} by {reason}"
             if not begun:

@@ -7,7 +7,7 @@ from archfem.dynamics.rigid_body.rocking_body import (
     describe_first_fall,
     find_first_fall,
 )
-from archfem.errors import InvalidInput
+from archfem.errors import ArchfemError, InvalidInput, logger
 from archfem.masonry.shapes.rings import columns_across
 from archfem.masonry.structure import Structure
 from archfem.motion.motion import Motion
@@ -21,8 +21,11 @@ def find_falls_across(
 ) -> dict[str, tuple[FirstFall, str]]:
     """Return the least first fall of strip and whole of a wall across its plane, and its motion.
 
-    Each is one rigid body, held by nothing else. It is an error if neither rocks.
+    Each is one rigid body, held by nothing else. It is an error if neither rocks. There are none of
+    what has no bond.
     """
+    if not structure.heads.any():
+        return {}
     found = dict[str, tuple[FirstFall, str]]()
     for key, column in columns_across(structure).items():
         for name, motion in motions.items():
@@ -35,6 +38,24 @@ def find_falls_across(
             "resist tension; run a case of its courses, made by archfem.masonry.columns_across"
         )
     return found
+
+
+def check_across(structure: Structure, motions: Mapping[str, Motion]) -> tuple[str, str]:
+    """Return in a line at which scales a wall falls across its plane, and for a headline below 1.
+
+    Both are empty of what is no wall in bond, and of what does not rock, which is logged.
+    """
+    try:
+        found = find_falls_across(structure, motions)
+    except ArchfemError as error:  # what was run is kept
+        logger.warning("the wall was not checked against the motions across its plane: %s", error)
+        return "", ""
+    if not found:
+        return "", ""
+    body, (first, name) = min(found.items(), key=lambda fall: fall[1][0].scale)
+    of = f"'{name}'" if len(motions) > 1 else "the motion"
+    falls = f"; across its plane the {body} {describe_first_fall(first, motions[name].pga, of)}"
+    return describe_falls_across(found, motions), falls * (first.scale <= 1.0)
 
 
 def describe_falls_across(

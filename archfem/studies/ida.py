@@ -115,7 +115,7 @@ def _run(result: DeadLoadResult, motion: Motion) -> dict[str, Any]:
     try:
         # demands of a run whose blocks fall are infinite: its first lost block tells all
         run = run_motion(result, motion, whole_fall=False)
-        complete = run.ending not in (Ending.PARTED, Ending.MET)
+        complete = not run.ending.is_loose
     except DidNotConverge as error:
         run, complete = partial_history(error), False
     demands = dict.fromkeys(DEMAND_LABELS, inf)

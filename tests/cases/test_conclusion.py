@@ -16,13 +16,19 @@ from archfem.cases.report import conclusion, doubts, report_data, sections
 from archfem.cases.report.report_data import ReportData
 from archfem.cases.result_text import PushFactors, site_acceleration
 from archfem.cases.toml_file import format_tables
-from archfem.commands.run import print_falls_across
+from archfem.commands import margin
 from archfem.dynamics import VerdictRange
 from archfem.dynamics.collapse_state import RANGE_REMEDY
-from archfem.dynamics.walls_across import describe_falls_across, find_falls_across
+from archfem.dynamics.rigid_body.rocking_body import FirstFall
+from archfem.dynamics.walls_across import (
+    check_across,
+    describe_falls_across,
+    find_falls_across,
+)
 from archfem.errors import InvalidInput
 from archfem.models.model import Doubt, read_doubts, write_doubts
 from archfem.statics.assessment_checks import UPPER_BOUND
+from archfem.studies import variations
 
 SPECTRUM = {"spectrum": {"code": "EC8", "ag": 0.2, "ground": "A"}}
 
@@ -120,6 +126,17 @@ def test_equal_doubts_of_runs_are_one_with_the_range_of_its_numbers(case):
     assert read_doubts(write_doubts([one, two])) == (one, two)
 
 
+def test_doubts_that_differ_in_numbers_and_examples_are_one_with_the_first_example(case):
+    words = "joints that are not assessed fail: {}"
+    given = [Doubt(words, "count them", (k,), example=f"joint {k}") for k in (3, 18)]
+    assert read_doubts(write_doubts(given)) == tuple(given)
+    data = data_of(case, a=verdict_of(doubts=given[:1]), b=verdict_of(doubts=given[1:]))
+    (text,) = (str(doubt) for _, doubt in doubts.list_doubts(data))
+    assert text == (
+        "2 of 2 runs: joints that are not assessed fail: 3 to 18; for example joint 3; count them"
+    )
+
+
 def test_the_weightiest_doubts_of_a_result_are_not_folded_away(case):
     """Those that a range answers are of the outcome."""
     causes = [Doubt(f"it slips {k} times") for k in range(3)]
@@ -204,7 +221,7 @@ def test_the_margin_of_scales_ends_where_it_is_dislocated(case):
     data = data_of(case)
     vars(data)["pairs"] = ("a", "b", "c", "d")
     assert say_margin(data, scale=state("scale", *every)) == [
-        "the least margin is 1.38 on 'a', PGA 0.20 g, of 2 motions",
+        "the least margin is 1.38 on 'a', then of PGA 0.276 g, of 2 motions",
         "of the scales that were run it first moves as a verified mechanism at 0.850 × or less, is "
         "dislocated at 1.41 × and falls at 4.50 ×",
         "no scale is known up to which it stands under 'c'",
@@ -212,7 +229,7 @@ def test_the_margin_of_scales_ends_where_it_is_dislocated(case):
     ]
     small = scales("a", 0.5, mechanism=0.55)
     assert say_margin(data, scale=state("scale", small))[:2] == [
-        "the least margin is 0.500 on 'a', PGA 0.20 g, which it fails",
+        "the least margin is 0.500 on 'a', then of PGA 0.1 g, which it fails",
         "of the scales that were run it first forms a mechanism at 0.550 ×",
     ]
     assert say_margin(data, scale=state("scale", scales("a", 1.5)))[1] == (
@@ -220,12 +237,13 @@ def test_the_margin_of_scales_ends_where_it_is_dislocated(case):
     )
     beyond = scales("a", 1.4, falls=1.5, again=[1.6, 2.0])
     assert say_margin(data, scale=state("scale", beyond))[1] == (
-        "of the scales that were run it first falls at 1.50 × and stands again at 1.60 to 2.00 ×"
+        "of the scales that were run it first falls at 1.50 × and stands again at some scales "
+        "from 1.60 to 2.00 ×"
     )
     for least, fails in ((1.3, ""), (0.9, ", which it fails")):
         begun = scales("a", 0.7, unfinished=True, moves=0.5, falls=least)
         assert say_margin(data, scale=state("scale", begun))[0] == (
-            f"the least margin is 0.700 (search unfinished) on 'a', PGA 0.20 g{fails}"
+            f"the least margin is 0.700 (search unfinished) on 'a', then of PGA 0.14 g{fails}"
         )
 
 
@@ -236,7 +254,7 @@ def test_what_fails_under_a_motion_that_was_not_scaled_has_a_margin_below_one(ca
     assert say_margin(data, scale=state("scale", scales("a", 1.4, dislocated=2.0, falls=4.0))) == [
         "the least margin is below 1 on 'b', PGA 0.20 g, under which it is dislocated, and which "
         "was not scaled",
-        "the next is 1.40 on 'a', PGA 0.20 g",
+        "the next is 1.40 on 'a', then of PGA 0.28 g",
         "of the scales that were run it first is dislocated at 2.00 × and falls at 4.00 ×",
         "'c' was not scaled",
     ]
@@ -295,12 +313,12 @@ def test_the_margin_of_a_stack_is_the_lesser_of_courses_and_of_one_body(case):
     for at, fails in ((0.677, ", which it fails"), (1.05, "")):
         one = scales("a", 1.4, falls=1.5, as_one=at)
         assert say_margin(data_of(case), scale=state("scale", found[0], one))[:2] == [
-            f"the least margin is below {at:#.3g} as one rigid body (1.40 in courses) on 'a', PGA "
-            f"0.20 g{fails}, of 2 motions",
+            f"the least margin is below {at:#.3g} as one rigid body (1.40 in courses) on 'a', then "
+            f"of PGA {0.2 * at:.3g} g{fails}, of 2 motions",
             "of the scales that were run it first falls at 1.50 ×",
         ]
     said = say_margin(data_of(case), scale=state("scale", *found))
-    assert said[0] == "the least margin is 1.30 on 'b', PGA 0.20 g, of 2 motions"
+    assert said[0] == "the least margin is 1.30 on 'b', then of PGA 0.26 g, of 2 motions"
     assert said[-1] == "as one rigid body it first falls at 1.50 × 'b'"
     # an assessment is ranked behind it
     data = data_of(case)
@@ -386,8 +404,8 @@ def test_the_answer_has_displacements_the_first_fall_and_the_checks(case):
         (5, "EN 1998-1", "stands", "It survives", "stands under all 5"),
         (
             *(2, "EN 1998-1", "stands"),
-            "Not decided, as 2 of 5 motions were run and EN 1998-1 (from memory) asks for 3 motions "
-            "at least",
+            "Not decided, as 2 of 5 motions were run and EN 1998-1 (from memory) requires 3 "
+            "motions at least",
             "stands under 2 of 5",
         ),
         (2, "SIA 261", "fallen", "It does not survive", "falls under 2 of 5"),
@@ -504,6 +522,23 @@ def test_of_unequal_outcomes_the_worst_is_the_first(case):
     assert dict(conclusion.list_facts(data))["verdict"] == varied
     text = conclusion.build_conclusion(data).pieces[0].text
     assert text.startswith("Under 'first' it falls in none of 2 variations and is disl")
+
+
+@pytest.mark.parametrize(("last", "outcome"), [(4.0, "stands"), (6.0, "stands"), (4.0, "fallen")])
+def test_what_stands_after_most_of_a_motion_as_loose_blocks_is_in_doubt(case, last, outcome):
+    """Of 10 s; a fall is followed so, and where its joints end says nothing against it."""
+    data = data_of(case, a=verdict_of(outcome))
+    data.runs["a"].time = np.array([0.0, last])
+    data.runs["a"].dataset.attrs["ended"] = "met"
+    vars(data)["motions"] = {"a": af.Motion(np.zeros(1001), 0.01)}
+    said = [str(doubt) for _, doubt in doubts.list_doubts(data)]
+    words = (
+        "under 'a': from 4 s on, for 60% of the motion, blocks were followed as loose rigid ones"
+    )
+    expected = (last, outcome) == (4.0, "stands")
+    assert [text.partition(": |e|")[0] for text in said] == [words] * expected
+    data.runs["a"].dataset.attrs["ended"] = "finished"
+    assert doubts.list_doubts(data) == []
 
 
 def test_doubts_of_several_motions_are_one(case):
@@ -650,7 +685,10 @@ def test_the_head_of_a_push_says_when_it_begins_to_move(case):
 )
 def test_a_rating_is_stated_by_the_norm_of_the_report_before_others(case, norm, first):
     codes = {"by CS 454": "0.8", "by Eurocodes on a fair road": "1.4", "by Eurocodes": "1.6"}
-    rows = [answers.Row("rating", f"lorry {by}", "passes", x, {}) for by, x in codes.items()]
+    rows = [
+        answers.Row("rating", f"lorry {by}", "passes", x, {"passes": True})
+        for by, x in codes.items()
+    ]
     said = [f"lorry {by}: factor {factor}, passes" for by, factor in codes.items()]
     settings = {key: value for key, value in case.settings.items() if key != "motion"}
     data = ReportData(af.Case.of(settings | ({"report": {"norm": norm}} if norm else {})), {})
@@ -666,6 +704,27 @@ def test_a_rating_is_stated_by_the_norm_of_the_report_before_others(case, norm, 
     (table,) = (piece for piece in pieces if getattr(piece, "caption", "").startswith("Demand"))
     assert table.caption.endswith("multiple of the demand at which a load makes a mechanism")
     assert first[0] in table.rows[0][1]
+
+
+@pytest.mark.parametrize(
+    ("norm", "says"),
+    [
+        ("EN 1991-2", "It fails too for lorry by CS 454 (0.95)."),
+        ("", "It fails too for lorry by CS 454 (0.95). It passes for lorry by Eurocodes (1.47)."),
+    ],
+)
+def test_ratings_that_disagree_are_all_in_the_headline(case, norm, says):
+    """That of the norm, and the least; of the others those that turn out otherwise."""
+    found = {"LM1": "0.82", "lorry by CS 454": "0.95", "lorry by Eurocodes": "1.47"}
+    rows = [
+        answers.Row("rating", name, "in words", factor, {"passes": float(factor) >= 1.0})
+        for name, factor in found.items()
+    ]
+    data = ReportData(af.Case.of({**case.settings, "report": {"norm": norm}}), {})
+    vars(data)["statements"] = {"rating": answers.Statement([], rows)}
+    verdict = dict(conclusion.list_facts(data))["verdict"]
+    assert verdict.endswith(f"Rating for LM1: factor 0.82, in words. {says}")
+    assert all(f"{name}: factor" in verdict or name in says for name in found)
 
 
 @pytest.mark.parametrize(("ag", "overturns"), [(0.1, False), (0.2, True)])
@@ -794,6 +853,9 @@ def test_a_run_of_a_wall_says_at_which_scale_it_falls_across_its_plane(
     said = "; across its plane the strip first falls at 0.331 g (0.80"
     assert (said in headline) is bool(falls)
     assert ("across its plane" in headline) is bool(falls)
+    # the first lines of the summary and of the range of the verdict have it too
+    summary = (folder / "summary.txt").read_text(encoding="utf-8").splitlines()
+    assert (said in summary[0]) is bool(falls)
     # one statement on what is checked across the plane, with the push that overturns it
     assert not [line for line in lines if "nothing is checked across" in line]
     (line,) = [line for line in lines if "begins to overturn" in line]
@@ -802,7 +864,37 @@ def test_a_run_of_a_wall_says_at_which_scale_it_falls_across_its_plane(
     )
 
 
-def test_a_wall_that_stands_again_says_so_beside_its_first_fall(tmp_path, capsys):
+@pytest.mark.parametrize(("share", "falls"), [(0.8, True), (1.25, False)])
+def test_a_range_of_the_verdict_says_that_a_wall_falls_across_its_plane(
+    share, falls, monkeypatch, capsys
+):
+    """Beside the headline, and below 1 × alone."""
+    monkeypatch.setattr(variations, "verdict_range", lambda *_, **__: range_of(0.01, 0.02))
+    pulse = sine(1.0, 0.33033 / share, 1, 1e-3)
+    monkeypatch.setattr(margin, "_choose_motion", lambda *_: pulse)
+    monkeypatch.setattr(af.Case, "read", lambda *_: wall_in_bond(title="wall"))
+    af.commands.main(["verdict", "wall.toml"])
+    _, headline, *rest = capsys.readouterr().out.splitlines()
+    said = "; across its plane the strip first falls at 0.331 g (0.80"
+    assert headline.startswith("falls in none of 2 variations")
+    assert (said in headline) is falls
+    assert ("across" in headline) is falls
+    assert not [line for line in rest if "across" in line]
+
+
+def test_a_structure_with_rings_has_the_falls_across_its_plane_that_occur_alone(monkeypatch):
+    """An arch over a wall in bond is more than a wall, of which "falls at none" says little."""
+    wall, ring = wall_in_bond(), af.circular_arch(span=4.0, rise=1.5, thickness=0.5, voussoirs=3)
+    falls = {"strip": (FirstFall(np.inf, None), "m"), "whole": (FirstFall(1.5, None), "m")}
+    monkeypatch.setattr(report_data, "find_falls_across", lambda *_: falls)
+    for rings, kept in ([], ["strip", "whole"]), (ring.joints, ["whole"]):
+        joints = [*wall.structure.joints, *rings]
+        structure = SimpleNamespace(joints=joints, heads=wall.structure.heads)
+        data = ReportData(SimpleNamespace(structure=structure), {})
+        assert [*data.across[0]] == kept
+
+
+def test_a_wall_that_stands_again_says_so_beside_its_first_fall():
     """One sine of ω/p = 5, integrated from impact to impact: it stands again at its full scale."""
     assert [overturns(5.0, peak, 2) for peak in (0.65, 0.75, 1.75)] == [False, True, False]
     sines = sine(5.0, 1.75, 2, 1e-3)
@@ -815,14 +907,16 @@ def test_a_wall_that_stands_again_says_so_beside_its_first_fall(tmp_path, capsys
     assert name == "sines"
     assert (
         f"under 'sines' the strip first falls at {peak:#.3g} g ({first.scale:#.3g} × the motion), "
-        f"and stands again at {first.again[0]:#.3g} to {first.again[1]:#.3g} ×; under "
+        f"and stands again at some scales from {first.again[0]:#.3g} to {first.again[1]:#.3g} ×; "
+        "under "
     ) in describe_falls_across(found, {"sines": sines})
-    headline = print_falls_across(wall, {"sines": sines})
+    line, headline = check_across(wall, {"sines": sines})
     assert headline == (
         f"; across its plane the strip first falls at {peak:#.3g} g ({first.scale:#.3g} × the "
-        f"motion), and stands again at {first.again[0]:#.3g} to {first.again[1]:#.3g} ×"
+        f"motion), and stands again at some scales from {first.again[0]:#.3g} to "
+        f"{first.again[1]:#.3g} ×"
     )
-    assert capsys.readouterr().out.startswith("across its plane, as one rigid body")
+    assert line == describe_falls_across(found, {"sines": sines})
 
 
 def test_a_wall_that_slides_before_it_rocks_is_not_checked_across_its_plane(caplog):
@@ -837,7 +931,7 @@ def test_a_wall_that_slides_before_it_rocks_is_not_checked_across_its_plane(capl
     with pytest.raises(InvalidInput, match="neither strip nor whole rocks"):
         find_falls_across(wall, {"push": motion})
     assert find_falls_across(wall, {}) == {}
-    assert print_falls_across(wall, {"push": motion}) == ""
+    assert check_across(wall, {"push": motion}) == ("", "")
     assert "the wall was not checked against the motions across its plane: " in caplog.text
 
 

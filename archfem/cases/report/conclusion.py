@@ -161,11 +161,20 @@ def _say_pushes(data: ReportData, name: str, stated: Statement) -> Iterator[str]
 
 
 def _say_ratings(data: ReportData, stated: Statement) -> Iterator[str]:
-    """Yield the least rating by the norm of the report, and the least of others."""
+    """Yield the least rating by the norm of the report, the least of others, and unlike ones."""
     own = [row for row in stated.rows if _is_of_norm(data, row.demand)]
     others = [row for row in stated.rows if row not in own]
     for row, needed in [*((x, ", 1 is required") for x in own[:1]), *((x, "") for x in others[:1])]:
         yield f"rating for {row.demand}: factor {row.factor}{needed}, {row.outcome}"
+    shown, left = [*own[:1], *others[:1]], [*own[1:], *others[1:]]
+    passes, fails = ([x for x in left if x.numbers["passes"] is state] for state in (True, False))
+    if any(x.numbers["passes"] for x in shown):
+        passes = []  # one is enough
+    elif not passes:
+        fails = []  # as all do
+    for words, rows in ("fails too", fails), ("passes", passes):
+        if rows:
+            yield f"it {words} for {join_words([f'{x.demand} ({x.factor})' for x in rows])}"
 
 
 def _is_of_norm(data: ReportData, text: str) -> bool:
@@ -178,9 +187,9 @@ def _is_of_norm(data: ReportData, text: str) -> bool:
 def _say_survival(
     data: ReportData, doubtful: Sequence[str], failed: Sequence[str]
 ) -> Iterator[str]:
-    """Yield whether it survives the motions, if they are enough, and how often with other properties.
+    """Yield whether it survives the motions, and how often with other properties.
 
-    The same sentence has assessments that fail.
+    Too few motions decide no survival; assessments that fail are in the same sentence.
     """
     verdicts, (_, answer) = [run.verdict for run in data.runs.values()], _find_worst(data)
     in_doubt = " (in doubt, as below)" * (HISTORIES in doubtful)
@@ -209,7 +218,7 @@ def _say_too_few(data: ReportData) -> str:
     total = count + len(data.missing)
     words = [f"{count} of {total} motions {'were' if count > 1 else 'was'} run"] * (count < total)
     if rule and count < rule.fewest:
-        words.append(f"{norm} (from memory) asks for {rule.fewest} motions at least")
+        words.append(f"{norm} (from memory) requires {rule.fewest} motions at least")
     return join_words(words)
 
 
