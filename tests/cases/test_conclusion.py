@@ -432,6 +432,9 @@ def test_a_part_of_the_motions_that_are_needed_decides_no_survival(
     assessed = "y the kinematic assessment it does not withstand the spectrum of the motion"
     assert verdict.startswith(f"{answer}, {but} b{assessed}: it {under} motions of PGA 0.20 g")
     assert verdict.count("withstand") == 1
+    ((_, (_, _, stated, *_)), *_) = conclusion._capacity_rows(data)
+    left = ", ".join("abcde"[count:])
+    assert (f"; not run: {left}" in stated) is bool(left)
 
 
 @pytest.mark.parametrize(

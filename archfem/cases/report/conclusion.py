@@ -524,6 +524,7 @@ def _capacity_rows(data: ReportData) -> Iterator[tuple[str, Row]]:
         verdicts = [run.verdict for run in data.runs.values()]
         demand, outcome = _describe_peaks(data.runs.values()), verdicts[0].outcome
         outcome = result_text.count_outcomes(verdicts) if len(verdicts) > 1 else outcome
+        outcome += f"; not run: {', '.join(data.missing)}" * bool(data.missing)
         # of a fall it is the way to the ground
         held = [(x.displacement, x.residual) for x in verdicts if x.outcome not in FALLEN_STATES]
         if (sizes := np.array(held)).size and np.isfinite(sizes).all():
