@@ -163,8 +163,15 @@ def set_title(axes: Axes, text: str) -> None:
         ratios = np.array(place.get_gridspec().get_width_ratios() or np.ones(columns), dtype=float)
         width *= ratios[list(place.colspan)].sum() / ratios.sum()
     width -= 0.3  # labels of the axis at the left shift the panel
-    letters = int(width / text_width(1, Size.TITLE))
-    lines = fill(" ".join(text.split()), max(letters, 12), break_long_words=False)
+    text, letters = " ".join(text.split()), max(int(width / text_width(1, Size.TITLE)), 12)
+    lines = fill(text, letters, break_long_words=False)
+    # capitals are 0.2 of the font size wider than other letters
+    room = letters
+    while letters > 12 and any(
+        len(line) + 0.35 * sum(map(str.isupper, line)) > room for line in lines.splitlines()
+    ):
+        letters -= 1
+        lines = fill(text, letters, break_long_words=False)
     axes.set_title(lines, fontsize=Size.TITLE, color=Colour.TEXT, parse_math=False)
 
 

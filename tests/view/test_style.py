@@ -74,6 +74,16 @@ def test_long_titles_take_several_lines():
     assert wide < page.bbox.width
 
 
+def test_titles_of_capitals_fit_the_figure():
+    figure = structure_figure(af.column(breadth=1.0, heights=[1.0] * 4))
+    axes = figure.subplots()
+    stones = [f"ZWICKELMAUERWERK {k} to ÜBERMAUERUNG {k}" for k in (9, 13, 15)]
+    set_title(axes, f"mechanism of 47 stones, with hinges at {'; '.join(stones)}")
+    figure.draw_without_rendering()
+    box = axes.title.get_window_extent()
+    assert 0.0 <= box.x0 < box.x1 <= figure.bbox.x1
+
+
 def drawings(bridge, run, runs):
     """Figures of all layouts: one panel, panels side by side, true to scale, legends below."""
     states = {"first hinge": 2.0, "mechanism": 3.0, "fall": 4.0}
