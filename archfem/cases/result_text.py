@@ -129,7 +129,7 @@ def tabulate_runs(runs: Mapping[str, History]) -> ResultTable:
         size = abs(joints["eccentricity"])
         apart = joints["open"].any("time")
         largest = size.max("time").where(~apart, 0.5)  # |e| is undefined while a joint is open
-        horizontal, vertical = run.dataset["peak_ground"].values
+        horizontal, vertical = run.dataset["ground"].attrs["peaks"]
         until = f" until {run.time[-1]:.2f} s" * run.ending.is_loose
         row = [name, verdict.outcome, str(len(verdict.doubts) or "none")]
         row += [f"{horizontal:.2f} m/s²", f"{vertical:.2f} m/s²"]

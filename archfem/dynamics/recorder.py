@@ -146,11 +146,11 @@ class Recorder:
             structure, resultants, times, self.criteria, faces, moved
         )
         variables |= self._block_displacements()
-        of_ground = {"units": "m/s2", "long_name": "acceleration of the ground"}
-        variables["ground"] = ("time", "axis"), motion.at(times), of_ground
+        of_ground: dict[str, Any] = {"units": "m/s2", "long_name": "acceleration of the ground"}
         # long steps take the mean of the ground's acceleration, and end beside its peaks
         passed = np.append(np.arange(times[0], times[-1], motion.dt), times)
-        variables["peak_ground"] = "axis", np.abs(motion.at(passed)).max(axis=0), of_ground
+        of_ground["peaks"] = np.abs(motion.at(passed)).max(axis=0)
+        variables["ground"] = ("time", "axis"), motion.at(times), of_ground
         variables |= self._effort(len(resultants))
         coordinates["block"] = [block.name for block in structure.blocks]
         coordinates["axis"] = ["x", "y"]

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import archfem as af
+from archfem.cases.result_text import tabulate_runs
 from archfem.dynamics.monitor import RunMonitor
 from archfem.dynamics.recorder import GrowingArray, Recorder
 
@@ -65,7 +66,9 @@ def test_peaks_of_the_ground_between_the_steps_are_recorded(steps, peaks):
     run = af.time_history(model, motion, dt=0.02, until=lambda *_: next(ends))
     assert run.time[-1] == pytest.approx(0.02 * steps)
     assert run.dataset["ground"].values[:, 0] == pytest.approx(0.0)
-    assert run.dataset["peak_ground"].values == pytest.approx(peaks)
+    assert run.dataset["ground"].attrs["peaks"] == pytest.approx(peaks)
+    (row, _) = tabulate_runs({"spikes": run}).rows
+    assert row[3:5] == [f"{peak:.2f} m/s²" for peak in peaks]
 
 
 def test_recorded_quantities_have_their_dimensions_and_values(run, model, motion):
