@@ -145,10 +145,9 @@ class Statement(NamedTuple):
 
 
 def read_numbers(kind: type[Numbers], stated: Statement | None) -> list[Numbers]:
-    """Return the numbers of a kind of the rows that have them, older ones with fewer too."""
-    known, rows = {*kind.__annotations__}, stated.rows if stated else []
-    needed = known - {*vars(kind)["_field_defaults"]}
-    return [kind(**row.numbers) for row in rows if needed <= {*row.numbers} <= known]
+    """Return the numbers of a kind of the rows that have them."""
+    rows = stated.rows if stated else []
+    return [kind(**row.numbers) for row in rows if {*row.numbers} == {*kind.__annotations__}]
 
 
 def cut_remedy(doubt: str) -> str:

@@ -503,12 +503,6 @@ def test_what_is_stated_of_a_result_is_read_as_it_was_written():
     assert again == stated._replace(doubts=again.doubts)
     assert [str(each) for each in again.doubts] == [str(each) for each in stated.doubts]
     assert answers.read_numbers(answers.Scales, again)[0].states == {"falls": 2.0}
-    # a file of before a number was added has the others
-    check, push = answers.Ratios("code", ["right"], 0.9, 0.9), PushFactors(0.5, 0.5, "a site")
-    older = state("assessment", check, push)
-    del older.rows[0].numbers["floor"]
-    assert answers.read_numbers(answers.Ratios, older) == [check]
-    assert answers.read_numbers(PushFactors, older) == [push]
 
 
 def test_of_unequal_outcomes_the_worst_is_the_first(case):

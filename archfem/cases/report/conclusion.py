@@ -167,10 +167,8 @@ def _say_ratings(data: ReportData, stated: Statement) -> Iterator[str]:
     for row, needed in [*((x, ", 1 is required") for x in own[:1]), *((x, "") for x in others[:1])]:
         yield f"rating for {row.demand}: factor {row.factor}{needed}, {row.outcome}"
     shown, left = [*own[:1], *others[:1]], [*own[1:], *others[1:]]
-    passes, fails = (
-        [x for x in left if x.numbers.get("passes") is state] for state in (True, False)
-    )
-    if any(x.numbers.get("passes") for x in shown):
+    passes, fails = ([x for x in left if x.numbers["passes"] is state] for state in (True, False))
+    if any(x.numbers["passes"] for x in shown):
         passes = []  # one is enough
     elif not passes:
         fails = []  # as all do
