@@ -112,7 +112,7 @@ def _read_damping(given: str | Table) -> Viscous | EffectiveDamping:
     misplaced = {*kinds}.union(*map(declared_keys, kinds.values())) - declared_keys(cls).keys()
     # the share of mass selects the second mode, which stiffness damping has not
     misplaced |= set() if table.get("kind") == "rayleigh" else {"mass_share"}
-    known = "ratio" in table and misplaced.isdisjoint(table)
+    known = (effective or "ratio" in table) and misplaced.isdisjoint(table)
     if (cls is EffectiveDamping) != effective or not known:
         raise InvalidInput(
             f"analysis.damping = {given}: write "
@@ -123,12 +123,11 @@ def _read_damping(given: str | Table) -> Viscous | EffectiveDamping:
     return read_object(cls, table, "analysis.damping")
 
 
-def _write_damping(damping: Viscous | EffectiveDamping) -> str | dict[str, Any]:
-    """Return the table of damping, or the word whose values are defaults."""
-    if damping == EffectiveDamping():
-        return "effective"
-    table = {"ratio": damping.ratio, **write_value(damping)}
-    return table | ({"modes": "effective"} if isinstance(damping, EffectiveDamping) else {})
+def _write_damping(damping: Viscous | EffectiveDamping) -> dict[str, Any]:
+    """Return the table of damping; an effective ratio that is the default is left out."""
+    if isinstance(damping, EffectiveDamping):
+        return {**write_value(damping), "modes": "effective"}
+    return {"ratio": damping.ratio, **write_value(damping)}
 
 
 def _read_named(given: str | Table, known: Mapping[str, type], section: str) -> Any:

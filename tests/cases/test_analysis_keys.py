@@ -309,13 +309,19 @@ def test_damping_at_a_frequency(small):
     )
 
 
+def test_effective_damping_has_its_ratio_by_default(small):
+    for damping in ('"effective"', '{ modes = "effective" }'):
+        case = af.Case.read(small, [f"analysis.damping={damping}"])
+        assert case.analysis.damping == af.EffectiveDamping(0.05)
+
+
 @pytest.mark.parametrize(
     "damping",
     [
         '{ ratio = 0.05, modes = "all" }',
         '{ ratio = 0.05, modes = "effective", frequencies = [1, 2] }',
         "{ ratio = 0.05, frequencies = [1, 2], mass_share = 0.1 }",
-        '{ modes = "effective" }',
+        '{ frequency = "8 Hz" }',
         '{ ratio = 0.05, modes = "effective", mass_share = 0.9 }',
         '{ ratio = 0.05, frequency = 8.0, kind = "rayleigh" }',
     ],

@@ -221,7 +221,7 @@ def test_the_margin_of_scales_ends_where_it_is_dislocated(case):
     data = data_of(case)
     vars(data)["pairs"] = ("a", "b", "c", "d")
     assert say_margin(data, scale=state("scale", *every)) == [
-        "the least margin is 1.38 on 'a', then of PGA 0.276 g, of 2 motions",
+        "the least margin is 1.38 on 'a', at a PGA of 0.276 g, of 2 motions",
         "of the scales that were run it first moves as a verified mechanism at 0.850 × or less, is "
         "dislocated at 1.41 × and falls at 4.50 ×",
         "no scale is known up to which it stands under 'c'",
@@ -229,7 +229,7 @@ def test_the_margin_of_scales_ends_where_it_is_dislocated(case):
     ]
     small = scales("a", 0.5, mechanism=0.55)
     assert say_margin(data, scale=state("scale", small))[:2] == [
-        "the least margin is 0.500 on 'a', then of PGA 0.1 g, which it fails",
+        "the least margin is 0.500 on 'a', at a PGA of 0.1 g, which it fails",
         "of the scales that were run it first forms a mechanism at 0.550 ×",
     ]
     assert say_margin(data, scale=state("scale", scales("a", 1.5)))[1] == (
@@ -243,7 +243,7 @@ def test_the_margin_of_scales_ends_where_it_is_dislocated(case):
     for least, fails in ((1.3, ""), (0.9, ", which it fails")):
         begun = scales("a", 0.7, unfinished=True, moves=0.5, falls=least)
         assert say_margin(data, scale=state("scale", begun))[0] == (
-            f"the least margin is 0.700 (search unfinished) on 'a', then of PGA 0.14 g{fails}"
+            f"the least margin is 0.700 (search unfinished) on 'a', at a PGA of 0.14 g{fails}"
         )
 
 
@@ -254,7 +254,7 @@ def test_what_fails_under_a_motion_that_was_not_scaled_has_a_margin_below_one(ca
     assert say_margin(data, scale=state("scale", scales("a", 1.4, dislocated=2.0, falls=4.0))) == [
         "the least margin is below 1 on 'b', PGA 0.20 g, under which it is dislocated, and which "
         "was not scaled",
-        "the next is 1.40 on 'a', then of PGA 0.28 g",
+        "the next is 1.40 on 'a', at a PGA of 0.28 g",
         "of the scales that were run it first is dislocated at 2.00 × and falls at 4.00 ×",
         "'c' was not scaled",
     ]
@@ -318,7 +318,7 @@ def test_the_margin_of_a_stack_is_the_lesser_of_courses_and_of_one_body(case):
             "of the scales that were run it first falls at 1.50 ×",
         ]
     said = say_margin(data_of(case), scale=state("scale", *found))
-    assert said[0] == "the least margin is 1.30 on 'b', then of PGA 0.26 g, of 2 motions"
+    assert said[0] == "the least margin is 1.30 on 'b', at a PGA of 0.26 g, of 2 motions"
     assert said[-1] == "as one rigid body it first falls at 1.50 × 'b'"
     # an assessment is ranked behind it
     data = data_of(case)

@@ -295,7 +295,7 @@ motion = {{ file = "tap.txt", dt = 0.01, units = "m/s2" }}
     said = again.splitlines()[0].partition(": ")[2].partition(";")[0]
     assert f"Scale of the motion: {said}" in words  # the conclusion
     met = "falls" if runs else "forms a mechanism"
-    margin = rf"is {factor[1]} on 'tap', PGA [\d.]+ g(, which it fails)?\. Of the scales that were "
+    margin = rf"is {factor[1]} on 'tap', at a PGA of [\d.]+ g(, which it fails)?\. Of the scales that were "
     assert re.search(rf"{margin}run it first [^.]*.*?{met} at ", words)
     shown = words.split("Scale of the motion")[-1]  # the section
     assert ("at the scales [× the motion]" if runs else head) in shown
@@ -345,7 +345,7 @@ def test_scales_of_the_pairs_of_a_suite_stand_side_by_side(searched, tmp_path, c
     assert not (out / "scale.json").exists()
     assert af.commands.main(["report", str(out)]) == 0
     words = " ".join(read_page((out / "report.html").read_text(encoding="utf-8")).words)
-    least = f"The least margin is {factors['strong']} on 'strong', PGA "
+    least = f"The least margin is {factors['strong']} on 'strong', at a PGA of "
     assert least in words
     assert (
         ", of 2 motions. Of the scales that were run it first moves as a verified mechanism at "

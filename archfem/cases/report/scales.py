@@ -107,7 +107,7 @@ def describe_scales(data: ReportData) -> Iterator[tuple[float, list[str]]]:
     if _bound(first) < first.held:
         met = min(met, _bound(first))
         words = f"below {_bound(first):#.3g} as one rigid body ({words} in courses)"
-    words += f" on '{first.motion}', then of PGA {_bound(first) * first.pga:.3g} g"
+    words += f" on '{first.motion}', at a PGA of {_bound(first) * first.pga:.3g} g"
     words += ", which it fails" * (met <= 1.0)
     words += f", of {len(made)} motions" * (len(made) > 1)
     less = {"moves": " or less" * first.moves_in_all}
