@@ -31,7 +31,7 @@ from archfem.errors import InvalidInput
 from archfem.limit.mechanism_count import Mechanism
 from archfem.models.model import Doubt
 from archfem.motion.motion import Motion
-from archfem.statics.equilibrium import doubt_pieces
+from archfem.statics.fill_checks import doubt_pieces
 from archfem.view.style import Files
 
 # Modules of studies are slow to import, and imported where they are needed.

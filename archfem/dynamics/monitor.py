@@ -29,7 +29,8 @@ from archfem.dynamics.state import Batch, State
 from archfem.errors import DidNotConverge, InvalidInput, logger
 from archfem.masonry.standing import list_own_stones
 from archfem.models.model import Doubt, Model, Observer
-from archfem.statics.equilibrium import SOIL_ANGLE, SOIL_COHESION, Equilibrium
+from archfem.statics.equilibrium import Equilibrium
+from archfem.statics.fill_checks import SOIL_ANGLE, SOIL_COHESION
 from archfem.statics.stress import observe_fill_tension
 from archfem.units import kPa
 

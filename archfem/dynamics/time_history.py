@@ -43,7 +43,8 @@ from archfem.errors import DidNotConverge, InvalidInput, logger
 from archfem.joints.criteria import Criteria
 from archfem.models.model import Doubt, Model, check_model
 from archfem.motion.motion import Motion
-from archfem.statics.equilibrium import Equilibrium, dead_load, fill_doubts
+from archfem.statics.equilibrium import Equilibrium, dead_load
+from archfem.statics.fill_checks import fill_doubts
 from archfem.statics.newton import Newton
 
 

@@ -55,10 +55,10 @@ def jointed_fill(
     fidelity is suitable, first of all "rigid". Joints to the stone keep their law, in series with
     the fill between them and the next piece.
 
-    Strength does not depend on the size of the pieces but on the directions of their joints, 0°,
-    ±30°, ±60° and 90°. For a Coulomb wedge along the critical one
-    of these, the thrust on a smooth wall is Rankine's at φ = 30°; at 20° and 40° the active thrust
-    is 1.2 % and 3.4 % smaller, the passive one larger by as much.
+    Where pieces are small beside the structure, strength depends on the directions of their joints
+    alone, 0°, ±30°, ±60° and 90°; coarse ones lock a ring. For a Coulomb wedge along the critical
+    one of these, the thrust on a smooth wall is Rankine's at φ = 30°; at 20° and 40° the active
+    thrust is 1.2 % and 3.4 % smaller, the passive one larger by as much.
 
     Args:
         structure: some of whose blocks are soft.

@@ -3,6 +3,7 @@
     assessment_checks     rules of codes, capacity against demand
     continuation          load and displacement control
     equilibrium           equilibrium under dead load, plausibility checks
+    fill_checks           fill in one piece or in coarse ones: what no soil does
     first_mechanism       mechanism of least factor at rest, fill as loads
     free_body             free-body diagram of a block
     mechanism_assessment  kinematic assessment against design spectra

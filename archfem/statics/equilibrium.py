@@ -12,7 +12,7 @@ rigid blocks that no thrust line within friction can hold must not be at rest: t
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache, partial
+from functools import cached_property, partial
 from itertools import combinations
 from math import sqrt
 from typing import Literal, Protocol, runtime_checkable
@@ -28,19 +28,14 @@ from archfem.errors import DidNotConverge, InvalidInput
 from archfem.joints.contact_law import LARGEST_CLOSING, ContactLaw
 from archfem.joints.criteria import assessed_joints
 from archfem.joints.resultants import joint_dataset, select_joint
-from archfem.limit.collapse import stands
-from archfem.limit.fill_strength import Fill
 from archfem.limit.instability import explain_instability, name_free_end
 from archfem.limit.linear_programme import NoEquilibrium
-from archfem.limit.self_weight import self_weight_programme
-from archfem.masonry.backfill import jointed_fill
 from archfem.masonry.block import Block, as_point, say_place
 from archfem.masonry.construction import Stage, resolve_stages
-from archfem.masonry.loads import BodyForce, PointLoad
+from archfem.masonry.loads import BodyForce
 from archfem.masonry.parts import find_undivided
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import (
-    CONTACT_TOLERANCE,
     Joint,
     Structure,
     join_joint_names,
@@ -49,6 +44,11 @@ from archfem.masonry.structure import (
 from archfem.models.construction import PartialStructure
 from archfem.models.linear_blocks import LinearBlockModel
 from archfem.models.model import Doubt, Model, check_model
+from archfem.statics.fill_checks import (
+    doubt_pieces,
+    doubt_whole_fill,
+    stands_as_rigid_blocks,
+)
 from archfem.statics.newton import EquilibriumSolver, Newton
 from archfem.statics.relaxation import (
     MovesOn,
@@ -60,7 +60,7 @@ from archfem.statics.relaxation import (
     solve_local,
     solve_or_relax,
 )
-from archfem.units import MPa, format_mm, kN, kPa, mm
+from archfem.units import MPa, format_mm, mm
 
 # Median depth of a ring's joints above which a wrong unit is likely [m]: of arches that span more
 # than 60 m the deepest are about that
@@ -385,7 +385,7 @@ def _refuse_if_rigid_blocks_fall(model: Model) -> None:
     # part of the weight is carried either, which long searches would find.
     structure = model.structure
     scales = not (model.large_displacements or structure.cohesion.any())
-    if scales and not structure.has_own_laws and not _stands_as_rigid_blocks(structure):
+    if scales and not structure.has_own_laws and not stands_as_rigid_blocks(structure):
         raise NoEquilibrium("nothing within friction holds it as rigid blocks")
 
 
@@ -497,7 +497,7 @@ def dead_load_doubts(dead: Equilibrium, friction: float | None = None) -> tuple[
     if smallest < 0.1:
         reason = f"the least coefficient of friction is {smallest:g}"
         doubts.append(Doubt(reason, "joints of stone have 0.6 to 0.75: check it"))
-    if not _stands_as_rigid_blocks(structure):
+    if not stands_as_rigid_blocks(structure):
         reason = (
             "it was found at rest, but as rigid blocks nothing within friction holds it: "
             "archfem.stands says that it falls"
@@ -512,7 +512,7 @@ def structure_doubts(structure: Structure) -> list[Doubt]:
     remedy = "if so, give it that part, in a drawing by its layer"
     parts = [Doubt(cause, remedy) for cause in structure.misplaced.values()]
     sizes = [*_doubt_slope(structure), *_doubt_depth(structure), *_doubt_undivided(structure)]
-    return [*fixed, *parts, *sizes, *_doubt_whole_fill(structure)]
+    return [*fixed, *parts, *sizes, *doubt_whole_fill(structure)]
 
 
 def _doubt_depth(structure: Structure) -> list[Doubt]:
@@ -654,97 +654,3 @@ def _doubt_support(structure: Structure, numbers: Sequence[int], part: str) -> D
         "take fixed from it, in a drawing by its layer, or, if it is a support, give the stones "
         "beside it parts of their own",
     )
-
-
-# Strength of loose soil, with the cohesion with which a fill meets load tests of bridges [°], [Pa]
-SOIL_ANGLE, SOIL_COHESION = 30.0, 5e3
-
-
-def fill_doubts(structure: Structure) -> tuple[Doubt, ...]:
-    """Return a doubt about a fill of runs, in one piece or in several."""
-    return _doubt_whole_fill(structure) or doubt_pieces(structure)
-
-
-@lru_cache(maxsize=8)
-def doubt_pieces(structure: Structure, most: float = 2.0) -> tuple[Doubt, ...]:
-    """Return a doubt where pieces of fill are so coarse that they lock a ring.
-
-    A push on the stones of rings alone fails them at a factor that pieces raise over all of their
-    passive pressure: for five bridges by 1.2 to 1.8 in pieces of 1.6 times the depth of the ring or
-    less, by 1.8 to 15 in those of three times that depth or more.
-    """
-    grain = np.array([block.grain for block in structure.blocks])
-    laws = [joint.contact for joint in structure.joints if grain[list(joint.blocks)].all()]
-    rings = [k for k in structure.free if structure.blocks[k].role == "ring"]
-    if not laws or not rings:
-        return ()
-    loads = [PointLoad(x, (1.0 * kN, 0.0), y) for x, y in structure.centroids[rings]]
-    angle = float(np.degrees(np.arctan(laws[0].coefficient)))
-    pressure = Fill(friction_angle=angle, cohesion=laws[0].cohesion, mobilisation=1.0)
-    factors = []
-    for fill in (None, pressure):
-        stones, dead = self_weight_programme(structure, "coulomb", None, fill)
-        try:
-            found = dead.with_load_factor(stones.load(loads)).solve(forces=False)
-        except NoEquilibrium:  # it does not stand, as others say
-            return ()
-        factors.append(np.inf if found is None else -found.value)
-    if (ratio := factors[0] / factors[1]) <= most or np.isnan(ratio):
-        return ()
-    return (
-        Doubt(
-            "coarse pieces of fill lock the ring: a push on its stones alone fails it at {:.3g} "
-            f"times the push with all passive pressure of the fill, and fine pieces at {most:g} "
-            "times or less: runs and pushovers stand longer than the structure",
-            "cut smaller pieces, such as half the size",
-            (float(ratio),),
-        ),
-    )
-
-
-@lru_cache(maxsize=8)
-def _doubt_whole_fill(structure: Structure) -> tuple[Doubt, ...]:
-    """Return a doubt where fill in one piece holds itself as no soil does.
-
-    Fill in one piece carries tension. Cut into pieces whose joints carry none, with the strength of
-    loose soil, it must hold too.
-    """
-    angle, cohesion = SOIL_ANGLE, SOIL_COHESION
-    fill = find_yielding_blocks(structure)
-    if not fill or any(structure.blocks[number].grain for number in fill):
-        return ()
-    # about 150 pieces; with 50 to 300 the answer was the same for 15 bridges
-    size = sqrt(8.0 / sqrt(3.0) * sum(structure.blocks[n].area for n in fill) / 100.0)
-    pieces = jointed_fill(structure, size, friction_angle=angle, cohesion=cohesion)
-    if _stands_as_rigid_blocks(pieces):
-        return ()
-    heights = [height for number in fill for height in _free_end_heights(structure, number)]
-    ends = f", and it ends in free faces of {join_names(heights)} m" if heights else ""
-    return (
-        Doubt(
-            f"fill in one piece holds itself by tension: as soil of {angle:g}° and "
-            f"{cohesion / kPa:g} kPa it does not stand under its own weight{ends}",
-            "hold its ends by sidewalls ([structure.sidewalls] in a case), and compare with pieces "
-            '(law = "jointed", friction_angle and piece_size in [structure.fill])',
-        ),
-    )
-
-
-def _free_end_heights(structure: Structure, number: int) -> list[str]:
-    """Return the heights of the upright ends of a fill that nothing touches, as text [m]."""
-    outline, near = structure.blocks[number].drawn(), CONTACT_TOLERANCE * structure.size
-    faces = [joint.ends for joint in structure.joints if number in joint.blocks]
-    heights = []
-    for end in (outline[:, 0].min(), outline[:, 0].max()):
-        height = float(np.ptp(outline[np.abs(outline[:, 0] - end) <= near, 1]))
-        held = any((np.abs(face[:, 0] - end) <= near).all() for face in faces)
-        heights += [] if held or height <= near else [f"{height:.3g}"]
-    return heights
-
-
-def _stands_as_rigid_blocks(structure: Structure) -> bool:
-    """Return whether limit analysis finds it standing, or does not apply."""
-    try:
-        return stands(structure, strength=np.inf)
-    except (InvalidInput, DidNotConverge):  # soft bodies, bonds: no comparison is possible
-        return True

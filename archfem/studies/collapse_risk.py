@@ -50,7 +50,8 @@ from archfem.motion.hazard import DESIGN_PERIOD, MEASURES, Hazard
 from archfem.motion.motion import Motion, admissible_range
 from archfem.motion.response_spectra import measure_intensity, response_spectrum
 from archfem.motion.suite import Suite
-from archfem.statics.equilibrium import Equilibrium, fill_doubts
+from archfem.statics.equilibrium import Equilibrium
+from archfem.statics.fill_checks import fill_doubts
 from archfem.statics.modes import modes
 from archfem.studies.fragility import (
     Fragility,

@@ -40,7 +40,7 @@ from archfem.masonry.joint_closing import FINISHES, with_finish
 from archfem.masonry.structure import Structure
 from archfem.models.model import Doubt, write_doubts
 from archfem.motion.motion import Motion
-from archfem.statics.equilibrium import fill_doubts
+from archfem.statics.fill_checks import fill_doubts
 from archfem.studies.evaluators import PreparedRuns
 from archfem.studies.parameter_space import Point, WholePoint
 from archfem.studies.result_store import evaluate_with_progress

@@ -15,9 +15,9 @@ from archfem.statics import Equilibrium, dead_load, equilibrium, self_weight
 from archfem.statics.equilibrium import (
     _increment_load,
     dead_load_doubts,
-    fill_doubts,
     structure_doubts,
 )
+from archfem.statics.fill_checks import fill_doubts
 from archfem.statics.newton import Solution
 
 ROOT = Path(__file__).parents[2]
