@@ -1,7 +1,8 @@
 """Limit analysis of rigid blocks: collapse factor, least thickness, mechanisms.
 
     backfill              earth pressure, load spreading
-    collapse              collapse_factor, stands, warnings
+    collapse              collapse_factor, stands
+    collapse_warnings     why a factor may be an upper estimate
     cone_programme        second-order cone programmes
     displaced_blocks      limit analysis of blocks at displaced places
     fill_bounds           bounds of the factor with a plastic fill

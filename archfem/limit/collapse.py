@@ -22,6 +22,13 @@ from archfem._validation import validate_arguments
 from archfem.errors import Interrupted, InvalidInput, logger
 from archfem.joints.resultants import check_instant, joint_dataset
 from archfem.limit.backfill import BlocksWithFill, sum_body_forces
+from archfem.limit.collapse_warnings import (
+    warn_dilatancy,
+    warn_lift,
+    warn_locking,
+    warn_lost_solution,
+    warn_sliding,
+)
 from archfem.limit.fill_bounds import FillBounds, bound_least_factor, refine_bounds
 from archfem.limit.fill_range import FillRange, say_part, vary_fill
 from archfem.limit.fill_strength import Fill, PlasticFill, find_clear_springing, place_backing
@@ -47,7 +54,6 @@ from archfem.masonry.materials import STONE
 from archfem.masonry.structure import (
     HasStructure,
     Structure,
-    join_joint_names,
     join_names,
     list_or_count,
     structure_of,
@@ -676,48 +682,6 @@ def describe_fill(fill: Fill | PlasticFill | None, structure: Structure) -> str:
     return f"{text}; backing up to y = {fill.backing:.4g} m{above}: {holds}"
 
 
-def warn_lift(loads: Sequence[Action]) -> None:
-    """Warn of a load at a point that lifts, as one does whose sign is wrong."""
-    for load in loads:
-        if isinstance(load, PointLoad) and load.force[1] > 0.0:
-            logger.warning(
-                "the point load at x = %.4g m acts upwards by %.4g kN, and lifts the structure: a "
-                "weight is negative, as in (0, -1)",
-                *(load.x, load.force[1] / kN),
-            )
-
-
-def warn_dilatancy(structure: Structure) -> None:
-    """Warn of contact dilatancy that sliding without dilatancy neglects."""
-    steepest = max(joint.contact.dilatancy for joint in structure.joints)
-    if steepest > 0.0:
-        logger.warning(
-            "joints dilate by up to %.3g, which friction='nonassociated' neglects: the factor is "
-            "that of joints which slide flat; 'coulomb' gives that of joints which dilate by μ",
-            steepest,
-        )
-
-
-def warn_sliding(names: Sequence[str], factor: float) -> None:
-    """Warn of joints that slide and, by associated flow, dilate."""
-    if names:
-        logger.warning(
-            "joints slide (%s): with the dilatancy of associated flow the factor %.4g is an "
-            "upper estimate; friction='nonassociated' does without it",
-            *(join_joint_names(names), factor),
-        )
-
-
-def warn_locking(structure: Structure, friction: str | None, fill: object) -> None:
-    """Warn of a fill in pieces, which associated flow may lock so that no load is too large."""
-    if friction is not None and fill is None and any(block.grain for block in structure.blocks):
-        logger.warning(
-            "an infinite factor is that of a fill in pieces which dilates by tan φ as it slides: "
-            "it may lock between the stones, as soil does not; cut smaller pieces, or give "
-            "fill=af.limit.Fill(…)"
-        )
-
-
 def warn_idle_joints(result: Collapse) -> None:
     """Warn of joints without force, which never slide although they would open freely."""
     normal = result.joints["N"].values
@@ -727,31 +691,6 @@ def warn_idle_joints(result: Collapse) -> None:
             "wall in bond can lift along a stepped crack, so that the factor %.4g is no bound; "
             "friction='nonassociated' lets it",
             *(idle, result.factor),
-        )
-
-
-def warn_lost_solution(solutions: NonassociatedBounds) -> None:
-    """Warn where the weakest was found by chance, or the factor rises suddenly with friction."""
-    least, tried = solutions.between[0], solutions.starts[0]
-    if solutions.interrupted:
-        words = "a weaker solution without dilatancy may exist: the search was interrupted after %d"
-        logger.warning(f"{words} starting states; run it to its end", tried)
-    elif solutions.may_be_less and solutions.agreeing < 2:
-        found = f"only one of {tried} starting states led to the least found, {least:.4g}"
-        if not solutions.agreeing:
-            found = (
-                f"the least found, {least:.4g}, is below what all {tried} starting states led to: "
-                "a descent from the least of these found it"
-            )
-        logger.warning(
-            "a weaker solution without dilatancy may exist: %s; hold a motion a tenth below", found
-        )
-    if solutions.jumps:
-        share, factor = solutions.path[-1]
-        logger.warning(
-            "a weaker solution without dilatancy is likely: the least found is %.4g, but %.4g with "
-            "%.3g times the friction, from which the factor should rise little",
-            *(least, factor, share),
         )
 
 

@@ -14,7 +14,8 @@ from archfem._typing import Array, Flags, Metres, Newtons, Numbers, Pascals
 from archfem._validation import check_choice, check_number, check_numbers
 from archfem.errors import InvalidInput, logger
 from archfem.limit.backfill import BlocksWithFill
-from archfem.limit.collapse import Collapse, collapse_factor, read_bounds, warn_locking
+from archfem.limit.collapse import Collapse, collapse_factor, read_bounds
+from archfem.limit.collapse_warnings import warn_locking
 from archfem.limit.fill_bounds import FillBounds, bound_least_factor, refine_bounds
 from archfem.limit.fill_strength import Fill, PlasticFill, as_pressure
 from archfem.limit.linear_programme import Optimum, Programme

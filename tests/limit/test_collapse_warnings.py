@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.limit import collapse
+from archfem.limit import collapse, collapse_warnings
 
 
 @pytest.fixture
@@ -22,7 +22,7 @@ def warned(caplog):
 )
 def test_the_steepest_dilatancy_that_is_left_out_is_stated(each, said, warned):
     joints = [SimpleNamespace(contact=SimpleNamespace(dilatancy=value)) for value in each]
-    collapse.warn_dilatancy(SimpleNamespace(joints=joints))
+    collapse_warnings.warn_dilatancy(SimpleNamespace(joints=joints))
     assert said in warned()
     assert bool(warned()) == bool(said)
 
@@ -35,9 +35,9 @@ def test_a_load_that_lifts_is_named(force, said, warned):
 
 
 def test_joints_that_slide_are_named_with_their_factor(warned):
-    collapse.warn_sliding([], 0.3)
+    collapse_warnings.warn_sliding([], 0.3)
     assert not warned()
-    collapse.warn_sliding(["a", "b"], 0.31416)
+    collapse_warnings.warn_sliding(["a", "b"], 0.31416)
     assert "joints slide (a; b)" in warned()
     assert "factor 0.3142 is" in warned()
 

@@ -13,7 +13,7 @@ from scipy.optimize import Bounds, LinearConstraint, milp
 import archfem as af
 from archfem.errors import Interrupted
 from archfem.limit import Outcome, linear_programme, nonassociated
-from archfem.limit.collapse import warn_lost_solution
+from archfem.limit.collapse_warnings import warn_lost_solution
 from archfem.limit.linear_programme import RigidBlocks
 from archfem.limit.nonassociated import descend, find_solution, starting_forces
 from archfem.limit.self_weight import self_weight_programme

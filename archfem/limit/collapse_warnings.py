@@ -1,0 +1,76 @@
+"""Warnings of limit analysis: why a factor may be an upper estimate, or no bound."""
+
+from collections.abc import Sequence
+
+from archfem.errors import logger
+from archfem.limit.nonassociated import NonassociatedBounds
+from archfem.masonry.loads import Action, PointLoad
+from archfem.masonry.structure import Structure, join_joint_names
+from archfem.units import kN
+
+
+def warn_lift(loads: Sequence[Action]) -> None:
+    """Warn of a load at a point that lifts, as one does whose sign is wrong."""
+    for load in loads:
+        if isinstance(load, PointLoad) and load.force[1] > 0.0:
+            logger.warning(
+                "the point load at x = %.4g m acts upwards by %.4g kN, and lifts the structure: a "
+                "weight is negative, as in (0, -1)",
+                *(load.x, load.force[1] / kN),
+            )
+
+
+def warn_dilatancy(structure: Structure) -> None:
+    """Warn of contact dilatancy that sliding without dilatancy neglects."""
+    steepest = max(joint.contact.dilatancy for joint in structure.joints)
+    if steepest > 0.0:
+        logger.warning(
+            "joints dilate by up to %.3g, which friction='nonassociated' neglects: the factor is "
+            "that of joints which slide flat; 'coulomb' gives that of joints which dilate by μ",
+            steepest,
+        )
+
+
+def warn_sliding(names: Sequence[str], factor: float) -> None:
+    """Warn of joints that slide and, by associated flow, dilate."""
+    if names:
+        logger.warning(
+            "joints slide (%s): with the dilatancy of associated flow the factor %.4g is an "
+            "upper estimate; friction='nonassociated' does without it",
+            *(join_joint_names(names), factor),
+        )
+
+
+def warn_locking(structure: Structure, friction: str | None, fill: object) -> None:
+    """Warn of a fill in pieces, which associated flow may lock so that no load is too large."""
+    if friction is not None and fill is None and any(block.grain for block in structure.blocks):
+        logger.warning(
+            "an infinite factor is that of a fill in pieces which dilates by tan φ as it slides: "
+            "it may lock between the stones, as soil does not; cut smaller pieces, or give "
+            "fill=af.limit.Fill(…)"
+        )
+
+
+def warn_lost_solution(solutions: NonassociatedBounds) -> None:
+    """Warn where the weakest was found by chance, or the factor rises suddenly with friction."""
+    least, tried = solutions.between[0], solutions.starts[0]
+    if solutions.interrupted:
+        words = "a weaker solution without dilatancy may exist: the search was interrupted after %d"
+        logger.warning(f"{words} starting states; run it to its end", tried)
+    elif solutions.may_be_less and solutions.agreeing < 2:
+        found = f"only one of {tried} starting states led to the least found, {least:.4g}"
+        if not solutions.agreeing:
+            found = (
+                f"the least found, {least:.4g}, is below what all {tried} starting states led to: "
+                "a descent from the least of these found it"
+            )
+        logger.warning(
+            "a weaker solution without dilatancy may exist: %s; hold a motion a tenth below", found
+        )
+    if solutions.jumps:
+        share, factor = solutions.path[-1]
+        logger.warning(
+            "a weaker solution without dilatancy is likely: the least found is %.4g, but %.4g with "
+            "%.3g times the friction, from which the factor should rise little",
+            *(least, factor, share),
+        )
