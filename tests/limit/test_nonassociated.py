@@ -568,7 +568,8 @@ def test_an_interrupted_search_leaves_the_least_factor_so_far(monkeypatch, caplo
     else:
         assert found.outcome is Outcome.BRACKETED
         assert found.upper == pytest.approx(upper)
-        assert "the factor is only a bound, whose mechanism dilates; the search was interrupted: " in caplog.text
+        bound = "the factor is only a bound, whose mechanism dilates"
+        assert f"{bound}; the search was interrupted: " in caplog.text
 
 
 def stop_at_once(*_):
