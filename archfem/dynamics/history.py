@@ -30,6 +30,7 @@ from archfem.dynamics.verdict import (
 )
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.joints.criteria import (
+    FACE_COORDINATE,
     HEAD_COORDINATE,
     Criteria,
     describe_assessed_joints,
@@ -115,7 +116,7 @@ DIMENSIONS: dict[str, tuple[str, ...]] = {
     "time": ("time",),
     "ground": ("time", "axis"),
 }
-TEXTS = ("name", "part", "role")
+TEXTS = ("name", "part", "role", FACE_COORDINATE)
 
 
 @validate_methods

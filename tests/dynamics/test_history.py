@@ -53,6 +53,15 @@ def test_file_and_back(run, tmp_path):
     assert [each.name for each in path.parent.iterdir()] == ["run.nc"]
 
 
+def test_file_of_a_bridge_whose_fill_lies_on_chords(tmp_path):
+    arch = af.shapes.Arch(span=4.0, rise=1.6, thickness=0.3, voussoirs=5)
+    bridge = af.bridge(arches=[arch], backfill=af.shapes.Backfill(cover=0.5), chords=2)
+    motion = af.Motion(np.full(4, 0.1), dt=0.001)
+    run = af.Analysis(bridge, fidelity="rigid", damping=DAMPING, dt=0.001).run(motion)
+    again = History.read(run.save(tmp_path / "run.nc"), bridge)
+    assert np.unique(again.joints["face"]).size == 6 + 5 < len(bridge.joints)
+
+
 def test_arrays_over_time_and_joint_are_packed(run, tmp_path):
     with xr.open_dataset(run.save(tmp_path / "run.nc")) as plain:
         assert plain["N"].ndim == 2
