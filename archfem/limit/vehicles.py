@@ -610,7 +610,8 @@ def find_worst_rows(
             break
         factors[k], sets[k] = known.lay(loads[k], known.solve(loads[k]), sets[k])
         solved[k] = True
-        share = min(share, factors[k] / max(guide[k], 1e-300))
+        if np.isfinite(guide[k]):  # what falls at no factor there says nothing of the share
+            share = min(share, factors[k] / max(guide[k], 1e-300))
     # and back with the mechanisms of all places
     while (above := known.bound(loads)[0]).min() < (1.0 - 1e-5) * factors.min():
         k = int(above.argmin())

@@ -11,6 +11,8 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, wraps
+from itertools import pairwise
+from math import sqrt
 from numbers import Integral
 from typing import Any, Protocol, TypeVar
 
@@ -461,11 +463,16 @@ class Structure(ResultDisplay):
     @property
     def face_names(self) -> list[str]:
         """Names of joints; those along chords of one curved face have that of the face."""
-        pairs = Counter(joint.blocks for joint in self.joints)
-        return [
-            re.sub(r", \d+$", "", joint.name) if pairs[joint.blocks] > 1 else joint.name
-            for joint in self.joints
-        ]
+        names, chords = [joint.name for joint in self.joints], dict[tuple[int, int], list[int]]()
+        for number, joint in enumerate(self.joints):
+            chords.setdefault(joint.blocks, []).append(number)
+        for numbers in chords.values():
+            turns = (self.normals[a] @ self.normals[b] for a, b in pairwise(numbers))
+            # less than 45°: a step has two faces
+            if len(numbers) > 1 and min(turns) > sqrt(0.5):
+                for number in numbers:
+                    names[number] = re.sub(r", \d+$", "", names[number])
+        return names
 
     @cached_property
     def misplaced(self) -> dict[int, str]:

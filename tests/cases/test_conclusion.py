@@ -313,8 +313,8 @@ def test_the_margin_of_a_stack_is_the_lesser_of_courses_and_of_one_body(case):
     for at, fails in ((0.677, ", which it fails"), (1.05, "")):
         one = scales("a", 1.4, falls=1.5, as_one=at)
         assert say_margin(data_of(case), scale=state("scale", found[0], one))[:2] == [
-            f"the least margin is below {at:#.3g} as one rigid body (1.40 in courses) on 'a', then "
-            f"of PGA {0.2 * at:.3g} g{fails}, of 2 motions",
+            f"the least margin is below {at:#.3g} as one rigid body (1.40 in courses) on 'a', at a "
+            f"PGA of {0.2 * at:.3g} g{fails}, of 2 motions",
             "of the scales that were run it first falls at 1.50 ×",
         ]
     said = say_margin(data_of(case), scale=state("scale", *found))
