@@ -12,7 +12,6 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, wraps
 from itertools import pairwise
-from math import sqrt
 from numbers import Integral
 from typing import Any, Protocol, TypeVar
 
@@ -468,8 +467,8 @@ class Structure(ResultDisplay):
             chords.setdefault(joint.blocks, []).append(number)
         for numbers in chords.values():
             turns = (self.normals[a] @ self.normals[b] for a, b in pairwise(numbers))
-            # less than 45°: a step has two faces
-            if len(numbers) > 1 and min(turns) > sqrt(0.5):
+            # a step, of 90°, has two faces
+            if len(numbers) > 1 and min(turns) > 0.5:
                 for number in numbers:
                     names[number] = re.sub(r", \d+$", "", names[number])
         return names
