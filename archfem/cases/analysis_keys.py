@@ -332,11 +332,10 @@ def parse_rating(table: Any) -> Table:
             has_unit = all(isinstance(weight, str) for weight in each["axles"])
             heaviest = max(vehicle.axles)
             if not has_unit and 1.0 < heaviest < LIGHT_AXLE:  # 1 N is a load of studies
-                mass = heaviest * (1e3 if heaviest < 100.0 else 1.0)  # tonnes, or kg
                 raise InvalidInput(
                     f"rating.vehicle '{vehicle.name}': axles = {each['axles']} are in N, and the "
                     f"heaviest, {heaviest / kN:g} kN, is that of a cart: give units, as "
-                    f'in "{mass * G / kN:.4g} kN" for a mass of {mass:g} kg'
+                    f'in "{heaviest * G / kN:.4g} kN" for a mass of {heaviest:g} kg'
                 )
     return options
 
