@@ -71,6 +71,7 @@ FOREIGN = (
     "datetime",
     "os",
     "dataclasses",
+    "logging",
 )
 
 
