@@ -1,6 +1,8 @@
 """Walls across their plane: scales of motions at which they fall as one rigid body."""
 
 from collections.abc import Mapping
+from functools import lru_cache
+from itertools import product
 
 from archfem.dynamics.rigid_body.rocking_body import (
     FirstFall,
@@ -27,17 +29,23 @@ def find_falls_across(
     if not structure.heads.any():
         return {}
     found = dict[str, tuple[FirstFall, str]]()
-    for key, column in columns_across(structure).items():
-        for name, motion in motions.items():
-            first = find_first_fall(column, motion, SCALES_ACROSS)
-            if first and (key not in found or first.scale < found[key][0].scale):
-                found[key] = first, name
+    for key, name in product(("strip", "whole"), motions):
+        first = _find_falls(structure, motions[name])[key]
+        if first and (key not in found or first.scale < found[key][0].scale):
+            found[key] = first, name
     if motions and not found:
         raise InvalidInput(
             "as one rigid body neither strip nor whole rocks: it slides before, or its joints "
             "resist tension; run a case of its courses, made by archfem.masonry.columns_across"
         )
     return found
+
+
+@lru_cache(maxsize=8)  # a run states its own, and those of all motions follow
+def _find_falls(structure: Structure, motion: Motion) -> dict[str, FirstFall | None]:
+    """Return the first falls of strip and whole of a wall under a motion; None of what slides."""
+    columns = columns_across(structure).items()
+    return {key: find_first_fall(column, motion, SCALES_ACROSS) for key, column in columns}
 
 
 def check_across(structure: Structure, motions: Mapping[str, Motion]) -> tuple[str, str]:

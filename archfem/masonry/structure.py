@@ -459,7 +459,7 @@ class Structure(ResultDisplay):
         parts = select_assessed_parts({joint.part: joint.role for joint in self.joints})
         return ~self.heads & np.array([joint.part in parts for joint in self.joints], dtype=bool)
 
-    @property
+    @cached_property
     def face_names(self) -> list[str]:
         """Names of joints; those along chords of one curved face have that of the face."""
         names, chords = [joint.name for joint in self.joints], dict[tuple[int, int], list[int]]()

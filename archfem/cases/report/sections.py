@@ -340,10 +340,11 @@ def _build_assessment(data: ReportData) -> list[Any]:
         mirrored = "\nleft: the mirror image, with the same numbers"
         texts = [texts[0], texts[1] + mirrored, *texts[3:]]
     figures = [figure for each in captions.items() for figure in data.read_figure(*each)]
-    return [TextBlock("\n\n".join(texts), "lines"), _define_assessment(data, text), *figures]
+    defined = _define_assessment(data, text, bool(moved))
+    return [TextBlock("\n\n".join(texts), "lines"), defined, *figures]
 
 
-def _define_assessment(data: ReportData, text: str) -> Grid:
+def _define_assessment(data: ReportData, text: str, moves: bool) -> Grid:
     """Tabulate the quantities of a kinematic assessment that were computed, and their rules."""
     state = data.case.assessment.options.get("limit_state", "NTC-2018 SLV")
     rules = state if isinstance(state, LimitState) else LIMIT_STATES[state]
@@ -363,7 +364,7 @@ def _define_assessment(data: ReportData, text: str) -> Grid:
             "q a_0* / FC against the spectrum at T = 0, which small arches pass that fall in runs",
         ),
     ]
-    if f"\n{rules.name}: " in text:  # what moves
+    if moves:
         rows.append(("d_0*", "displacement at which it resists nothing, or the end of its motion"))
         rows += [("T_s", "secant period at 0.16 d_0*, that of NTC-2008")] * ("T_s" in text)
         rows += [("T", period), (rules.name, checked)]

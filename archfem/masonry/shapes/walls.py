@@ -87,7 +87,9 @@ def wall(  # noqa: PLR0913  (all are lengths and properties of one structure)
         gravity: acceleration of gravity [m/s²].
 
     Raises:
-        InvalidStructure: a length is not positive, or an opening is not within the wall.
+        InvalidInput: there are more than 10 000 stones.
+        InvalidStructure: a length is not positive; or an opening is not within the wall, overlaps
+            another, or leaves no course for its lintel.
 
     Example:
         >>> barn = af.shapes.wall(breadth=4.0, height=4.0, eaves=2.5, width=0.4)
@@ -138,7 +140,8 @@ def _check_opening(opening: Opening, height: float, reach: float) -> None:
         raise InvalidStructure(
             f"opening '{opening.name}' is from x = {opening.left:.4g} to {opening.right:.4g} m and "
             f"from {opening.sill:.4g} to {opening.head:.4g} m high: the wall is {height:.4g} m "
-            f"high, and has room for it below {reach:.4g} m from the middle at its head"
+            f"high, and has room for it below {reach:.4g} m from the middle at its head: "
+            "move it, or make it smaller"
         )
 
 
