@@ -330,14 +330,16 @@ def fit_brackets(ends: Array, members: Any = True) -> tuple[Array, Array]:
     mean = (shares * start).sum(axis=1)
     variance = (shares * (start - mean[:, None]) ** 2).sum(axis=1)
     deviation = np.maximum(np.sqrt(variance), DISPERSION_RANGE[0])
+    moving = np.arange(len(mean))  # samples that have not converged
     for _ in range(2000):
-        first, second = _moments(low, high, mean[:, None], deviation[:, None])
-        new_mean = (shares * first).sum(axis=1)
-        variance = (shares * second).sum(axis=1) - new_mean**2
-        new_deviation = np.clip(np.sqrt(np.maximum(variance, 0.0)), *DISPERSION_RANGE)
-        change = max(np.abs(new_mean - mean).max(), np.abs(new_deviation - deviation).max())
-        mean, deviation = new_mean, new_deviation
-        if change < 1e-9:
+        at, by = mean[moving], deviation[moving]
+        first, second = _moments(low[moving], high[moving], at[:, None], by[:, None])
+        mean[moving] = (shares[moving] * first).sum(axis=1)
+        variance = (shares[moving] * second).sum(axis=1) - mean[moving] ** 2
+        deviation[moving] = np.clip(np.sqrt(np.maximum(variance, 0.0)), *DISPERSION_RANGE)
+        change = np.maximum(np.abs(mean[moving] - at), np.abs(deviation[moving] - by))
+        moving = moving[change >= 1e-9]
+        if not moving.size:
             break
     return mean, deviation
 
