@@ -831,7 +831,7 @@ def test_a_report_of_a_wall_has_its_falls_across_the_plane_as_one_rigid_body(mon
 
 @pytest.mark.parametrize(("share", "falls"), [(0.8, True), (1.25, False), (2.5, None)])
 def test_a_run_of_a_wall_says_at_which_scale_it_falls_across_its_plane(
-    share, falls, tmp_path, capsys
+    share, falls, tmp_path, capsys, unplotted
 ):
     """The half sine above over the share: it falls at the share, in the headline only below 1."""
     pulse = sine(1.0, 0.33033 / share, 1, 1e-3)

@@ -231,7 +231,7 @@ def test_a_ratio_of_nothing_has_no_sign(value, text):
     assert format_ratio(value) == text
 
 
-def test_dead_loads_that_a_push_leaves_at_rest_are_noted(tmp_path, capsys):
+def test_dead_loads_that_a_push_leaves_at_rest_are_noted(tmp_path, capsys, unplotted):
     """W = 28.8 kN and P = 10 kN on a block of 0.6 m by 2.4 m: about the toe, b/2 over heights."""
     block = {"shape": "column", "breadth": 0.6, "heights": [2.4]}
     tables = {"structure": block, "limit": {"horizontal": 1.0, "friction": "none"}}
@@ -263,7 +263,7 @@ def test_dead_loads_that_a_push_leaves_at_rest_are_noted(tmp_path, capsys):
     assert "no mass" not in str(point) + str(moved)
 
 
-def test_parapets_of_a_rating_that_a_push_leaves_out_are_noted(tmp_path, capsys):
+def test_parapets_of_a_rating_that_a_push_leaves_out_are_noted(tmp_path, capsys, unplotted):
     """2 kN/m along 0.6 m are 1.2 kN, 4.2 % of 28.8 kN: runs, limits, assessments say so."""
     tables = {
         "structure": {"shape": "column", "breadth": 0.6, "heights": [2.4]},

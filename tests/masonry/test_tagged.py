@@ -188,7 +188,7 @@ $EndElements
         ("3 1 1 0\n", "3 1 1e300 0\n", "a coordinate of 1e"),
         ("3 1 1 0\n", "3 1 1 1\n", "does not lie in the plane of x and y"),
         ("$Nodes\n4\n", "$Nodes\n40000000000\n", "no mesh of gmsh that meshio reads"),
-        ("\n3 1 1 0\n", "\n300000000 1 1 0\n", r"meshio reads \(MemoryError: .* save it again"),
+        ("\n3 1 1 0\n", "\n1500000000 1 1 0\n", r"meshio reads \(MemoryError: .* save it again"),
     ],
 )
 def test_a_damaged_mesh_is_refused_in_words(before, after, says, tmp_path):
