@@ -87,3 +87,39 @@ def test_piers_under_the_ends_of_a_bridge_leave_no_place_for_sidewalls():
         af.bridge(arches=[arch], piers=piers, sidewalls=[wall, wall])
     with pytest.raises(af.InvalidStructure, match="a ring does not stand on a gap"):
         af.bridge(arches=[arch], piers=[shapes.Pier(gap=0.1, height=2.0, name="l"), piers[1]])
+
+
+@pytest.mark.parametrize(("breadth", "taken"), [(0.82, 0), (0.8, 1), (0.5, 3), (0.3, 4)])
+def test_a_slender_pier_has_one_stone_below_where_the_rings_part(breadth, taken):
+    """Semicircles of radii 1.6 m and 2 m in 19 voussoirs, whose extrados cross at cos φ."""
+    given = {"spans": [3.2, 3.2], "rises": 1.6, "thicknesses": 0.4, "voussoirs": 19, "heights": 2.0}
+    arcade = shapes.arcade(breadths=[1.0, breadth, 1.0], **given)
+    skewback = next(block for block in arcade.blocks if block.name == "pier 2, skewback")
+    turns = np.pi / 19 * np.arange(taken + 1)
+    corners = [(side * 0.5 * breadth, -0.4) for side in (-1.0, 1.0)]
+    for side in (-1.0, 1.0):
+        centre, radii = side * (0.5 * breadth + 1.6), [*np.full(taken + 1, 1.6), 2.0]
+        for radius, turn in zip(radii, [*turns, turns[-1]], strict=True):
+            corners.append((centre - side * radius * np.cos(turn), radius * np.sin(turn)))
+    found = skewback.points - [
+        3.4 + 0.5 * breadth,
+        0.0,
+    ]  # x begins in the middle of a springing joint
+    found, expected = (sorted(map(tuple, np.round(each, 9) + 0.0)) for each in (found, corners))
+    assert np.array(found) == pytest.approx(np.array(expected), abs=1e-8)
+    rings = [block.name for block in arcade.blocks if block.role == "ring"]
+    assert rings[-1] == "arch 2, voussoir 19"
+    assert rings[19 - taken] == f"arch 2, voussoir {1 + taken}"
+    # the joints of its lower voussoirs are missing, and those above keep their numbers
+    faces = [joint.name for joint in arcade.joints]
+    assert f"arch 2, joint {taken}" in faces
+    assert f"arch 2, joint {taken - 1}" not in faces
+    polygons = [shapely.Polygon(block.points) for block in arcade.blocks]
+    assert sum(p.area for p in polygons) == pytest.approx(shapely.union_all(polygons).area)
+    assert af.stands(arcade)
+
+
+def test_rings_on_a_pier_that_one_stone_would_not_part_are_refused():
+    given = {"spans": [3.2, 3.2], "rises": 1.6, "thicknesses": 0.4, "voussoirs": 7, "heights": 2.0}
+    with pytest.raises(af.errors.InvalidStructure, match=r"'pier 2'.* on a breadth of 0.3 m, and"):
+        shapes.arcade(breadths=[1.0, 0.3, 1.0], **given)

@@ -94,7 +94,8 @@ class Arch:
 class Pier:
     """A pier of stone courses, flush with the intrados of the rings that spring from it.
 
-    Its top course is one skewback between the two springing joints, or behind the only one.
+    Its top course is one skewback between the two springing joints, or behind the only one. Where
+    rings are less than 10 mm apart, it takes their lowest voussoirs up to where they part.
 
     Attributes:
         breadth: breadth of the courses, between the clear spans beside them [m]; or

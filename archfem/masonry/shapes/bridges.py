@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from itertools import chain, pairwise
 from math import cos
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -25,6 +25,14 @@ from archfem.units import G
 
 # Depth of the fixed blocks under piers and behind walls [m]; they do not deform.
 FOUNDATION_DEPTH = 0.2
+
+# Gap between rings side by side, below which a skewback takes their lowest stones [m]: rings move
+# by more, and there is no joint between them
+MIN_GAP = 0.01
+
+# A skewback takes at most the voussoirs of a ring over this at each springing [-]: no stone of an
+# arch is larger
+MAX_SHARED = 4
 
 # One length for all parts, or one for each, from left to right
 Lengths = Metres | Sequence[Metres]
@@ -278,10 +286,41 @@ def _expand_values(count: int, **values: Any) -> list[list[Any]]:
     return rows
 
 
+class BridgeRing(NamedTuple):
+    """The stones of a ring in a bridge, its joints, and the lower ends of both.
+
+    `left` and `right` lead from the springing along the intrados to the outermost joint, and across
+    it: the skewbacks there take the stones below it. Joints are numbered from the `first`.
+    """
+
+    stones: tuple[Block, ...]
+    faces: list[Face]
+    left: list[Point]
+    right: list[Point]
+    first: int = 0
+
+    @property
+    def extrados(self) -> list[Point]:
+        """The points along the extrados, from left to right [m]."""
+        # the extrados is the second half of an outline, from the right
+        halves = (reversed(each.outline[len(each.outline) // 2 : -1]) for each in self.stones)
+        return [self.faces[0][1], *chain(*halves)]
+
+    def cut(self, first: int, last: int) -> "BridgeRing":
+        """Return the ring without its first and its last stones, which skewbacks take."""
+        end, faces = len(self.stones) - last, self.faces[first : len(self.faces) - last]
+        left, right = (
+            list(chain(*(each.outline[: len(each.outline) // 2] for each in taken)))
+            for taken in (self.stones[:first], self.stones[end:])
+        )
+        ends = [*left, *faces[0]], [*reversed(right), *faces[-1]]
+        return BridgeRing(self.stones[first:end], faces, *ends, first)
+
+
 def build_ring(
     arch: Arch, left: float, material: Material, contact: Contact, chords: int
-) -> Structure:
-    """Build a ring at its position in a bridge, between abutments that are dropped later."""
+) -> BridgeRing:
+    """Build a ring at its position in a bridge."""
     # the embrace with its unit, so that no small angle is taken for radians
     shape: dict[str, Any] = {"embrace": f"{np.degrees(2.0 * arch.half):.17g} degree"}
     shape |= {"radius": arch.radius, "thickness": arch.thickness, "voussoirs": arch.voussoirs}
@@ -293,24 +332,23 @@ def build_ring(
         return (float(point[0] + right), float(point[1] + up))
 
     part: dict[str, Any] = {"part": arch.name, "role": arch.role}
-    blocks = []
-    for each in ring.blocks:
+    stones = []
+    for each in ring.blocks[1:-1]:  # its abutments are other blocks in a bridge
         outline, name = tuple(map(at, each.outline)), f"{arch.name}, {each.name}"
-        blocks.append(replace(each, outline=outline, name=name, **part))
-    joints = [
-        replace(each, intrados=at(each.intrados), extrados=at(each.extrados), part=arch.name)
-        for each in ring.joints
-    ]
-    return replace(ring, blocks=tuple(blocks), joints=tuple(joints), name=arch.name)
+        stones.append(replace(each, outline=outline, name=name, **part))
+    faces = [(at(each.intrados), at(each.extrados)) for each in ring.joints]
+    return BridgeRing(tuple(stones), faces, [], []).cut(0, 0)
 
 
-def extrados_points(ring: Structure) -> list[Point]:
-    """Return the points along the extrados of a ring, from left to right [m]."""
-    points = [ring.joints[0].extrados]
-    for block in ring.blocks[1:-1]:
-        # the extrados is the second half, from the right
-        points += reversed(block.outline[len(block.outline) // 2 : -1])
-    return points
+def _count_shared(left: BridgeRing, right: BridgeRing, pier: Pier) -> int:
+    """Count the stones at each of two springings below where the rings stand side by side."""
+    for count in range(min(len(left.stones), len(right.stones)) // MAX_SHARED + 1):
+        if left.faces[-1 - count][1][0] < right.faces[count][1][0] - MIN_GAP:
+            return count
+    raise InvalidStructure(
+        f"'{pier.name}': rings do not stand side by side on {_width_text(pier)}, and one stone "
+        f"would take over 1/{MAX_SHARED} of their voussoirs: give a wider one, or thinner rings"
+    )
 
 
 def _width_text(pier: Pier) -> str:
@@ -353,21 +391,21 @@ class StoneworkBuilder:
             x += arch.centre_line_span
             if number < len(piers):
                 x += piers[number].gap_beside(arch.reach, arches[number + 1].reach)
-        joints = [[(joint.intrados, joint.extrados) for joint in ring.joints] for ring in rings]
-        springings = [(faces[0], faces[-1]) for faces in joints]
+        springings = [(ring.faces[0], ring.faces[-1]) for ring in rings]
+        shared = [0, *map(_count_shared, rings[:-1], rings[1:], piers), 0]
+        rings = [ring.cut(*taken) for ring, taken in zip(rings, pairwise(shared), strict=True)]
         support = self._build_end(springings[0][0], 1.0, ends[:1], "left abutment")
         for number, (arch, ring) in enumerate(zip(arches, rings, strict=True)):
-            stones = [support, *range(len(self.blocks), len(self.blocks) + len(ring.blocks) - 2)]
-            self.blocks += ring.blocks[1:-1]  # its abutments are the supports of this bridge
-            right = springings[number][1]
+            stones = [support, *range(len(self.blocks), len(self.blocks) + len(ring.stones))]
+            self.blocks += ring.stones
             if number < len(piers):
-                support = self._build_pier(piers[number], right, springings[number + 1][0])
+                support = self._build_pier(piers[number], ring.right, rings[number + 1].left)
             else:
-                support = self._build_end(right, -1.0, ends[1:], "right abutment")
+                support = self._build_end(ring.faces[-1], -1.0, ends[1:], "right abutment")
             pairs = pairwise([*stones, support])
-            for k, (pair, face) in enumerate(zip(pairs, joints[number], strict=True)):
+            for k, (pair, face) in enumerate(zip(pairs, ring.faces, strict=True), ring.first):
                 self._add_joint(pair, face, f"joint {k}", arch)
-        return springings, [extrados_points(ring) for ring in rings]
+        return springings, [ring.extrados for ring in rings]
 
     def add(
         self,
@@ -422,23 +460,20 @@ class StoneworkBuilder:
         name = f"{part.name}, {words}"
         return self.add(outline, name, part=part.name, role=part.role, **options)
 
-    def _build_pier(self, pier: Pier, left: Face, right: Face) -> int:
-        """Build a pier under two springings; return the number of its skewback."""
+    def _build_pier(self, pier: Pier, left: Sequence[Point], right: Sequence[Point]) -> int:
+        """Build a pier under two springings; return the number of its skewback.
+
+        Each leads along the intrados to the outermost joint of the ring, and across it.
+        """
         (x0, y0), (x1, y1) = left[0], right[0]
         step = pier.height / count_pieces(pier.height, pier.course, f"courses of '{pier.name}'")
-        if not left[1][0] < right[1][0]:
-            raise InvalidStructure(
-                f"'{pier.name}': rings do not stand side by side on {_width_text(pier)}: give a "
-                "wider one, or thinner rings; blocks or outlines may have one springer for both"
-            )
         if min(y0, y1) <= -step:
             raise InvalidStructure(
                 f"'{pier.name}': rings begin below the uppermost course, of {step:.3g} m: give "
                 "higher courses"
             )
-        # flush with the intrados below, along both springing joints above
-        top = [right[0], right[1], left[1], left[0]]
-        return self._build_skewback(pier, (x0, x1), step, top)
+        # flush with the intrados below, along the outermost joints of both rings above
+        return self._build_skewback(pier, (x0, x1), step, [*right, *reversed(left)])
 
     def _build_skewback(self, pier: Pier, sides: Pair, step: float, top: Sequence[Point]) -> int:
         """Build the courses of a pier and the skewback on them; return the number of the latter."""
