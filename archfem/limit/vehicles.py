@@ -558,11 +558,16 @@ class _RoadMechanisms:
         adverse = sinks > 1e-9 * sinks.max(axis=0, initial=0.0)
         return bounds.min(axis=1), adverse.T[best]
 
-    def lay(self, axles: Array, factor: float, adverse: Flags, rounds: int = 20) -> Any:
-        """Return the least factor of axles found with sets of adverse strips, and this set."""
+    def lay(self, axles: Array, factor: float, adverse: Flags | None, rounds: int = 20) -> Any:
+        """Return the least factor of axles found with sets of adverse strips, and this set.
+
+        The factor is that with the given set, or infinite without any.
+        """
         for _ in range(rounds):
             bounds, other = self.bound(axles[None])
             if not bounds[0] < (1.0 - 1e-5) * factor:  # crushing has endless mechanisms
+                break
+            if np.array_equal(other[0], adverse):  # solved before: the bound is round-off
                 break
             adverse = other[0]
             factor = self.solve(axles + self.road[adverse].sum(axis=0))
@@ -615,7 +620,7 @@ def find_worst_rows(
     # and back with the mechanisms of all places
     while (above := known.bound(loads)[0]).min() < (1.0 - 1e-5) * factors.min():
         k = int(above.argmin())
-        factor, sets[k] = known.lay(loads[k], factors[k], sets[k])
+        factor, sets[k] = known.lay(loads[k], factors[k], sets[k] if solved[k] else None)
         factors[k], solved[k] = min(factor, above[k]), True  # the bound ends it in any case
     worst = {
         _join_row(rows[k], strips, sets[k]): loads[k] + known.road[sets[k]].sum(axis=0)
