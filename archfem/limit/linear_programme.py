@@ -15,6 +15,7 @@ References: Livesley, Int. J. Numer. Meth. Eng. 12 (1978) 1853-1871.
 
 from collections.abc import Sequence
 from contextlib import suppress
+from copy import copy
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
 
@@ -81,9 +82,10 @@ class RigidBlocks:
     """Rigid blocks of a structure, with forces at the two ends of each joint."""
 
     structure: Structure
-    # by what they depend on; a search without dilatancy alternates between four, eight leave room
+    # by what they depend on, each without and with further unknowns; a search without dilatancy
+    # alternates between four, sixteen leave room
     _reductions: RecentResults["ReducedBalance"] = field(
-        default_factory=lambda: RecentResults(8), init=False
+        default_factory=lambda: RecentResults(16), init=False
     )
 
     @property
@@ -162,11 +164,13 @@ class RigidBlocks:
         self, columns: sparse.csr_matrix, friction: Array, coheres: Flags
     ) -> "ReducedBalance":
         """Return the balance in few unknowns, kept for programmes of other loads and costs."""
-        parts = columns.indptr, columns.indices, columns.data, friction, coheres
-        key = tuple(part.tobytes() for part in parts)
-        return self._reductions.look_up(
-            key, lambda: ReducedBalance(self, columns, friction, coheres)
+        single = _find_single_blocks(columns)
+        key = tuple(part.tobytes() for part in (single, friction, coheres))
+        reduced = self._reductions.look_up(
+            key, lambda: ReducedBalance(self, single, friction, coheres)
         )
+        key += tuple(part.tobytes() for part in (columns.indptr, columns.indices, columns.data))
+        return self._reductions.look_up(key, lambda: reduced.with_columns(columns))
 
     def load(self, actions: Sequence[BodyForce | PointLoad]) -> Array:
         """Return the generalised forces of actions on the free blocks (3 n_free,) [N, N, N m]."""
@@ -238,11 +242,11 @@ def crushing_cuts(joints: Numbers, at: Array, crushing: Array) -> Limits:
     # A rectangular stress block of the full strength σ demands F >= N²/(2 N_c) at each end, with
     # N_c = σ w h; the tangent at N_0 is F >= N_0/N_c N - N_0²/(2 N_c).
     slope, count = at / crushing[joints], len(joints)
-    # built entry by entry, in a tenth of the time of products of sparse matrices
-    values = np.concatenate([slope - 1.0, slope, slope, slope - 1.0])
-    row = np.arange(2 * count).reshape(2, 1, count).repeat(2, axis=1).ravel()
-    column = np.tile(np.concatenate([joints, joints + len(crushing)]), 2)
-    rows = sparse.csr_matrix((values, (row, column)), (2 * count, 3 * len(crushing)))
+    # built row by row, in a tenth of the time of products of sparse matrices
+    values = np.stack([slope - 1.0, slope, slope, slope - 1.0]).reshape(2, 2, count)
+    column = np.tile(np.stack([joints, joints + len(crushing)], axis=1).ravel(), 2)
+    entries = values.transpose(0, 2, 1).ravel(), column, np.arange(0, 4 * count + 1, 2)
+    rows = sparse.csr_matrix(entries, (2 * count, 3 * len(crushing)))
     return Limits(rows, np.tile(slope * at / 2.0, 2))
 
 
@@ -302,6 +306,15 @@ class Programme:
         optimum = self.with_unknowns(columns, np.ones(2 * len(self.load))).solve()
         assert optimum is not None  # a sum of magnitudes is bounded from below
         return optimum
+
+    def with_cuts_at(self, state: Optimum | None) -> "Programme":
+        """Return the programme with crushing cuts at the thrusts of a state, as of other loads."""
+        if self.crushing is None or state is None:
+            return self
+        thrust = state.forces.reshape(3, -1)[:2].sum(axis=0)
+        crushes = np.flatnonzero(np.isfinite(self.crushing))
+        cuts = crushing_cuts(crushes, thrust[crushes], self.crushing)
+        return replace(self, limits=(self.limits or no_limits(len(thrust))).joined(cuts))
 
     def objective(self, state: Optimum) -> float:
         """Return the objective a·x + b·z at a state of another programme of the same unknowns."""
@@ -390,10 +403,10 @@ class ReducedBalance:
     """
 
     def __init__(
-        self, blocks: RigidBlocks, columns: sparse.csr_matrix, friction: Array, coheres: Flags
+        self, blocks: RigidBlocks, single: Numbers, friction: Array, coheres: Flags
     ) -> None:
-        """Eliminate chains, and express the other forces by generators."""
-        balance, single = blocks.balance, _find_single_blocks(columns)
+        """Eliminate chains without single blocks, and express the other forces by generators."""
+        balance = blocks.balance
         links, self._pivots = _find_chains(blocks.structure, single)
         self._is_pivot = np.zeros(balance.shape[1], dtype=bool)
         self._is_pivot.reshape(3, -1)[:, self._pivots] = True
@@ -402,27 +415,35 @@ class ReducedBalance:
         self._balance, used = balance[self._kept], ~self._is_pivot[: len(friction)]
         # these carry shear without compression
         self._alone = np.flatnonzero(used & (coheres | ~np.isfinite(friction)))
-        self._map = _cone_generators(friction, used, self._alone, columns.shape[1])
-        self._count = self._map.shape[1] - columns.shape[1]
-        entries = columns.data, columns.indices + self._count, columns.indptr
-        loads = sparse.csr_matrix(entries, (columns.shape[0], self._map.shape[1]))
+        self._map = _cone_generators(friction, used, self._alone)
+        self._count, passed = self._map.shape[1], balance[~self._kept]
         if len(links):
-            self._eliminate(balance[~self._kept], loads[~self._kept])
-        self._equations = self._balance @ self._map + loads[self._kept]
+            self._factors = splu(passed[:, self._is_pivot].tocsc())
+            self._map = self._map + self._pass_on(passed @ self._map)
+        self._equations = self._balance @ self._map
         self._slides = self._pivots[np.isfinite(friction[self._pivots])]
         self._rows = _pivot_limits(friction, self._pivots, self._slides)
         self._limits = self._rows @ self._map
 
-    def _eliminate(self, passed: sparse.csr_matrix, loads: sparse.csr_matrix) -> None:
-        """Solve the balance of the links of chains for the forces of their pivots."""
-        self._factors = splu(passed[:, self._is_pivot].tocsc())
-        passed_on = (passed @ self._map + loads).tocsc()
+    def with_columns(self, columns: sparse.csr_matrix) -> "ReducedBalance":
+        """Return the balance with further unknowns z."""
+        passed, other = self._pass_on(columns[~self._kept]), copy(self)
+        direct = columns[self._kept] + self._balance @ passed
+        other._map = sparse.hstack([self._map, passed], format="csr")
+        other._equations = sparse.hstack([self._equations, direct], format="csr")
+        other._limits = sparse.hstack([self._limits, self._rows @ passed], format="csr")
+        return other
+
+    def _pass_on(self, loads: sparse.csr_matrix) -> sparse.csr_matrix:
+        """Return the forces of all joints with which pivots carry loads on the links of chains."""
+        shape, loads = (len(self._is_pivot), loads.shape[1]), loads.tocsc()
         # only forces at the end of a chain and loads act on its links
-        acting = np.flatnonzero(np.diff(passed_on.indptr))
-        solved = self._factors.solve(-passed_on[:, acting].toarray())
+        if not len(acting := np.flatnonzero(np.diff(loads.indptr))):
+            return sparse.csr_matrix(shape)
+        solved = self._factors.solve(-loads[:, acting].toarray())
         row, column = np.nonzero(solved)
         place = np.flatnonzero(self._is_pivot)[row], acting[column]
-        self._map = self._map + sparse.csr_matrix((solved[row, column], place), self._map.shape)
+        return sparse.csr_matrix((solved[row, column], place), shape)
 
     def solve(self, programme: Programme, further: Limits, large: int = 600) -> Optimum | None:
         """Solve a programme: by the interior point from `large` equations on, else the simplex.
@@ -441,20 +462,19 @@ class ReducedBalance:
             cost[np.abs(cost) < ROUND_OFF * np.abs(cost).max()] = 0.0
         cost[self._count :] += programme.unknown_cost
         strength = np.tile(programme.cohesion[self._slides], 2)
-        limits = Limits(self._rows, np.concatenate([np.zeros(2 * len(self._pivots)), strength]))
+        bounds = np.concatenate([np.zeros(2 * len(self._pivots)), strength]) - self._rows @ constant
         reduced = self._limits
         if len(further.bounds):
-            limits = limits.joined(further)
+            bounds = np.concatenate([bounds, further.bounds - further.rows @ constant])
             reduced = sparse.vstack([reduced, further.rows @ self._map], format="csr")
         load = programme.load[self._kept] - self._balance @ constant
         method = "highs-ipm" if len(load) > large and cost.any() else "highs-ds"
-        rows = reduced, limits.bounds - limits.rows @ constant
-        equations = self._equations, load
+        equations, rows = (self._equations, load), (reduced, bounds)
         result = solve_linear(cost, self._bounds(programme), equations, rows, method)
         if result is None:
             return None
         forces, unknowns = self._map @ result.x + constant, result.x[self._count :]
-        multipliers = self._multipliers(result, force_cost, limits.rows)
+        multipliers = self._multipliers(result, force_cost, further.rows)
         value = float(force_cost @ forces + programme.unknown_cost @ unknowns)
         return Optimum(value, forces, multipliers, unknowns)
 
@@ -469,7 +489,7 @@ class ReducedBalance:
         return bounds
 
     def _multipliers(
-        self, result: OptimizeResult, force_cost: Array, rows: sparse.csr_matrix
+        self, result: OptimizeResult, force_cost: Array, further: sparse.csr_matrix
     ) -> Array:
         """Return the multipliers of the balance of all blocks (3 n_free,)."""
         every = np.empty(len(self._kept))
@@ -477,7 +497,8 @@ class ReducedBalance:
         if len(self._pivots):
             # the forces of pivots are unknowns without bounds: their reduced costs vanish
             cost = force_cost - self._balance.T @ result.eqlin.marginals
-            cost -= rows.T @ result.ineqlin.marginals
+            own, others = np.split(result.ineqlin.marginals, [self._rows.shape[0]])
+            cost -= self._rows.T @ own + further.T @ others
             every[~self._kept] = self._factors.solve(cost[self._is_pivot], trans="T")
         return every
 
@@ -506,8 +527,8 @@ def _find_chains(structure: Structure, excluded: Numbers) -> tuple[Numbers, Numb
     return links, np.asarray(pivots, dtype=np.intp)
 
 
-def _cone_generators(friction: Array, used: Flags, alone: Numbers, extra: int) -> sparse.csr_matrix:
-    """Return generators of the forces of some joints, followed by zeros (3 n_joints, m + extra)."""
+def _cone_generators(friction: Array, used: Flags, alone: Numbers) -> sparse.csr_matrix:
+    """Return generators of the forces of some joints (3 n_joints, m)."""
     cone, count = np.isfinite(friction) & (friction > 0.0), len(used)
     slides, plain = np.flatnonzero(used & cone), np.flatnonzero(used & ~cone)
     # both ends with a shear of μ, both with -μ, both without shear, shear alone
@@ -517,7 +538,7 @@ def _cone_generators(friction: Array, used: Flags, alone: Numbers, extra: int) -
     values = np.concatenate([np.ones(len(rows)), signs * np.tile(friction[slides], 4)])
     columns = np.concatenate([np.arange(len(rows)), np.arange(len(signs))])
     places = np.concatenate([rows, np.tile(2 * count + slides, 4)]), columns
-    return sparse.csr_matrix((values, places), (3 * count, len(rows) + extra))
+    return sparse.csr_matrix((values, places), (3 * count, len(rows)))
 
 
 def _pivot_limits(friction: Array, pivots: Numbers, slides: Numbers) -> sparse.csr_matrix:

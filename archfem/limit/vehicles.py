@@ -529,7 +529,8 @@ class _RoadMechanisms:
     def __init__(self, dead: Programme, strips: Sequence[Array]) -> None:
         self._dead = dead
         self.road = np.array(strips).reshape(len(strips), len(dead.load))
-        self._motions, self._resistances = list[Array](), list[float]()  # at a power of 1
+        self._before: Optimum | None = None
+        self._motions, self._resistances = np.zeros((0, len(dead.load))), np.zeros(0)  # power of 1
         # the first ones are of the distributed load alone, on stretches: else a search ends early
         for size in (len(strips) // 8, len(strips) // 4, len(strips) // 2):
             for first in range(0, len(strips) - size + 1, max(size // 2, 1)):
@@ -537,21 +538,22 @@ class _RoadMechanisms:
 
     def solve(self, load: Array) -> float:
         """Return the factor of a load, infinite without any, and keep its mechanism."""
-        optimum = self._dead.with_load_factor(load).solve(forces=False) if load.any() else None
+        # cuts at the thrusts of the load before leave few to add
+        dead = self._dead.with_cuts_at(self._before)
+        optimum = dead.with_load_factor(load).solve(forces=False) if load.any() else None
         if optimum is None:
             return np.inf
-        self._motions.append(optimum.multipliers)
-        self._resistances.append(-optimum.value)
+        self._before = optimum
+        self._motions = np.vstack([self._motions, optimum.multipliers])
+        self._resistances = np.append(self._resistances, -optimum.value)
         return -optimum.value
 
     def bound(self, loads: Array) -> tuple[Array, Flags]:
         """Return the least bound of each load (n, 3 n_free), and which strips are adverse to it."""
-        scale = self._dead.blocks.dimensionless
-        motions = np.array(self._motions).reshape(-1, len(self._dead.load)).T
-        sinks = np.array([scale(force) for force in self.road]).reshape(-1, len(motions)) @ motions
-        power = np.array([scale(load) for load in loads]) @ motions
-        power += np.maximum(sinks, 0.0).sum(axis=0)
-        bounds = np.array(self._resistances) / np.maximum(power, 1e-300)
+        scale, motions = self._dead.blocks.dimensionless, self._motions.T
+        sinks = scale(self.road) @ motions
+        power = scale(loads) @ motions + np.maximum(sinks, 0.0).sum(axis=0)
+        bounds = self._resistances / np.maximum(power, 1e-300)
         if not bounds.shape[1]:
             return np.full(len(loads), np.inf), np.zeros((len(loads), len(self.road)), dtype=bool)
         best = bounds.argmin(axis=1)
@@ -567,7 +569,8 @@ class _RoadMechanisms:
             bounds, other = self.bound(axles[None])
             if not bounds[0] < (1.0 - 1e-5) * factor:  # crushing has endless mechanisms
                 break
-            if np.array_equal(other[0], adverse):  # solved before: the bound is round-off
+            # the factor is that of this set: what is below it is round-off
+            if adverse is not None and (other[0] == adverse).all():
                 break
             adverse = other[0]
             factor = self.solve(axles + self.road[adverse].sum(axis=0))

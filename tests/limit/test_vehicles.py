@@ -11,9 +11,15 @@ from backfilled import SOIL, fill_of
 from repeats import each_once
 
 import archfem as af
-from archfem.limit import vehicles
+from archfem.limit import linear_programme, vehicles
 from archfem.limit.linear_programme import Programme
-from archfem.limit.vehicles import _find_worst, _search_nonassociated
+from archfem.limit.self_weight import self_weight_programme
+from archfem.limit.vehicles import (
+    _find_worst,
+    _search_nonassociated,
+    collapse_factors,
+    find_worst_rows,
+)
 
 EXACT = 1e-6
 """Relative: the programme is solved to 1e-9 block weights, corners count as one within 1e-6."""
@@ -206,6 +212,33 @@ def test_a_distributed_load_stands_on_the_worst_of_all_sets_of_strips(fill, monk
         alone, everywhere = factors[0].factor, factors[-1].factor
         assert least.factor < min(alone, everywhere)
     assert 0.0 < float(found["loaded"].min()) <= float(found["loaded"].max()) < np.ptp(corners)
+
+
+@pytest.mark.parametrize(("strength", "rounds"), [(np.inf, 1.0), (5e6, 2.5)])
+def test_a_search_for_the_worst_place_solves_each_once(strength, rounds, monkeypatch):
+    """With the factors of places on their own, and few rounds of cuts where stones crush.
+
+    An axle behind the springing reaches the stones by round-off alone.
+    """
+    options = {"friction": "coulomb", "strength": strength, "fill": GRAVEL}
+    stones, dead = self_weight_programme(arch_bridge(), **options)
+    rows = [(af.PointLoad(x, (0.0, -1e5)),) for x in np.linspace(0.1, 8.9, 45).tolist()]
+    axles, solved, solve = (
+        {row: stones.load(row) for row in rows},
+        [],
+        linear_programme.solve_linear,
+    )
+    expected = collapse_factors(stones, dead, axles, options)
+    monkeypatch.setattr(
+        linear_programme, "solve_linear", lambda *given: [solved.append(1), solve(*given)][1]
+    )
+    worst, factors = find_worst_rows(dead, axles, (), [], np.zeros(len(rows)))
+    assert len(solved) <= rounds * len(rows)
+    assert next(iter(worst)) == min(rows, key=expected.__getitem__)
+    reached = [k for k, row in enumerate(rows) if np.isfinite(expected[row])]
+    assert 20 < len(reached) < len(rows)
+    own = [expected[rows[k]] for k in reached]
+    assert factors[reached].tolist() == pytest.approx(own, rel=1e-5)  # of the cuts
 
 
 @pytest.mark.slow
