@@ -260,22 +260,32 @@ def test_a_wedge_that_is_lost_is_doubted(monkeypatch, caplog):
     )
 
 
-def test_strength_that_hardly_matters_takes_few_programmes_more(monkeypatch, capfd):
-    """Of many states with the same gap one is sought, so that the crushing cuts converge."""
+@pytest.mark.parametrize(
+    ("courses", "found_from", "times"),
+    [(6, 40, 2.6), pytest.param(16, 25, 4, marks=pytest.mark.slow)],
+)
+def test_strength_that_hardly_matters_takes_few_programmes_more(
+    courses, found_from, times, monkeypatch, capfd
+):
+    """Of many states with the same gap one is sought, so that the crushing cuts converge.
+
+    It is found from most of 46 or 32 starts. Six courses take 2.3 times the programmes, and 2.9
+    times where no state is preferred.
+    """
     solved, solve = [], linear_programme.solve_linear
     monkeypatch.setattr(
         linear_programme, "solve_linear", lambda *given: [solved.append(1), solve(*given)][1]
     )
     monkeypatch.setattr("archfem._display.PROGRESS_INTERVAL", 0.0)
-    found, counts = {}, {}
+    found, counts, bond = {}, {}, wall([FOUR, FOUR_CUT] * (courses // 2))
     for strength in (None, 56e6):
         options = {"friction": "nonassociated", "strength": strength}
         solved.clear()
-        found[strength] = af.collapse_factor(wall([FOUR, FOUR_CUT] * 8), live=SIDEWAYS, **options)
+        found[strength] = af.collapse_factor(bond, live=SIDEWAYS, **options)
         counts[strength] = len(solved)
     assert found[56e6].factor == pytest.approx(found[None].factor, rel=2e-3)
-    assert found[56e6].solutions.starts[1] > 25  # of 32 starts; the gap has the error of the cuts
-    assert counts[56e6] < 4 * counts[None]
+    assert found[56e6].solutions.starts[1] > found_from  # the gap has the error of the cuts
+    assert counts[56e6] < times * counts[None]
     said = capfd.readouterr().err
     assert "limit analysis: 0.7 of the friction" in said
     assert "limit analysis: start 2 of " in said

@@ -709,8 +709,9 @@ def test_a_vehicle_without_factors_passes_on_a_condition(vehicle, given, missing
     assert ("(none" in impact) == ("impact" in missing)
 
 
-def test_factors_of_codes_are_stated_with_outcome_and_range():
+def test_factors_of_codes_are_stated_with_outcome_and_range(monkeypatch):
     """Against ratings with these factors; those of CS 454 search the axle that has the impact."""
+    monkeypatch.setattr(rating, "_places_along", partial(places_along, steps=10))
     bridge, fill = (
         arch_bridge(width=3.0, voussoirs=9),
         replace(GRAVEL, mobilisation=0.5, backing=0.6),
