@@ -1,6 +1,7 @@
 """Rigid-block equilibrium as a linear programme: loads, gaps, balance and crushing cuts."""
 
 from dataclasses import replace
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -12,7 +13,7 @@ from scipy import sparse
 from scipy.optimize import linprog
 
 import archfem as af
-from archfem.limit import linear_programme
+from archfem.limit import linear_programme, rating
 from archfem.limit.linear_programme import RigidBlocks
 from archfem.limit.self_weight import self_weight_programme
 
@@ -107,8 +108,9 @@ def test_strength_lowers_the_factor_steadily():
     )
 
 
-def test_the_strength_of_a_material_is_that_of_its_stones_and_no_default_is():
+def test_the_strength_of_a_material_is_that_of_its_stones_and_no_default_is(monkeypatch):
     """In the functions of limit analysis alike; infinite is none."""
+    monkeypatch.setattr(rating, "_places_along", partial(rating._places_along, steps=20))
     weak = replace(af.STONE, strength=0.5 * af.units.MPa)
     vehicle, stones, given = "CS454-single", ring(material=weak), {"strength": weak.strength}
     answers = [

@@ -91,7 +91,9 @@ def test_the_upper_part_of_a_stack_rocks_where_it_is_slender():
     assert found.mechanism_name == "rocking of all above plinth about the toe of shaft"
 
 
-@pytest.mark.parametrize("friction", ["coulomb", "nonassociated"])
+@pytest.mark.parametrize(
+    "friction", ["coulomb", pytest.param("nonassociated", marks=pytest.mark.slow)]
+)
 def test_a_wall_in_bond_loses_a_wedge_at_its_toe(friction):
     found = af.collapse_factor(bonded_wall(courses=12), live=PUSH, friction=friction)
     assert found.factor == pytest.approx(0.5, rel=0.06)  # length / (4 course) of a high wall

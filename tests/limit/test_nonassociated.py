@@ -532,7 +532,7 @@ def test_without_a_solution_the_bound_is_the_answer(monkeypatch):
 GATEWAY = Path(__file__).parent / "gateway.geojson"
 
 
-@pytest.mark.parametrize("push", [1.0, -1.0])
+@pytest.mark.parametrize("push", [1.0, pytest.param(-1.0, marks=pytest.mark.slow)])
 def test_states_of_a_surveyed_gateway_are_found(push):
     """A preference for weak states held gaps of 1e-7 open, behind which a state is."""
     structure = af.masonry.surveyed(GATEWAY, snap=6e-3, width=0.6)

@@ -276,7 +276,9 @@ def test_parapets_are_a_dead_load_along_the_bridge(monkeypatch):
     ("axles", "turns", "direction", "number"),
     [
         ((40e3, 50e3), 1.8 * 50e3 * 1.0 + 40e3 * 0.7, "left", 2),
-        ((50e3, 40e3), 1.8 * 50e3 * 1.0 + 40e3 * 0.7, "right", 1),
+        pytest.param(
+            *((50e3, 40e3), 1.8 * 50e3 * 1.0 + 40e3 * 0.7, "right", 1), marks=pytest.mark.slow
+        ),
         ((20e3, 70e3, 25e3), 1.8 * 70e3 * 1.0 + 25e3 * 0.7, "right", 2),
     ],
 )
@@ -404,7 +406,7 @@ def test_the_geometric_factor_of_a_ring_is_one_of_thickness():
         assert (factor >= 1.0) == carries
 
 
-@pytest.mark.parametrize("spacings", [(), (1.3,)])
+@pytest.mark.parametrize("spacings", [(), pytest.param((1.3,), marks=pytest.mark.slow)])
 def test_the_least_factor_of_bare_stones_is_at_the_end_of_one(spacings, monkeypatch):
     """Whichever places are sampled; places beside it come near to it from above."""
     ring = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17)

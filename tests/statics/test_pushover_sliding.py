@@ -343,7 +343,7 @@ def test_a_step_after_a_relaxed_one_is_relaxed_first(monkeypatch):
     assert ways[:4] == ["step", "creep", "creep", "creep"]
 
 
-@pytest.mark.parametrize("friction", [0.3, 0.4])
+@pytest.mark.parametrize("friction", [pytest.param(0.3, marks=pytest.mark.slow), 0.4])
 def test_a_wall_that_slides_ends_at_what_limit_analysis_proves(friction):
     """All of its beds slide at μ: no equilibrium is above."""
     wall = bonded_wall(courses=6, friction=friction)

@@ -311,7 +311,7 @@ def unbalanced(structure, load, joints, factor):
     return max(rest)
 
 
-QUICK = [(ring, seed) for seed in (2, 4, 9, 13)] + [(wall, seed) for seed in (2, 3, 6, 9, 12, 15)]
+QUICK = [(ring, seed) for seed in (4, 9, 13)] + [(wall, seed) for seed in (2, 3, 6, 9, 12, 15)]
 OTHERS = [(make, seed) for make in (ring, wall) for seed in range(16) if (make, seed) not in QUICK]
 
 
