@@ -31,7 +31,7 @@ from archfem.joints.criteria import assessed_joints, envelope, first_time, longe
 from archfem.limit.collapse import Collapse, Outcome, describe_crushing, describe_fill
 from archfem.limit.fill_strength import Fill, PlasticFill, as_pressure
 from archfem.limit.instability import explain_instability
-from archfem.limit.mechanism_count import Mechanism, duration_text
+from archfem.limit.mechanism_count import duration_text
 from archfem.limit.rating import Rating
 from archfem.limit.thickness import minimum_thickness
 from archfem.masonry.loads import Action, Settlement, describe_massless
@@ -130,21 +130,21 @@ def tabulate_runs(runs: Mapping[str, History]) -> ResultTable:
         apart = joints["open"].any("time")
         largest = size.max("time").where(~apart, 0.5)  # |e| is undefined while a joint is open
         horizontal, vertical = run.dataset["ground"].attrs["peaks"]
-        until = f" until {run.time[-1]:.2f} s" * run.ending.is_loose
         row = [name, verdict.outcome, str(len(verdict.doubts) or "none")]
         row += [f"{horizontal:.2f} m/s²", f"{vertical:.2f} m/s²"]
-        row.append(f"{format_ratio(float(size.max()))}{until}")
+        row.append(f"{format_ratio(float(size.max()))}{verdict.until}")
         row.append(str(joints["name"].values[int(largest.values.argmax())]))
-        row.append(f"{format_ratio(float(joints['friction'].max()))}{until}")
+        row.append(f"{format_ratio(float(joints['friction'].max()))}{verdict.until}")
         row.append(f"{int(apart.sum())} joints" if apart.any() else "-")
-        sizes = [format_mm(verdict.displacement), format_mm(verdict.residual)]
+        sizes = [verdict.said_displacement, format_mm(verdict.residual)]
         sizes[1] += " (moving)" * (verdict.fall is not None and not verdict.fall.resting)
         row += ["-", "-"] if verdict.outcome in FALLEN_STATES else sizes  # the way to the ground
-        row += [_mechanism_cell(verdict.mechanisms, definition) for definition in ALL_DEFINITIONS]
+        row += [_mechanism_cell(verdict, definition) for definition in ALL_DEFINITIONS]
         rows.append([*row, f"{endings.get(run.ending, run.ending)} {run.time[-1]:.2f} s"])
     verdicts = [run.verdict for run in runs.values()]
+    least = "≥ " * any(verdict.until for verdict in verdicts)
     counts = [
-        f"{sum(verdict.mechanisms.get(name) is not None for verdict in verdicts)} of {len(runs)}"
+        f"{least}{sum(x.mechanisms.get(name) is not None for x in verdicts)} of {len(runs)}"
         if any(name in verdict.mechanisms for verdict in verdicts)
         else "-"  # the definition does not apply
         for name in ALL_DEFINITIONS
@@ -615,13 +615,13 @@ def format_ratio(value: float) -> str:
     return f"{value:z.3f}" if value < 100.0 else "> 100"
 
 
-def _mechanism_cell(mechanisms: Mapping[str, Mechanism | None], definition: str) -> str:
+def _mechanism_cell(verdict: Verdict, definition: str) -> str:
     """Return the cell of a mechanism: class, time, duration and opening."""
-    if definition not in mechanisms:  # it does not apply, or the structure is unknown
+    if definition not in verdict.mechanisms:  # it does not apply, or the structure is unknown
         return "-"
-    found = mechanisms[definition]
+    found = verdict.mechanisms[definition]
     if found is None:
-        return "none"
+        return f"none{verdict.until}"
     assert found.duration is not None  # a run has a duration
     opening = "" if found.opening is None else f", {format_mm(found.opening)}"
     return f"{found.kind} {found.time:.2f} s, {duration_text(found.duration)}{opening}"

@@ -26,6 +26,10 @@ COLLAPSE_STATES = ("stands", "dislocated", "partly fallen", "fallen")
 # Displacement above which a structure is dislocated, over the depth of the shallowest part [-]
 DISLOCATION = 0.1
 
+# Share of the Arias intensity left when strong motion ends, after 95 % of it (Trifunac and Brady,
+# BSSA 65, 1975) [-]
+MAX_LOOSE_SHARE = 0.05
+
 # Remedy where properties or steps may change the kind
 RANGE_REMEDY = "state a range, `archfem verdict CASE.toml`"
 
@@ -62,6 +66,8 @@ class CollapseState:
         resting: whether all blocks were at rest at the end, or vibrated too weakly to overturn; if
             not, more may fall.
         admissible_step: time step that follows sliding; infinite where that of the run does [s].
+        loose_share: share of the Arias intensity of the ground that loose blocks were followed
+            through, without elastic joints [-].
     """
 
     kind: str
@@ -71,6 +77,12 @@ class CollapseState:
     residual: float
     resting: bool
     admissible_step: float = inf
+    loose_share: float = 0.0
+
+    @property
+    def lacks_joints(self) -> bool:
+        """Whether blocks that did not fall were loose before strong motion was over."""
+        return self.kind not in FALLEN_STATES and self.loose_share > MAX_LOOSE_SHARE
 
     @property
     def text(self) -> str:

@@ -115,10 +115,10 @@ def follow_fall(
         except KeyboardInterrupt:  # before the first step
             return mark_interrupted(history, f"{state.time:.4g} s")
         fall = classify_collapse(structure, frames, origin)
+        fall = replace(fall, loose_share=_measure_share_left(motion, state.time))
         until_lost = [each for each in frames if fall.time is None or each.time <= fall.time]
         dataset.attrs["fall_unsettled_early"] = until_lost[-1].settling.unsettled_share
-        attrs = history.dataset.attrs | dataset.attrs
-        history = replace(history, dataset=history.dataset.merge(dataset).assign_attrs(attrs))
+        history = History(history.dataset.merge(dataset, combine_attrs="no_conflicts"), structure)
         doubts += _doubt_fall(structure, dataset)
         if (failure := dataset.attrs["fall_failure"]) == "interrupted":
             history = mark_interrupted(history, f"{frames[-1].time:.4g} s, in a fall")
@@ -146,6 +146,13 @@ def follow_fall(
     if fall.kind not in FALLEN_STATES or not whole or history.ending is Ending.INTERRUPTED:
         return history
     return _compare_rigid_blocks(history, structure, motion, start.time)
+
+
+def _measure_share_left(motion: Motion, time: float) -> float:
+    """Return the share of the Arias intensity of both components after a time [-]."""
+    times = motion.dt * np.arange(round(motion.duration / motion.dt) + 1)
+    squares = np.square(motion.at(times)).sum(axis=1)
+    return float(squares[times > time].sum() / max(squares.sum(), np.finfo(float).tiny))
 
 
 def _compare_rigid_blocks(

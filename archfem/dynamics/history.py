@@ -54,6 +54,16 @@ SIGN_CONVENTION = (
     "gravity along -y; displacements relative to the ground"
 )
 
+# Words of the doubt of blocks that were loose while the ground still shook, with the time and the
+# share of Arias intensity left, and its remedy where stones met
+LOOSE_BLOCKS = (
+    "from {:.2f} s on, with {:.0%} of the Arias intensity to come, blocks were followed as loose "
+    "rigid ones: with elastic joints they may move farther, and mechanisms were sought until then"
+)
+MEETING_REMEDY = (
+    "join these stones by a joint or make them one, or leave a gap that they do not close"
+)
+
 # Kind of the file of a history
 FILE_KIND = "history file"
 
@@ -99,6 +109,7 @@ ATTRIBUTE_KINDS: dict[str, Callable[[Any], Any]] = {
     **dict.fromkeys(("last_time", "predicted_error", "admissible_step"), _read_number),
     **dict.fromkeys(("fill_tension", "fill_tension_time"), _read_number),
     **dict.fromkeys(("fall_time", "fall_residual", "fall_resting"), _read_number),
+    "fall_loose_share": _read_number,
     **dict.fromkeys(("criteria_hinge", "criteria_duration", "criteria_friction"), _read_number),
     **dict.fromkeys(("halved_steps", "steps", "criteria_failures"), index),
     **dict.fromkeys(("structure", "fidelity", "fall_blocks"), str.strip),
@@ -195,22 +206,28 @@ class History(ResultDisplay):
         They concern energy drift above 5 % at any step; rotations and displacements too large for a
         model of small displacements; damping that drags loose blocks; a missed tolerance of the
         steps; constant steps that are long for sliding; a fidelity that does not suit a block; a
-        predicted error above its tolerance; a run that was broken off; soft blocks that fall in one
-        piece; a stack that as one rigid body falls, stands or moves otherwise; joints between
-        stones that fail and are not assessed; and soft joints that let blocks rock before they
-        hinge. The last two need the structure.
+        predicted error above its tolerance; a run that was broken off; blocks that were loose
+        before strong motion was over, and did not fall; soft blocks that fall in one piece; a stack
+        that as one rigid body falls, stands or moves otherwise; joints between stones that fail and
+        are not assessed; and soft joints that let blocks rock before they hinge. The last two need
+        the structure.
         """
         stored = read_doubts(str(self.dataset.attrs.get("doubts", "[]")))
         return (*stored, *self._doubts_of_run)
 
     @cached_property
     def _doubts_of_run(self) -> list[Doubt]:
-        """Doubts of a run broken off, and of joints that fail and, by roles, are not assessed."""
+        """Doubts of a run broken off or without joints, and of failing joints not assessed."""
         joints, structure = self.joints, self.structure
         doubts = [] if structure is None else doubt_unassessed_joints(joints, structure)
         if structure is not None and (fall := self.fall) is not None:
             soft = doubt_soft_joints(joints, structure, fall)
             doubts += [doubt for doubt in soft if not any(self.mechanisms.values())]
+        if self.fall is not None and self.fall.lacks_joints:
+            example, met = self.outcome.partition(": ")[2], self.ending is Ending.MET
+            remedy = MEETING_REMEDY if met else "state that blocks come loose, and not how far"
+            values = float(self.time[-1]), self.fall.loose_share
+            doubts.append(Doubt(LOOSE_BLOCKS, remedy, values, example=example))
         if not self.ending.is_complete:
             cause = f"the run {self.outcome.partition(':')[0]}, and what comes after is not known"
             doubts.append(Doubt(cause, "run the motion again, to its end"))
@@ -271,6 +288,7 @@ class History(ResultDisplay):
             float(attrs["fall_residual"]),
             bool(attrs["fall_resting"]),
             float(attrs.get("admissible_step", np.inf)),
+            float(attrs["fall_loose_share"]),
         )
 
     @cached_property
@@ -311,6 +329,7 @@ class History(ResultDisplay):
             assessed=describe_assessed_joints(joints),
             farthest=farthest,
             incomplete="" if self.ending.is_complete else self.outcome.partition(":")[0],
+            until=f" until {self.time[-1]:.2f} s" * self.ending.is_loose,
             remarks=tuple(remarks),
         )
 
@@ -522,6 +541,7 @@ def with_fall(history: History, fall: CollapseState) -> History:
         fall_blocks="\n".join(fall.blocks),
         fall_residual=fall.residual,
         fall_resting=int(fall.resting),
+        fall_loose_share=fall.loose_share,
     )
     return History(dataset, history.structure)
 

@@ -77,6 +77,8 @@ class Verdict:
             applies, and by the criterion of Demirel and Aldemir; "verified" only where the
             structure is known and the run was not interrupted.
         fall: state of collapse with large displacements, or None.
+        until: until when joints were followed, such as " until 4.85 s", where blocks were loose
+            after it; "" otherwise.
         incomplete: how the run was broken off, such as "failed at 1.2 s"; "" otherwise.
         assessed: which joints the verdict is based on, and which it leaves out; "" if none.
         remarks: further sentences on the run: ending, places of the largest values, mechanisms too
@@ -92,6 +94,7 @@ class Verdict:
     incomplete: str = ""
     assessed: str = ""
     farthest: tuple[str, ...] = ()
+    until: str = ""
     remarks: tuple[str, ...] = ()
 
     @property
@@ -110,6 +113,12 @@ class Verdict:
         text += f", but the run {self.incomplete}" if self.incomplete else ""
         count = len(self.doubts)
         return f"{text}; {count} doubt{'s' * (count > 1)}" if count else text
+
+    @property
+    def said_displacement(self) -> str:
+        """Largest displacement, with the time from which it lacks elastic joints."""
+        lacks = self.fall is not None and self.fall.lacks_joints
+        return format_mm(self.displacement) + f" (with joints{self.until})" * lacks
 
     @property
     def _outcome_text(self) -> str:
@@ -135,7 +144,7 @@ class Verdict:
             end = f"{format_mm(self.residual)}{left}"
             end = f"{end} at the end, while blocks still move" if moves else f"residual {end}"
             lines.append(
-                f"largest displacement of a corner {format_mm(self.displacement)}{most}, {end}; "
+                f"largest displacement of a corner {self.said_displacement}{most}, {end}; "
                 "not varied"
             )
         # definitions with the same mechanism share a line
@@ -144,8 +153,8 @@ class Verdict:
             groups.setdefault("none" if found is None else str(found), []).append(name)
         lines += self.remarks
         for words, names in groups.items():
-            subject = "mechanism by " if words == "none" else ""
-            lines.append(f"{subject}{join_names(names)}: {words}")
+            subject, until = ("mechanism by ", self.until) if words == "none" else ("", "")
+            lines.append(f"{subject}{join_names(names)}: {words}{until}")
         return "\n".join(lines)
 
     def __repr__(self) -> str:

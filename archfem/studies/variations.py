@@ -174,6 +174,11 @@ def verdict_range(  # noqa: PLR0913  (one call, one argument for each thing that
     doubts += doubt_soft_blocks(*structures)
     steps = [row["found"].get("admissible_step", inf) for row in rows.values()]
     doubts += doubt_steps_of_sliding(steps, analysis.dt)
+    if lacking := sum(row["found"].get("lacks_joints", False) for row in rows.values()):
+        words = f"in {{}} of {len(rows)} runs blocks were loose, without elastic joints, before "
+        words += "strong motion was over, and none fell"
+        remedy = "`archfem run CASE.toml` says which stones met, and what to do"
+        doubts.append(Doubt(words, remedy, (lacking,)))
     dataset.attrs["doubts"] = write_doubts(doubts)
     contacts = [joint.contact for joint in analysis.structure.joints]
     dataset.attrs["k_n"] = float(np.mean([contact.normal_stiffness for contact in contacts]))
@@ -349,6 +354,7 @@ def evaluate_variation(variation: Variation) -> dict[str, Any]:
         "residual": state.residual,
         "time": np.nan if state.time is None else state.time,
         "admissible_step": state.admissible_step,
+        "lacks_joints": state.lacks_joints,
     }
 
 

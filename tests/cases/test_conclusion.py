@@ -527,23 +527,6 @@ def test_of_unequal_outcomes_the_worst_is_the_first(case):
     assert text.startswith("Under 'first' it falls in none of 2 variations and is disl")
 
 
-@pytest.mark.parametrize(("last", "outcome"), [(4.0, "stands"), (6.0, "stands"), (4.0, "fallen")])
-def test_what_stands_after_most_of_a_motion_as_loose_blocks_is_in_doubt(case, last, outcome):
-    """Of 10 s; a fall is followed so, and where its joints end says nothing against it."""
-    data = data_of(case, a=verdict_of(outcome))
-    data.runs["a"].time = np.array([0.0, last])
-    data.runs["a"].dataset.attrs["ended"] = "met"
-    vars(data)["motions"] = {"a": af.Motion(np.zeros(1001), 0.01)}
-    said = [str(doubt) for _, doubt in doubts.list_doubts(data)]
-    words = (
-        "under 'a': from 4 s on, for 60% of the motion, blocks were followed as loose rigid ones"
-    )
-    expected = (last, outcome) == (4.0, "stands")
-    assert [text.partition(": |e|")[0] for text in said] == [words] * expected
-    data.runs["a"].dataset.attrs["ended"] = "finished"
-    assert doubts.list_doubts(data) == []
-
-
 def test_doubts_of_several_motions_are_one(case):
     """With the ranges of their numbers; names differ in kind."""
     given = [

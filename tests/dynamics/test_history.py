@@ -8,7 +8,8 @@ import pytest
 import xarray as xr
 
 import archfem as af
-from archfem.dynamics import History, first_mechanisms, partial_history
+from archfem.dynamics import CollapseState, History, first_mechanisms, partial_history
+from archfem.dynamics.history import LOOSE_BLOCKS, MEETING_REMEDY, with_fall
 from archfem.dynamics.recorder import corner_displacements
 
 DAMPING = af.Rayleigh(0.05, (8.0, 16.0))
@@ -234,7 +235,7 @@ def test_attributes_that_no_run_has_are_refused_by_name(
 ):
     """Whoever changes a file can seal it again. The first value is read from a file."""
     fall = {"fall": "stands", "fall_time": np.nan, "fall_blocks": ""}
-    whole = few_instants.assign_attrs(fall, fall_residual=0.0, fall_resting=1)
+    whole = few_instants.assign_attrs(fall, fall_residual=0.0, fall_resting=1, fall_loose_share=0.0)
     path = tmp_path / "run.nc"
     refused = partial(
         pytest.raises, af.InvalidInput, match=f"lacks attribute {name}, or has something else"
@@ -267,6 +268,35 @@ def test_variables_that_no_run_has_are_refused_by_name(few_instants, run, tmp_pa
         path = History(dataset).save(tmp_path / "run.nc")
         with pytest.raises(af.InvalidInput, match=f"lacks {name}, or has"):
             History.read(path, run.structure)
+
+
+@pytest.mark.parametrize(
+    ("ended", "kind", "share", "doubted"),
+    [
+        ("met", "stands", 0.06, True),
+        ("met", "stands", 0.04, False),  # strong motion ends at 95 % of the Arias intensity
+        ("parted", "dislocated", 0.06, True),
+        ("parted", "partly fallen", 0.9, False),
+        ("met", "fallen", 0.9, False),
+    ],
+)
+def test_blocks_that_were_loose_in_strong_motion_and_did_not_fall_are_in_doubt(
+    ended, kind, share, doubted, run
+):
+    fall = CollapseState(kind, None, (), 0.0, 0.0, True, loose_share=share)
+    outcome = "ended with joints, and went on with loose blocks, by stones meeting: 'a' met 'b'"
+    dataset = run.dataset.assign_attrs(ended=ended, outcome=outcome, displacement=0.0)
+    loose = with_fall(History(dataset, run.structure), fall)
+    found = [doubt for doubt in loose.doubts if doubt.words == LOOSE_BLOCKS]
+    assert len(found) == doubted
+    for doubt in found:
+        assert doubt.example == "'a' met 'b'"
+        assert doubt.values == (run.time[-1], share)
+        assert (doubt.remedy == MEETING_REMEDY) == (ended == "met")
+    until = f" until {run.time[-1]:.2f} s"
+    assert loose.verdict.until == until
+    assert (f"(with joints{until})" in str(loose.verdict)) == doubted
+    assert loose.with_doubts(loose.doubts).doubts == loose.doubts  # is not stored
 
 
 @pytest.mark.parametrize("ended", ["interrupted", "failed"])

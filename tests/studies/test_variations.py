@@ -76,6 +76,22 @@ def test_steps_that_do_not_follow_sliding_are_a_doubt(column, motion, calls, mon
     assert "analysis.dt=0.002" in doubt.remedy
 
 
+def test_runs_without_joints_in_strong_motion_are_a_doubt(column, motion, calls, monkeypatch):
+    """As given and with half the step; strong motion ends at 95 % of the Arias intensity."""
+    options = {"vary": {**HELD, "dt": ("as given", "half")}, "samples": 1, "dt": 0.005}
+    for kind, half, count in (("stands", 0.06, 1), ("dislocated", 0.04, 0), ("fallen", 0.06, 0)):
+
+        def meet(analysis, motion, kind=kind, half=half, **options):
+            share = 0.0 if analysis.dt == 0.005 else half
+            fall = replace(STANDS, kind=kind, loose_share=share)
+            return SimpleNamespace(fall=fall, ending=af.dynamics.Ending.MET)
+
+        monkeypatch.setattr(evaluators, "time_history", meet)
+        doubts = af.verdict_range(column, motion, **options).doubts
+        assert len(doubts) == count
+        assert all("of 3 runs blocks were loose" in doubt.cause for doubt in doubts)
+
+
 def test_contacts_motion_and_step_reach_the_run(column, motion, calls):
     found = evaluate(column, motion)
     (same, moved, dt, *_) = calls.pop()
@@ -85,6 +101,7 @@ def test_contacts_motion_and_step_reach_the_run(column, motion, calls):
         "residual": 0.01,
         "time": pytest.approx(np.nan, nan_ok=True),
         "admissible_step": np.inf,
+        "lacks_joints": False,
     }
     assert (same, dt) == (column, 0.005)
     assert np.array_equal(moved.horizontal, motion.horizontal)

@@ -602,7 +602,7 @@ def describe_mechanism(verdict: Any) -> str:
     for definition in ("verified", *verdict.mechanisms):
         if (found := verdict.mechanisms.get(definition)) is not None:
             return f"{'by ' * (definition != 'verified')}{definition}, {found}"
-    return "none by any definition"
+    return f"none by any definition{verdict.until}"
 
 
 def describe_lost(structure: Structure, falls: Sequence[CollapseState]) -> str:

@@ -11,7 +11,7 @@ from archfem.cases.report.motion_rules import check_motions, note_checks
 from archfem.cases.report.report_data import ReportData
 from archfem.cases.report.study_findings import list_studied, read_study
 from archfem.dynamics.collapse_state import COLLAPSE_STATES, FALLEN_STATES, RANGE_REMEDY
-from archfem.dynamics.history import Ending, History
+from archfem.dynamics.history import History
 from archfem.dynamics.verdict_range import MAX_RATIO_OF_DISPLACEMENTS, VerdictRange, property_text
 from archfem.masonry.joint_closing import finish_range
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
@@ -43,7 +43,6 @@ def list_varied(data: ReportData) -> tuple[str, ...]:
 def list_doubts(data: ReportData) -> list[tuple[str, Doubt]]:
     """Return each result in doubt with its doubts, each kind once, of the runs that have it."""
     ranges, doubts = data.verdict_ranges, [(HISTORIES, doubt) for doubt in _merge_runs(data)]
-    doubts += [(HISTORIES, doubt) for doubt in _merge_motions(_doubt_loose(data))]
     several = max(len(ranges), len(data.runs)) > 1
     varied = list[Doubt]()
     for found in ranges:
@@ -76,18 +75,6 @@ def _merge_runs(data: ReportData) -> Iterator[Doubt]:
     for same in group_doubts(x for each in verdicts for x in each.doubts):
         count = sum(any(doubt in same for doubt in each.doubts) for each in verdicts)
         yield merge_doubts(same, f"{count} of {len(verdicts)} runs" * (len(verdicts) > 1))
-
-
-def _doubt_loose(data: ReportData) -> Iterator[Doubt]:
-    """Yield a doubt of each run without a fall in which most of the motion moved loose blocks."""
-    for name, run in data.runs.items():
-        loose = Ending(run.dataset.attrs.get("ended", Ending.FINISHED)).is_loose
-        if loose and run.verdict.outcome not in FALLEN_STATES:
-            last, whole = float(run.time[-1]), data.motions[name].duration
-            if (share := 1.0 - last / whole) > 0.5:
-                words = "from {:.3g} s on, for {:.0%} of the motion, blocks were followed as loose "
-                words += "rigid ones: |e|, V / N and mechanisms are of the time before"
-                yield Doubt(words, values=(last, share), place=name)
 
 
 def _merge_motions(doubts: Iterable[Doubt]) -> Iterator[Doubt]:

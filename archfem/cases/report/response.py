@@ -159,8 +159,8 @@ def _tabulate_joints(data: ReportData, run: History) -> Grid:
     )
     caption = " ".join([caption, *(note for flag, note in notes.items() if flag in empty)])
     caption += f" {sentence(assessed)}" if assessed else ""
-    if run.ending.is_loose:
-        caption += f" All are of the time until {run.time[-1]:.2f} s, before blocks were loose."
+    if until := run.verdict.until:
+        caption += f" All are of the time{until}, before blocks were loose."
     head, cells = [head[k] for k in filled], [[row[k] for k in filled] for row in rows]
     if len(head) <= 5 and len(cells) > 12:  # in two halves side by side
         half = (len(cells) + 1) // 2
