@@ -142,12 +142,14 @@ def tabulate_runs(runs: Mapping[str, History]) -> ResultTable:
         row += [_mechanism_cell(verdict, definition) for definition in ALL_DEFINITIONS]
         rows.append([*row, f"{endings.get(run.ending, run.ending)} {run.time[-1]:.2f} s"])
     verdicts = [run.verdict for run in runs.values()]
-    least = "≥ " * any(verdict.until for verdict in verdicts)
     counts = [
-        f"{least}{sum(x.mechanisms.get(name) is not None for x in verdicts)} of {len(runs)}"
-        if any(name in verdict.mechanisms for verdict in verdicts)
+        # where joints were not followed to the end there may be more
+        f"{'≥ ' * any(found is None and x.until for x, found in own)}"
+        f"{sum(found is not None for _, found in own)} of {len(runs)}"
+        if own
         else "-"  # the definition does not apply
         for name in ALL_DEFINITIONS
+        for own in [[(x, x.mechanisms[name]) for x in verdicts if name in x.mechanisms]]
     ]
     rows.append(["all", *["-"] * (len(RUN_COLUMNS) - 1), *counts, "-"])
     return ResultTable([*RUN_COLUMNS, *ALL_DEFINITIONS, "end"], rows)
