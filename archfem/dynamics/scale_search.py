@@ -225,7 +225,11 @@ def doubt_searches(searches: Mapping[str, MechanismScales], definition: str) -> 
             made = f"{len(scales.runs)} run{'s' * (len(scales.runs) != 1)}"
             words = f"the search was interrupted after {made}"
             doubts.append(Doubt(words, "the same command continues it", (), settings))
-        for run in list_bounds(scales, definition):
+        ends = [run.scale for run in list_bounds(scales, definition)]
+        # with joints a run below a fall may fall too
+        loose = [run.scale for run in scales.runs if run.fall and run.fall.lacks_joints]
+        ends += [scale for scale in loose if scale < bracket.upper]
+        for run in (run for run in scales.runs if run.scale in ends):
             place = f"{run.scale:#.3g} × {settings}".strip()
             of_runs += [replace(doubt, place=place) for doubt in run.doubts]
     for same in group_doubts(of_runs):

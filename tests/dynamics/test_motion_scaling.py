@@ -723,6 +723,23 @@ def test_a_doubt_of_the_model_is_not_repeated_as_one_of_its_runs():
     assert [doubt.cause for doubt in found.doubts] == ["fill in one piece", "energy drifts"]
 
 
+@pytest.mark.parametrize(
+    ("scale", "share", "doubted"), [(0.5, 0.06, True), (0.5, 0.04, False), (3.0, 0.06, False)]
+)
+def test_a_run_without_joints_below_a_fall_is_in_doubt(scale, share, doubted):
+    """Brackets are from 1 to 2: with joints it may have fallen before, and above that is known."""
+    search, doubt = fallen(0.5, 1.0, -2.0, 3.0), Doubt("blocks were loose")
+    runs = tuple(
+        replace(run, fall=replace(run.fall, loose_share=share), doubts=(doubt,))
+        if run.scale == scale
+        else run
+        for run in search.runs
+    )
+    said = [str(x) for x in CollapseScale({0.005: replace(search, runs=runs)}).doubts]
+    words = f"at {scale:#.3g} × by 5 ms: blocks were loose"
+    assert [x for x in said if "loose" in x] == [words] * doubted
+
+
 def test_doubts_of_many_runs_are_logged_once_by_kind(caplog):
     def shaken(scale):
         log.warning("%s", Doubt("it slips by {:mm}", "", (1e-3 * scale,)))
