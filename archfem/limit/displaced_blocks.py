@@ -20,7 +20,7 @@ from scipy.sparse import csgraph, csr_matrix
 from archfem._typing import Array, Flags, Numbers
 from archfem.errors import DidNotConverge
 from archfem.joints.rigid_kinematics import jump_entries, jump_rates
-from archfem.limit.linear_programme import NoEquilibrium, solve_linear
+from archfem.limit.linear_programme import HELD_SHARE, NoEquilibrium, solve_linear
 from archfem.masonry.block import rotate
 from archfem.masonry.loads import AttachedLoad
 from archfem.masonry.structure import Structure, largest_displacement
@@ -137,8 +137,13 @@ class PlacedBlocks:
     def dead(self) -> Array:
         """Weights and constant forces, about the centroids (n_blocks, 3) [N, N, N m]."""
         forces = [(k, place, (0.0, -weight)) for k, place, weight in self.masses]
-        forces += [(k, place, load.force) for k, place, load in self.attached]
+        forces += [(k, place, x.force) for k, place, x in self.attached if not x.passive]
         return self._resultants(forces)
+
+    @cached_property
+    def ties(self) -> list[tuple[int, Array, tuple[float, float]]]:
+        """Block, present place and largest force of each tie [m, N]."""
+        return [(k, place, x.force) for k, place, x in self.attached if x.passive and any(x.force)]
 
     @cached_property
     def live(self) -> Array:
@@ -314,12 +319,22 @@ class Bodies:
         return np.concatenate([normal, along]), places, bodies, self.references
 
     @cached_property
-    def fill_forces(self) -> tuple[csr_matrix, csr_matrix]:
-        """Return generalised least and further forces of the fill, each (n, 3 n_bodies)."""
+    def tie_forces(self) -> csr_matrix:
+        """Generalised largest forces of the ties (n_ties, 3 n_bodies)."""
+        ties = self.blocks.ties
+        pairs = np.array([(-1, self.body[k]) for k, *_ in ties], dtype=np.intp).reshape(-1, 2)
+        forces, places = (np.array([tie[i] for tie in ties]).reshape(-1, 2) for i in (2, 1))
+        return jump_rates(forces, places, pairs, self.references)
+
+    @cached_property
+    def bounded_forces(self) -> tuple[csr_matrix, csr_matrix]:
+        """Return generalised least forces of the fill, and those that it and the ties may add.
+
+        Each is (n, 3 n_bodies); of the latter a share from 0 to 1 acts.
+        """
         fill, blocks = self.blocks.fill, self.blocks
         if fill is None:
-            none = csr_matrix((0, 3 * self.count))
-            return none, none
+            return csr_matrix((0, 3 * self.count)), self.tie_forces
         arms = fill.points - blocks.structure.centroids[fill.block]
         turned = rotate(arms, blocks.displacement[fill.block, 2])
         body = self.body[fill.block]
@@ -330,14 +345,15 @@ class Bodies:
                 fill.forces, turned + blocks.centroids[fill.block], strict=True
             )
         )
-        return least, fill.shared.T @ further
+        return least, sparse.vstack([fill.shared.T @ further, self.tie_forces], format="csr")
 
     def dead_forces(self, velocity: Array | None = None) -> Array:
         """Return the generalised forces that do not grow (3 n_bodies,).
 
-        The fill presses actively, and passively where a velocity moves a stone into it.
+        The fill presses actively, and passively where a velocity moves a stone into it. A tie that
+        it stretches pulls with all of its force.
         """
-        least, further = self.fill_forces
+        least, further = self.bounded_forces
         dead = self.generalised(self.blocks.dead) + least.sum(axis=0).A1
         if velocity is not None:
             dead += further.T @ (further @ velocity < 0.0)
@@ -352,23 +368,41 @@ def find_mechanism(
     # factor at which they balance the loads is sought; its dual is the motion. Without dilatancy,
     # if `flat`, |T| <= μ N₀ with N₀ of the solution before, until it repeats (Gilbert, Casapulla
     # and Ahmed, Comput. Struct. 84 (2006) 873-887).
-    among = set(joints)
-    welded = [k for k in range(len(blocks.structure.joints)) if k not in among]
-    bodies = Bodies(blocks, merge_blocks(blocks.structure, welded))
-    if not bodies.count:
-        return None
-    contacts = blocks.touching(joints)
-    coefficient = friction[[contact.joint for contact in contacts]]
-    if (solution := _solve_static(bodies, contacts, coefficient)) is None:
+    bodies, contacts, coefficient = given = _select_bodies(blocks, joints, friction)
+    if not bodies.count or (solution := _solve_static(*given)) is None:
         return None
     factor, velocity, forces = solution
     if flat:
-        factor, velocity = _solve_flat(bodies, contacts, coefficient, forces)
+        factor, velocity = _solve_flat(bodies, contacts, coefficient, forces[: len(contacts)])
     motion = bodies.spread(velocity)
     speed = blocks.largest_speed(motion)
     dilates = np.zeros(len(contacts)) if flat else coefficient
     found = classify_motion(blocks, joints, motion / speed, dilates, contacts, factor)
     return replace(found, is_flat=flat)
+
+
+def find_least_pulls(
+    blocks: PlacedBlocks, joints: Sequence[int], friction: Array, factor: float
+) -> Array:
+    """Return the least forces of the ties by which the blocks bear a factor (n_ties,) [N]."""
+    if not blocks.ties:
+        return np.zeros(0)
+    given = _select_bodies(blocks, joints, friction)
+    solution = _solve_static(*given, fixed=HELD_SHARE * factor)
+    assert solution is not None  # a sum of magnitudes is bounded from below
+    sizes = np.array([np.hypot(*force) for *_, force in blocks.ties])
+    return np.asarray(sizes * solution[2][-1 - len(sizes) : -1])
+
+
+def _select_bodies(
+    blocks: PlacedBlocks, joints: Sequence[int], friction: Array
+) -> tuple[Bodies, list[Contact], Array]:
+    """Return the bodies between the joints that may move, their contacts and friction."""
+    among = set(joints)
+    welded = [k for k in range(len(blocks.structure.joints)) if k not in among]
+    contacts = blocks.touching(joints)
+    coefficient = friction[[contact.joint for contact in contacts]]
+    return Bodies(blocks, merge_blocks(blocks.structure, welded)), contacts, coefficient
 
 
 def _solve_flat(
@@ -386,7 +420,7 @@ def _solve_flat(
         if abs(factor - before) <= 1e-7 * abs(factor):
             return factor, velocity
         # half steps: whole ones may alternate between two states
-        before, forces = factor, 0.5 * (forces + found)
+        before, forces = factor, 0.5 * (forces + found[: len(contacts)])
     raise DidNotConverge(
         "no mechanism was found whose faces slide without dilatancy: af.collapse_factor(…, "
         "friction='nonassociated') searches for one, at rest"
@@ -394,15 +428,20 @@ def _solve_flat(
 
 
 def _solve_static(
-    bodies: Bodies, contacts: Sequence[Contact], coefficient: Array, held: Array | None = None
+    bodies: Bodies,
+    contacts: Sequence[Contact],
+    coefficient: Array,
+    held: Array | None = None,
+    fixed: float | None = None,
 ) -> tuple[float, Array, Array] | None:
-    """Return the largest factor, velocities by duality and normal forces [mean body weights].
+    """Return the largest factor, velocities by duality and the unknowns [mean body weights].
 
-    With `held` normal forces, friction is limited by these.
+    With `held` normal forces, friction is limited by these. At a `fixed` factor the forces of the
+    ties are the least.
     """
     normal, along = bodies.sparse_rates(contacts)
     dead, live = bodies.dead_forces(), bodies.generalised(bodies.blocks.live)
-    further = bodies.fill_forces[1]
+    further = bodies.bounded_forces[1]
     # forces in mean body weights and lengths in metres over the size keep coefficients near one
     unit = np.abs(bodies.blocks.dead[:, 1]).sum() / bodies.count
     count, slides = len(contacts), np.isfinite(coefficient)
@@ -416,16 +455,19 @@ def _solve_static(
     pieces = further.shape[0]
     none = csr_matrix((slope.shape[0], pieces + 1))
     limits = sparse.bmat([[-slope, one, none], [-slope, -one, none]], format="csr")
-    # forces across joints, along them, shares of passive pressure, and the factor, maximised
+    # forces across joints, along them, shares of passive pressure and ties, and the factor
     anything, share = [-np.inf, np.inf], [0.0, 1.0]
     kinds, numbers = [[0.0, np.inf], anything, share, anything], [count, count, pieces, 1]
     bounds = np.repeat(kinds, numbers, axis=0)
     cost = np.append(np.zeros(2 * count + pieces), -1.0)
+    if fixed is not None:
+        sizes = [np.hypot(*force) / unit for *_, force in bodies.blocks.ties]
+        bounds[-1], cost = fixed, np.append(np.zeros(len(cost) - 1 - len(sizes)), [*sizes, 0.0])
     equations = sparse.diags(bodies.units) @ balance, -bodies.units * dead / unit
     if (result := solve_linear(cost, bounds, equations, (limits, strength))) is None:
         return None
     velocity = -bodies.units * np.array(result.eqlin.marginals)
-    return float(result.x[-1]), velocity, result.x[:count]
+    return float(result.x[-1]), velocity, result.x
 
 
 def classify_motion(

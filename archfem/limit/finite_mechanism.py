@@ -53,6 +53,7 @@ class PathEnd(ExplainedWord):
     COLLIDES = "collides", "at the end it runs into blocks that it has no joint with"
     ENDURES = "endures", "it still needs a force where the path is cut off"
     UNRESOLVED = "unresolved", "at the end no mechanism was found whose faces slide flat"
+    HELD = "held", "at the end a tie holds its point, and the motion is followed no further"
     SLIDES = "slides", "it slides without turning, up to the ends of the faces as drawn"
 
 
@@ -158,6 +159,14 @@ class LinkageState:
         if speed <= STILL * self.blocks.largest_speed(self.bodies.spread(previous)):
             return None
         return velocity / speed
+
+    def is_tied(self, velocity: Array) -> bool:
+        """Return whether a tie holds a point of a body that moves, neither stretched nor slack."""
+        rates = self.bodies.tie_forces @ velocity
+        return any(
+            self.bodies.body[block] >= 0 and abs(rate) <= STILL * np.hypot(*force)
+            for rate, (block, _, force) in zip(rates, self.blocks.ties, strict=True)
+        )
 
     def corrected(self, iterations: int = 12) -> "LinkageState | None":
         """Return the nearest state that fulfils the constraints, by Newton's method."""
@@ -429,6 +438,9 @@ class PathFollower:
             velocity = state.velocity(state.linkage.first_velocity)
             if velocity is None or not self._opens_joints(state, velocity):
                 continue
+            if state.is_tied(velocity):
+                self._record(blocks, trial.factor)
+                raise _Stop(PathEnd.HELD)
             if trial.is_flat or self._presses(state, velocity):
                 return trial, state, velocity
         self._record(blocks, mechanism.factor)

@@ -187,8 +187,8 @@ class AttachedLoad:
         point: where it acts, at rest (x, y) [m].
         weight: that acts downwards and, as a mass, is accelerated with the block [N].
         force: constant force without mass, up positive (2,) [N].
-        passive: whether the force, as that of a tie, acts against horizontal forces alone, and not
-            in the sense in which these push.
+        passive: whether it is that of a tie: any part of `force` acts that equilibrium needs, and
+            along a motion all of it where the tie is stretched, and else none.
 
     Raises:
         InvalidInput: a value is no number, above 1e9 N, or the weight is negative.

@@ -15,6 +15,7 @@ from archfem.limit.displaced_blocks import (
     FillPressure,
     KinematicChain,
     PlacedBlocks,
+    find_least_pulls,
     find_mechanism,
 )
 from archfem.limit.linear_programme import NoEquilibrium
@@ -22,6 +23,7 @@ from archfem.limit.mechanism_kinematics import find_rigid_regions
 from archfem.masonry.loads import AttachedLoad
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import Structure, join_names
+from archfem.units import kN
 
 
 class DoesNotStand(InvalidInput):
@@ -89,9 +91,11 @@ def find_first_mechanism(
     placed: PlacedBlocks, joints: list[int], coefficient: Array
 ) -> KinematicChain | None:
     """Return the mechanism of least factor at rest; None where there is none."""
+    why = "af.stands and `archfem check` say why"
+    if any(any(load.force) and not load.passive for load in placed.loads):
+        why = "their forces act whole; a tie, which bears up to its force, is `passive = true`"
     refusal = DoesNotStand(
-        f"{placed.structure.name} does not stand under its own weight and the attached loads: "
-        "af.stands and `archfem check` say why"
+        f"{placed.structure.name} does not stand under its own weight and the attached loads: {why}"
     )
     # At rest constant forces may be missing: a tie pulls only once the mechanism moves.
     weights = tuple(replace(load, force=(0.0, 0.0)) for load in placed.loads)
@@ -105,3 +109,20 @@ def find_first_mechanism(
     if any(found is not None and found.factor <= 1e-9 for found in (mechanism, *others)):
         raise refusal
     return mechanism
+
+
+def describe_ties(
+    placed: PlacedBlocks, joints: list[int], coefficient: Array, factor: float
+) -> str:
+    """Describe the forces of the ties at a factor and along the motion; empty without ties."""
+    pulls, needs = find_least_pulls(placed, joints, coefficient, factor), []
+    for pull, (block, _, force) in zip(pulls, placed.ties, strict=True):
+        size, name = float(np.hypot(*force)), placed.structure.blocks[block].name
+        need = f"{pull / kN:.4g}" if pull > 1e-4 * size else "none"
+        needs.append(f"{need} of the {size / kN:.4g} kN of the tie at {name}")
+    if not needs:
+        return ""
+    return (
+        f"alpha_0 needs {join_names(needs)}; along the motion a tie pulls with all of its force "
+        "where it is stretched, and else with none: verify bar and anchor"
+    )

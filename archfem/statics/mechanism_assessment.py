@@ -67,6 +67,7 @@ from archfem.statics.assessment_checks import (
 )
 from archfem.statics.first_mechanism import (
     DoesNotStand,
+    describe_ties,
     find_first_mechanism,
     press_stones,
     select_joints,
@@ -337,10 +338,6 @@ def kinematic_assessment(  # noqa: PLR0913  (the factors of the codes are argume
         check_between(value, f"{name} [-]", 1.0, most, ends="[]")
     structure = structure_of(structure)
     check_assessable(structure, friction, loads)
-    loads = [
-        replace(x, force=(0.0, 0.0)) if x.passive and x.force[0] * direction > 0.0 else x
-        for x in loads
-    ]
     search = _Search(
         *(structure, spectrum, float(direction), friction, part, blocks, tuple(loads), rules),
         *(confidence_factor, q),
@@ -383,7 +380,8 @@ class _Search:
         if mechanism is None:
             return _Oscillator(self, placed, None, 0, bool(weights)).assess()
         path, holds, doubt = self._follow(placed, joints, friction, mechanism)
-        return _Oscillator(self, placed, path, holds, bool(weights), searched=doubt).assess()
+        ties = describe_ties(placed, joints, friction, path.mechanisms[0].factor)
+        return _Oscillator(self, placed, path, holds, bool(weights), False, doubt, ties).assess()
 
     def _follow(
         self, placed: PlacedBlocks, joints: list[int], friction: Array, first: KinematicChain
@@ -506,6 +504,7 @@ class _Oscillator:
     fill: bool  # whether some of the loads are the weight of a fill
     by_body: bool = False  # whether each body that moves as one has one weight
     searched: Doubt | None = None  # about a factor that was searched without dilatancy
+    ties: str = ""  # forces of the ties, in words
 
     @cached_property
     def weights(self) -> tuple[Array, Array]:
@@ -568,7 +567,9 @@ class _Oscillator:
                 "all along the motion the pressures of the fill on the stones are those of the "
                 "weights as built: that the fill stays in place is not checked"
             )
-        if forces := [load.force for load in self.placed.loads if any(load.force)]:
+        found += [self.ties] * bool(self.ties)
+        constant = (load for load in self.placed.loads if not load.passive)
+        if forces := [load.force for load in constant if any(load.force)]:
             pushes = any(force[0] * self.placed.direction > 0.0 for force in forces)
             found.append(
                 "constant forces have no mass, so that they are not pushed, and count from the "
@@ -581,7 +582,8 @@ class _Oscillator:
                 "and faces slide flat here"
             )
         if len(self.path.factors) == 1:
-            why = "this mechanism begins, and its contacts permit no finite motion"
+            why = f"{', or a tie that holds its point,' * bool(self.ties)} permit no finite motion"
+            why = f"this mechanism begins, and its contacts{why}"
             if self.path.end is PathEnd.SLIDES:
                 why = (
                     "this mechanism slides without turning and alpha does not fall as it moves; "

@@ -152,6 +152,41 @@ def test_a_passive_tie_resists_in_one_sense_and_pushes_in_none():
         assert says == [False, not passive]
 
 
+def assess_tied(height, force, direction=1.0):
+    """A strip of two blocks of 0.5 × 2 m and 20 kN each, with a tie at a height."""
+    strip, block = af.column(breadth=0.5, heights=[2.0, 2.0]), f"block {1 if height <= 2.0 else 2}"
+    tie = af.masonry.AttachedLoad(block, (0.0, height), force=(-force, 0.0), passive=True)
+    return af.kinematic_assessment(strip, SPECTRUM, direction=direction, loads=[tie])
+
+
+@pytest.mark.parametrize(
+    ("force", "factor", "pull"), [(3e3, 0.2, 3), (2e4, 0.25, 5), (3e5, 0.25, 5)]
+)
+def test_a_tie_bears_what_equilibrium_needs(force, factor, pull):
+    """By moments about the toe, at 2 m: α 80 = 10 + 2 t; above the tie α = 0.25 / 1, t = 5 kN."""
+    found = assess_tied(2.0, force)
+    assert found.alpha_0 == pytest.approx(factor, rel=1e-4)
+    says = f"alpha_0 needs {pull} of the {force / 1e3:g} kN of the tie at block 1; along the motion"
+    assert found.notes[0].startswith(says)
+    if pull == 5:  # what rocks is the block above, which the tie does not reach
+        alone = af.kinematic_assessment(af.column(breadth=0.5, heights=[2.0]), SPECTRUM)
+        assert found.d_0_star == pytest.approx(alone.d_0_star, rel=1e-4)
+        assert found.displacement.capacity == pytest.approx(alone.displacement.capacity, rel=1e-4)
+    free = assess_tied(2.0, force, direction=-1.0)
+    assert free.alpha_0 == pytest.approx(0.125, rel=1e-4)
+    assert free.notes[0].startswith(f"alpha_0 needs none of the {force / 1e3:g} kN")
+
+
+def test_a_tie_that_holds_its_point_has_no_displacement_check():
+    """Tied at 4 m the halves turn against each other: α 20 (1 + 1) = 20 (0.25 + 0.75), t = 7.5."""
+    found = assess_tied(4.0, 2e4)
+    assert found.alpha_0 == pytest.approx(0.5, rel=1e-4)
+    assert found.notes[0].startswith("alpha_0 needs 7.5 of the 20 kN of the tie at block 2; along")
+    assert found.displacement is None
+    assert "or a tie that holds its point, permit no finite motion: there is no" in found.notes[1]
+    assert assess_tied(4.0, 5e3).alpha_0 == pytest.approx((10.0 + 5.0 * 4.0) / 80.0, rel=1e-4)
+
+
 def test_a_portal(verified):
     """Columns b x h rock about their corners, the lintel moves with their tops: α = tan(β - θ)."""
     b, h, span = 0.5, 2.5, 3.0
@@ -556,7 +591,7 @@ def test_refused_structures_and_rules():
         af.kinematic_assessment(thin, SPECTRUM)
     wall = af.column(breadth=0.6, heights=[2.4])
     push = af.masonry.AttachedLoad(1, (0.0, 2.4), force=(2e4, 0.0))
-    with pytest.raises(af.InvalidInput, match="does not stand"):
+    with pytest.raises(af.InvalidInput, match=r"does not stand .* forces act whole; a tie, which"):
         af.kinematic_assessment(wall, SPECTRUM, loads=[push])
     # pushed to the right it stands, and falls to the left by itself
     leaning = af.Block(((0.0, 0.0), (0.5, 0.0), (-0.4, 1.5), (-0.9, 1.5)), af.STONE, "leaning")
