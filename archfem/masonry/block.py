@@ -250,15 +250,18 @@ class Block:
             met += intersect_arc(self.points[side : side + 2], np.array(self.centre), x)
         return max(met, default=None)
 
-    def distance_to(self, other: "Block") -> float:
-        """Return the distance to another block, zero where they touch [m].
+    def distance_to(self, other: "Block | Point") -> float:
+        """Return the distance to another block or a point, zero where they touch [m].
 
         Args:
-            other: the block.
+            other: the block, or the point (x, y) [m].
         """
         import shapely
 
-        return float(shapely.distance(*(shapely.Polygon(each.drawn()) for each in (self, other))))
+        own = shapely.Polygon(self.drawn())
+        if isinstance(other, Block):
+            return float(shapely.distance(own, shapely.Polygon(other.drawn())))
+        return float(shapely.distance(own, shapely.Point(other)))
 
     def side_of(self, line: Array, near: float) -> int:
         """Return on which side of a line the block lies, if its straight edges cover the line.

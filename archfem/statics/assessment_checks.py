@@ -10,6 +10,7 @@ from archfem._typing import Array
 from archfem._validation import check_between, check_fields
 from archfem.errors import InvalidInput, logger
 from archfem.limit.fill_range import FillAssumption, FillRange
+from archfem.masonry.block import Block
 from archfem.masonry.loads import AttachedLoad
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import Structure
@@ -28,6 +29,9 @@ from archfem.units import STANDARD_GRAVITY
 
 # Outcome of a check that passes with the weights of single blocks alone
 BY_SPLIT = "passes or fails by the split of weights"
+
+# Distance of an attached force, as at an anchor plate, from its block over the block's size [-]
+MAX_OFFSET = 0.1
 
 # Value of a doubt about ratios that are no less than the true one
 UPPER_BOUND = "an upper bound"
@@ -222,12 +226,15 @@ def check_assessable(
             "friction 'nonassociated' is not searched with attached loads or a fill: use 'coulomb'"
         )
     soft = [structure.blocks[number].name for number in find_yielding_blocks(structure)]
-    for name in (structure.blocks[structure.block_number(load.block)].name for load in loads):
-        if name in soft:
+    for load in loads:
+        block = structure.blocks[structure.block_number(load.block)]
+        if block.name in soft:
             raise InvalidInput(
-                f"a load is attached to '{name}', which is fill and no stone: stand it on the "
-                "fill, [structure.standing] of a case, or name the stone below"
+                f"a load is attached to '{block.name}', which is fill and no stone: stand it on "
+                "the fill, [structure.standing] of a case, or name the stone below"
             )
+        if any(load.force):  # masses may have their centre far from the block that carries them
+            _check_place(load, block)
     if (structure.tension > 0.0).any():
         raise InvalidInput(
             "joints have tensile strength, which breaks before a mechanism forms: give contacts "
@@ -239,6 +246,18 @@ def check_assessable(
             "joints have a cohesion of %.3g Pa, which the assessment leaves out: its factor is on "
             "the safe side, and joints slide that might hold; collapse_factor counts cohesion",
             cohesion,
+        )
+
+
+def _check_place(load: AttachedLoad, block: Block) -> None:
+    """Refuse a force that acts away from its block, as at a mistyped height."""
+    near, away = MAX_OFFSET * np.ptp(block.points, axis=0).max(), block.distance_to(load.point)
+    if away > near:
+        (left, low), (right, high) = block.points.min(axis=0), block.points.max(axis=0)
+        raise InvalidInput(
+            f"an attached force acts at {load.point} m, {away:.3g} m from '{block.name}' (x from "
+            f"{left:.4g} to {right:.4g} m, y from {low:.4g} to {high:.4g} m), above the "
+            f"{near:.3g} m of an anchor: correct its point, or name the block there"
         )
 
 

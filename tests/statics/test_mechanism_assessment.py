@@ -187,6 +187,19 @@ def test_a_tie_that_holds_its_point_has_no_displacement_check():
     assert assess_tied(4.0, 5e3).alpha_0 == pytest.approx((10.0 + 5.0 * 4.0) / 80.0, rel=1e-4)
 
 
+def test_a_force_acts_on_its_block():
+    """A mistyped height of 2.7 m on a block that ends at 2 m; a mass may stand above its block."""
+    strip = af.column(breadth=0.5, heights=[2.0, 2.0])
+    force = af.masonry.AttachedLoad("block 1", (0.0, 2.7), force=(-2e3, 0.0), passive=True)
+    says = (
+        r"2\.7\) m, 0\.7 m from 'block 1' \(x .* y from 0 to 2 m\), above the 0\.2 m of an anchor"
+    )
+    with pytest.raises(af.InvalidInput, match=says):
+        af.kinematic_assessment(strip, SPECTRUM, loads=[force])
+    for load in (replace(force, point=(0.0, 2.19)), replace(force, force=(0.0, 0.0), weight=1e3)):
+        assert af.kinematic_assessment(strip, SPECTRUM, loads=[load]).alpha_0 > 0.0
+
+
 def test_a_portal(verified):
     """Columns b x h rock about their corners, the lintel moves with their tops: α = tan(β - θ)."""
     b, h, span = 0.5, 2.5, 3.0
@@ -477,7 +490,7 @@ def test_a_body_on_the_fill_is_weight_and_mass_and_no_load_is_attached_to_fill()
     load = af.masonry.AttachedLoad("backfill", (3.5, 1.5), weight=30e3)
     with pytest.raises(af.InvalidInput, match=r"'backfill', which is fill and no stone: stand it"):
         af.kinematic_assessment(bridge, SPECTRUM, loads=[load])
-    own = af.masonry.AttachedLoad(bridge.free[0], (3.0, 1.0), force=(0.0, -1.0))
+    own = af.masonry.AttachedLoad(bridge.free[0], (2.2, 0.2), force=(0.0, -1.0))
     noted = af.kinematic_assessment(bridge, SPECTRUM, loads=[own])
     assert any("constant forces have no mass" in note for note in noted.notes)
 
