@@ -264,7 +264,10 @@ def _convert(text: str, unit: str, key: str) -> float:
         raise
     except pint.DimensionalityError as error:
         if unit == "1":
-            raise InvalidInput(f"{key} = {text!r} has a unit, and this is a pure number") from error
+            plain = f", in g if it is an acceleration: write {number}" * (name == "g")
+            raise InvalidInput(
+                f"{key} = {text!r} has a unit, and this is a pure number{plain}"
+            ) from error
         hint = f" ({question})" if (question := _suggest_unit(text, unit)) else f": {error}"
         reason = f"is not in a unit like {target}{hint}"
         plain = f'has no unit: write a number, or "{text} {target}"'

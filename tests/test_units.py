@@ -54,6 +54,11 @@ def test_a_comma_in_a_number_is_refused(text):
         af.units.in_unit(text, "m", "length")
 
 
+def test_an_acceleration_as_a_multiple_of_g_is_refused_with_its_number():
+    with pytest.raises(af.InvalidInput, match=r"ag = '0\.22 g' .* if it is an acc.*: write 0\.22$"):
+        af.units.in_unit("0.22 g", "1", "ag")
+
+
 def test_a_number_as_a_text_is_refused_with_its_remedy():
     with pytest.raises(af.InvalidInput, match=r"x = '2\.25' has no unit: .* or \"2\.25 m\""):
         af.units.in_unit("2.25", "m", "x")
