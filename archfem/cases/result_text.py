@@ -292,7 +292,20 @@ def describe_depths(structure: Structure) -> str:
     return (
         f"depth of joints: {format_mm(float(depths.min()))} at least, at "
         f"{structure.joints[int(depths.argmin())].name}; median {join_names(medians)}\n"
-        f"{describe_spans(structure)}"
+        f"{describe_spans(structure)}{_name_slivers(structure)}"
+    )
+
+
+def _name_slivers(structure: Structure, share: float = 0.25) -> str:
+    """Return a line on stones of a wall in bond that are far shorter than most; else nothing."""
+    lengths = {each.name: np.ptp(each.points[:, 0]) for each in structure.blocks if not each.fixed}
+    usual = float(np.median([*lengths.values()]))
+    slivers = [f"'{k}' ({format_mm(x)})" for k, x in lengths.items() if x < share * usual]
+    if not slivers or not structure.heads.any():
+        return ""
+    return (
+        f"\nstones shorter than {share:g} of the usual {format_mm(usual)}: {join_names(slivers)}; "
+        "put jambs of openings above one another, or further apart"
     )
 
 

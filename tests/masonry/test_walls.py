@@ -1,5 +1,6 @@
 """Walls in bond by a few lengths, against areas by hand, stones laid one by one, closed forms."""
 
+import re
 from itertools import pairwise
 
 import numpy as np
@@ -7,6 +8,7 @@ import pytest
 from bonded import bonded_wall
 
 import archfem as af
+from archfem.cases.result_text import describe_depths
 from archfem.errors import InvalidStructure
 
 CONTACT = af.Contact(1.48e9, 0.3e9, friction=0.6)
@@ -107,6 +109,34 @@ def test_opening_takes_its_area_or_is_refused(opening, area):
         return
     wall = af.shapes.wall(**lengths)
     assert sum(wall.blocks[k].area for k in wall.free) == pytest.approx(area)
+
+
+def test_stones_far_shorter_than_most_are_named():
+    """A jamb of the window is 0.25 m from one of the door: half of it is 125 mm."""
+    lengths = {
+        "breadth": 6.2,
+        "height": 6.1,
+        "eaves": 4.2,
+        "width": 0.55,
+        "course": 0.3,
+        "stone": 0.75,
+    }
+    door, window = lay_opening(-0.6, 0.6, 0.0, 2.1), lay_opening(-0.35, 0.35, 3.0, 3.9)
+    says = describe_depths(af.shapes.wall(**lengths, openings=[door, window])).splitlines()
+    assert says[2].startswith("stones shorter than 0.25 of the usual 7")
+    assert re.findall(r"\((\d+) mm\)", says[2]) == ["125", "125"]
+    aligned = lay_opening(-0.6, 0.6, 3.0, 3.9)
+    whole = describe_depths(af.shapes.wall(**lengths, openings=[door, aligned]))
+    assert len(whole.splitlines()) == 2
+
+
+def test_a_course_is_no_taller_than_the_wall():
+    """30 m typed for 0.30 m; a course of the whole height is one."""
+    with pytest.raises(
+        InvalidStructure, match=r"course \[m\] = 30.0 is not between 0 and 2.1: a co"
+    ):
+        af.shapes.wall(breadth=6.0, height=2.1, width=0.5, course=30.0)
+    assert af.shapes.wall(breadth=6.0, height=2.1, width=0.5, course=2.1).heads.any()
 
 
 @pytest.mark.parametrize(

@@ -99,6 +99,10 @@ def wall(  # noqa: PLR0913  (all are lengths and properties of one structure)
     lengths = {"breadth": breadth, "height": height, "course": course, "stone": stone}
     for key, length in lengths.items():
         check_between(length, f"{key} [m]", 0.0, 1e3, error=InvalidStructure)
+    taller = "a course is no taller than the wall"
+    check_between(
+        course, "course [m]", 0.0, height, ends="(]", remedy=taller, error=InvalidStructure
+    )
     shoulder = height if eaves is None else eaves
     check_between(shoulder, "eaves [m]", 0.0, height, ends="[]", error=InvalidStructure)
 
