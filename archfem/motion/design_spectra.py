@@ -358,7 +358,10 @@ class TableSpectrum:
         """Interpolate a row of the table linearly."""
         natural = _validate_periods(periods, self.periods[-1])
         if np.any(natural < self.periods[0]):
-            raise InvalidInput(f"period below the table's first, {self.periods[0]:g} s")
+            raise InvalidInput(
+                f"period {natural.min():g} s is below the table's first, {self.periods[0]:g} s: "
+                "begin the table at 0 s, with the peak acceleration"
+            )
         return np.interp(natural, self.periods, row)
 
 

@@ -156,7 +156,7 @@ def test_table_is_straight_between_its_points():
         (lambda: TableSpectrum([0.0, 0.0], [1.0, 1.0]), "a row that grows"),
         (lambda: TableSpectrum([0.0, 1.0], [1.0, -1.0]), "2 positive values"),
         (lambda: TableSpectrum([0.0, 1.0], [1.0, 1.0]).vertical(0.5), "has no vertical"),
-        (lambda: TableSpectrum([0.1, 1.0], [1.0, 1.0]).horizontal(0.05), "below the table's"),
+        (lambda: TableSpectrum([0.1, 1.0], [1.0, 1.0]).horizontal(0.05), "begin the table at 0 s"),
     ],
 )
 def test_spectra_that_codes_do_not_define_are_refused(build, message):
