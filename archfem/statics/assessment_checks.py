@@ -25,7 +25,7 @@ from archfem.motion.design_spectra import (
 )
 from archfem.motion.motion import Motion
 from archfem.motion.response_spectra import response_spectrum
-from archfem.units import STANDARD_GRAVITY
+from archfem.units import STANDARD_GRAVITY, format_ratio
 
 # Outcome of a check that passes with the weights of single blocks alone
 BY_SPLIT = "passes or fails by the split of weights"
@@ -41,8 +41,9 @@ UPPER_BOUND = "an upper bound"
 class LimitState:
     """Displacement check of a code: capacity, period and damping of the equivalent oscillator.
 
-    The capacity is d_u* = share d₀*. Its period is T = period_factor π √(d_T / a*(d_T)) with
-    d_T = secant_share d_u*, and the demand is the displacement spectrum up to T.
+    The capacity is d_u* = share d₀*. Its period is T = period_factor π √(d_T FC / a*(d_T)) with
+    d_T = secant_share d_u*, and the demand is the displacement spectrum up to T. The confidence
+    factor FC divides the accelerations of the curve, as in C8.7.1.2.1.3 (from memory).
 
     Attributes:
         name: name of the code and limit state.
@@ -167,7 +168,7 @@ class AssessmentCheck:
     def ratios(self) -> str:
         """The ratio as text, or its range over all assumptions on a fill."""
         over = self.over_fill
-        return f"{self.ratio:.3g}" if over is None else over.format_ends(digits=3)
+        return format_ratio(self.ratio) if over is None else over.format_ends(digits=3)
 
     @property
     def least(self) -> float:

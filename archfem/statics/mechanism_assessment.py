@@ -213,13 +213,14 @@ class KinematicAssessment(ResultDisplay):
             many = not hinges and sliding and slides_anywhere(self.structure, self.alpha_0)
             vanishes = f", d_0* = {self.d_0_star:.4g} m, T_s = {self.T_s:.3f} s"
             weight = self.M_star * self.structure.gravity / self.e_star / kN
+            divided = f", which the checks divide by FC = {self.confidence_factor:g}"
             lines += [
                 f"{name_mechanism(self.structure, self.path.velocity)}{ONE_OF_MANY * bool(many)}; "
                 f"hinges: {hinges or 'none'}; sliding: {sliding or 'none'}",
                 f"alpha_0 = {self.alpha_0:.4g}, e* = {self.e_star:.3f} of the {weight:.4g} kN that "
                 f"move, M* = {self.M_star:.4g} kg{' of this body' * bool(many)}, "
                 f"a_0* = {self.a_0_star:.4g} m/s² ({self.a_0_star / STANDARD_GRAVITY:.3f} g)"
-                f"{vanishes if np.isfinite(self.d_0_star) else ''}",
+                f"{divided}{vanishes if np.isfinite(self.d_0_star) else ''}",
             ]
             changes = [event.text for event in self.path.events if event.text != self.path.end]
             lines += (
@@ -300,7 +301,7 @@ def kinematic_assessment(  # noqa: PLR0913  (the factors of the codes are argume
         fill: strength of the fill, a `Fill`; None leaves its pressure out. The bounds of a
             `PlasticFill` have no finite motion. In a case that of [limit], unless one is given.
         limit_state: rules of the displacement check: "NTC-2018 SLV" (d_u* = 0.4 d₀*, T = 1.68 π
-            √(d_u*/a*), 8 % damping; Circolare 7/2019, C8.7.1.2.1.6 and .8), "NTC-2018 SLC" (0.6,
+            √(d_u* FC/a*), 8 % damping; Circolare 7/2019, C8.7.1.2.1.6 and .8), "NTC-2018 SLC" (0.6,
             1.56 π, 10 %; there), "NTC-2008 SLV" (0.4, secant period at 0.4 d_u*, 5 %; Circolare
             617/2009, from memory), or a `LimitState` with rules of another code.
         q: behaviour factor [-]; Circolare 7/2019, C8.7.1.2.1.7.

@@ -65,6 +65,7 @@ def test_a_rigid_block(verified):
     expected["M_star"] = 0.6 * 2.4 * STONE / G
     check_values(found, expected, verified, "rigid block 0.6 x 2.4 m")
     assert str(found).startswith("kinematic assessment of column, pushed to the right\n")
+    assert f" m/s² ({a / 9.80665:.3f} g), which the checks divide by FC = 1.35, d_0*" in str(found)
     assert found.notes == ()
     periods = np.array([0.1, 1.0, 3.0])
     displacement, acceleration = found.demand(periods)
