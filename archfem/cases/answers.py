@@ -279,15 +279,18 @@ def list_ratios(found: KinematicAssessment) -> list[tuple[AssessmentCheck, Ratio
 
 def describe_margin(found: Iterable[KinematicAssessment]) -> str:
     """Describe the least ratio of all checks, and its range over what is assumed of a fill."""
-    listed = [each for result in found for each in list_ratios(result)]
-    check, ratios = min(listed, key=lambda each: each[1].decisive)
-    same = [x.over_fill for x, _ in listed if x.name == check.name and x.over_fill is not None]
+    listed = [(*each, result.direction) for result in found for each in list_ratios(result)]
+    check, ratios, sense = min(listed, key=lambda each: each[1].decisive)
+    alike = [(x, way) for x, _, way in listed if x.name == check.name]
+    same = [x.over_fill for x, _ in alike if x.over_fill is not None]
     if same:
         over = FillRange.least_of(same)
         text, outcome = f"{over.describe(digits=3)}{ratios.beside}", over.outcome
         outcome = check.words if outcome == "passes" else outcome
         return f"least margin {text}, by {check.name}: {outcome}"
-    return f"least margin {ratios}, by {check.name}: {check.words}"
+    side = f", pushed to the {'right' if sense > 0.0 else 'left'}"
+    differs = any(way != sense and x.ratio > 1.001 * check.ratio for x, way in alike)
+    return f"least margin {ratios}, by {check.name}{side * differs}: {check.words}"
 
 
 def note_band(case: Case, found: Iterable[KinematicAssessment]) -> list[str]:

@@ -120,9 +120,10 @@ def describe_ties(
         size, name = float(np.hypot(*force)), placed.structure.blocks[block].name
         need = f"{pull / kN:.4g}" if pull > 1e-4 * size else "none"
         needs.append(f"{need} of the {size / kN:.4g} kN of the tie at {name}")
+    side = "right" if placed.direction > 0.0 else "left"
     if not needs:
         return ""
     return (
-        f"alpha_0 needs {join_names(needs)}; along the motion a tie pulls with all of its force "
-        "where it is stretched, and else with none: verify bar and anchor"
+        f"pushed to the {side}, alpha_0 needs {join_names(needs)}; along the motion a tie pulls "
+        "with all of its force where it is stretched, and else with none: verify bar and anchor"
     )

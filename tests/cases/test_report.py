@@ -124,7 +124,7 @@ CHECKS = [
 
 def state_each(hazard):
     """Statements by command and file, of results that were made up."""
-    assessed = SimpleNamespace(checks=CHECKS, notes=("faces slide flat",))
+    assessed = SimpleNamespace(checks=CHECKS, direction=1.0, notes=("faces slide flat",))
     assessed.doubts = (Doubt("it is {}", "compare it with a run", (UPPER_BOUND,)),)
     place = "passes without all, with 2 axles at -0.1, 1.1 m"
     found = SimpleNamespace(hazard=hazard, doubts=(), sentence="falls at 0.002 a year")
@@ -285,7 +285,7 @@ def test_a_rate_is_stated_beside_the_hazard_at_its_return_periods():
 
 def test_a_check_that_passes_at_rest_says_so():
     resting = replace(CHECKS[1], ratio=1.5, bodies=None)
-    found = SimpleNamespace(checks=[resting], notes=(), doubts=())
+    found = SimpleNamespace(checks=[resting], direction=1.0, notes=(), doubts=())
     (row,) = answers.state_assessments({"right": found}, []).rows
     outcome = "0.11 m, passes, for the mechanism does not begin to move"
     assert row[:4] == ("assessment: a code, right", "0.22 m", outcome, "1.5 (0.5 by displacements)")

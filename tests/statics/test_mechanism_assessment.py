@@ -167,7 +167,7 @@ def test_a_tie_bears_what_equilibrium_needs(force, factor, pull):
     """By moments about the toe, at 2 m: α 80 = 10 + 2 t; above the tie α = 0.25 / 1, t = 5 kN."""
     found = assess_tied(2.0, force)
     assert found.alpha_0 == pytest.approx(factor, rel=1e-4)
-    says = f"alpha_0 needs {pull} of the {force / 1e3:g} kN of the tie at block 1; along the motion"
+    says = f"pushed to the right, alpha_0 needs {pull} of the {force / 1e3:g} kN of the tie at bl"
     assert found.notes[0].startswith(says)
     if pull == 5:  # what rocks is the block above, which the tie does not reach
         alone = af.kinematic_assessment(af.column(breadth=0.5, heights=[2.0]), SPECTRUM)
@@ -175,14 +175,18 @@ def test_a_tie_bears_what_equilibrium_needs(force, factor, pull):
         assert found.displacement.capacity == pytest.approx(alone.displacement.capacity, rel=1e-4)
     free = assess_tied(2.0, force, direction=-1.0)
     assert free.alpha_0 == pytest.approx(0.125, rel=1e-4)
-    assert free.notes[0].startswith(f"alpha_0 needs none of the {force / 1e3:g} kN")
+    assert free.notes[0].startswith(
+        f"pushed to the left, alpha_0 needs none of the {force / 1e3:g}"
+    )
+    assert ", pushed to the left: " in describe_margin([found, free])
+    assert ", pushed to" not in describe_margin([free, replace(free, direction=1.0)])
 
 
 def test_a_tie_that_holds_its_point_has_no_displacement_check():
     """Tied at 4 m the halves turn against each other: α 20 (1 + 1) = 20 (0.25 + 0.75), t = 7.5."""
     found = assess_tied(4.0, 2e4)
     assert found.alpha_0 == pytest.approx(0.5, rel=1e-4)
-    assert found.notes[0].startswith("alpha_0 needs 7.5 of the 20 kN of the tie at block 2; along")
+    assert found.notes[0].startswith("pushed to the right, alpha_0 needs 7.5 of the 20 kN")
     assert found.displacement is None
     assert "or a tie that holds its point, permit no finite motion: there is no" in found.notes[1]
     assert assess_tied(4.0, 5e3).alpha_0 == pytest.approx((10.0 + 5.0 * 4.0) / 80.0, rel=1e-4)
