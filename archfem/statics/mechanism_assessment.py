@@ -569,8 +569,7 @@ class _Oscillator:
                 "weights as built: that the fill stays in place is not checked"
             )
         found += [self.ties] * bool(self.ties)
-        constant = (load for load in self.placed.loads if not load.passive)
-        if forces := [load.force for load in constant if any(load.force)]:
+        if forces := [x.force for x in self.placed.loads if any(x.force) and not x.passive]:
             pushes = any(force[0] * self.placed.direction > 0.0 for force in forces)
             found.append(
                 "constant forces have no mass, so that they are not pushed, and count from the "
@@ -583,8 +582,8 @@ class _Oscillator:
                 "and faces slide flat here"
             )
         if len(self.path.factors) == 1:
-            why = f"{', or a tie that holds its point,' * bool(self.ties)} permit no finite motion"
-            why = f"this mechanism begins, and its contacts{why}"
+            holds = ", or a tie that holds its point," * bool(self.ties)
+            why = f"this mechanism begins, and its contacts{holds} permit no finite motion"
             if self.path.end is PathEnd.SLIDES:
                 why = (
                     "this mechanism slides without turning and alpha does not fall as it moves; "
