@@ -381,17 +381,14 @@ def find_mechanism(
     return replace(found, is_flat=flat)
 
 
-def find_least_pulls(
+def find_tie_shares(
     blocks: PlacedBlocks, joints: Sequence[int], friction: Array, factor: float
 ) -> Array:
-    """Return the least forces of the ties by which the blocks bear a factor (n_ties,) [N]."""
-    if not blocks.ties:
-        return np.zeros(0)
+    """Return the shares of the ties, of least sum, by which the blocks bear a factor (n_ties,)."""
     given = _select_bodies(blocks, joints, friction)
     solution = _solve_static(*given, fixed=HELD_SHARE * factor)
-    assert solution is not None  # a sum of magnitudes is bounded from below
-    sizes = np.array([np.hypot(*force) for *_, force in blocks.ties])
-    return np.asarray(sizes * solution[2][-1 - len(sizes) : -1])
+    assert solution is not None  # a sum of shares is bounded from below
+    return solution[2][-1 - len(blocks.ties) : -1]
 
 
 def _select_bodies(
@@ -436,8 +433,8 @@ def _solve_static(
 ) -> tuple[float, Array, Array] | None:
     """Return the largest factor, velocities by duality and the unknowns [mean body weights].
 
-    With `held` normal forces, friction is limited by these. At a `fixed` factor the forces of the
-    ties are the least.
+    With `held` normal forces, friction is limited by these. At a `fixed` factor the shares of the
+    ties have the least sum.
     """
     normal, along = bodies.sparse_rates(contacts)
     dead, live = bodies.dead_forces(), bodies.generalised(bodies.blocks.live)
@@ -461,8 +458,7 @@ def _solve_static(
     bounds = np.repeat(kinds, numbers, axis=0)
     cost = np.append(np.zeros(2 * count + pieces), -1.0)
     if fixed is not None:
-        sizes = [np.hypot(*force) / unit for *_, force in bodies.blocks.ties]
-        bounds[-1], cost = fixed, np.append(np.zeros(len(cost) - 1 - len(sizes)), [*sizes, 0.0])
+        bounds[-1], cost[-1 - len(bodies.blocks.ties) :] = fixed, 1.0
     equations = sparse.diags(bodies.units) @ balance, -bodies.units * dead / unit
     if (result := solve_linear(cost, bounds, equations, (limits, strength))) is None:
         return None

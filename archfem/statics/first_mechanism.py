@@ -15,8 +15,8 @@ from archfem.limit.displaced_blocks import (
     FillPressure,
     KinematicChain,
     PlacedBlocks,
-    find_least_pulls,
     find_mechanism,
+    find_tie_shares,
 )
 from archfem.limit.linear_programme import NoEquilibrium
 from archfem.limit.mechanism_kinematics import find_rigid_regions
@@ -115,14 +115,14 @@ def describe_ties(
     placed: PlacedBlocks, joints: list[int], coefficient: Array, factor: float
 ) -> str:
     """Describe the forces of the ties at a factor and along the motion; empty without ties."""
-    pulls, needs = find_least_pulls(placed, joints, coefficient, factor), []
-    for pull, (block, _, force) in zip(pulls, placed.ties, strict=True):
-        size, name = float(np.hypot(*force)), placed.structure.blocks[block].name
-        need = f"{pull / kN:.4g}" if pull > 1e-4 * size else "none"
-        needs.append(f"{need} of the {size / kN:.4g} kN of the tie at {name}")
-    side = "right" if placed.direction > 0.0 else "left"
-    if not needs:
+    if not placed.ties:
         return ""
+    shares, needs = find_tie_shares(placed, joints, coefficient, factor), []
+    for share, (block, _, force) in zip(shares, placed.ties, strict=True):
+        size, name = np.hypot(*force) / kN, placed.structure.blocks[block].name
+        need = f"{share * size:.4g}" if share > 1e-4 else "none"
+        needs.append(f"{need} of the {size:.4g} kN of the tie at {name}")
+    side = "right" if placed.direction > 0.0 else "left"
     return (
         f"pushed to the {side}, alpha_0 needs {join_names(needs)}; along the motion a tie pulls "
         "with all of its force where it is stretched, and else with none: verify bar and anchor"
