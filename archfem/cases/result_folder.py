@@ -57,14 +57,14 @@ class ResultFolder(CaseResult):
         case: the case that was run.
         runs: histories by the names of their motions.
         missing: names of the pairs of a suite without a history.
-        study: folder of a study that the report shows; None where this one has it, if any.
+        studies: folders of studies that the report shows; by default this one, if it has one.
     """
 
     folder: Path
     case: Case
     runs: Mapping[str, History]
     missing: tuple[str, ...] = ()
-    study: Path | None = None
+    studies: tuple[Path, ...] = ()
 
     def report(self, path: str | Path | None = None) -> Path:
         """Write an HTML report of the folder in one file, for print.

@@ -64,6 +64,9 @@ def mark_remarks(remarks: Iterable[Remark]) -> list[str]:
     return [*dict.fromkeys(lines)]
 
 
+# Finding of a study with the doubts of a run, as results keep them
+STATED_DOUBTS = "doubts, stated"
+
 # What a run of a wall in bond checks across its plane
 CHECKED_ACROSS = "across the plane of the drawing a run checks it as one rigid body"
 

@@ -228,7 +228,7 @@ class Run(CaseResult):
 
     # The report reads these, as of a `ResultFolder`.
     missing: ClassVar[tuple[str, ...]] = ()
-    study: ClassVar[Path | None] = None
+    studies: ClassVar[tuple[Path, ...]] = ()
 
     @property
     def runs(self) -> Mapping[str, History]:

@@ -253,7 +253,8 @@ def _add_result_commands(commands: Any) -> None:
         "--set", action="append", default=[], metavar="report.KEY=WORDS", dest="changes", help=about
     )
     add("--inputs", metavar="DIR", help="folder of a mesh or an extension of the case (FOLDER)")
-    add("--study", metavar="DIR", help="folder of a study that the report shows (FOLDER)")
+    about = "folder of a study that the report shows (FOLDER); repeatable"
+    add("--study", action="append", default=[], metavar="DIR", help=about, dest="studies")
     add("--pdf", action="store_true", help="also print it, by Chromium or Chrome")
     _add_own_code(add)
     text = (

@@ -451,8 +451,8 @@ def report(options: argparse.Namespace) -> None:
         path = History.read(history).report(options.out or history.with_suffix(".html"))
     else:
         found = results.open_results(options.folder, inputs=options.inputs)
-        study = None if options.study is None else Path(options.study)
-        found = replace(found, case=found.case.signed(options.changes), study=study)
+        studies = tuple(map(Path, options.studies))
+        found = replace(found, case=found.case.signed(options.changes), studies=studies)
         path = found.report(options.out)
     print(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
     if options.pdf:

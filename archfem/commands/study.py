@@ -11,6 +11,7 @@ from archfem._display import DOUBT_MARK
 from archfem._files import DERIVED, create_result_folder, hash_content, replace_results
 from archfem.commands.cli import ExitCode
 from archfem.errors import Interrupted, InvalidInput
+from archfem.models.model import Doubt
 from archfem.studies.result_store import RESULT_FILES, format_table, status
 
 if TYPE_CHECKING:
@@ -43,17 +44,18 @@ def study(options: argparse.Namespace) -> int:
     # of this very table
     inputs = hash_content(folder / RESULT_FILES[0])
     with replace_results(folder, DERIVED["study"][0], inputs) as draft:
-        _write_results(definition, table, draft)
+        doubts = _write_results(definition, table, draft)
     for name in ("study.txt", "study.png", *RESULT_FILES):
         if (folder / name).is_file():
             print(f"wrote {folder / name}")
     if interruption is not None:
         raise interruption
-    return 1 if all(errors) else ExitCode.DOUBTFUL if any(errors) else 0
+    return 1 if all(errors) else ExitCode.DOUBTFUL if any(errors) or doubts else 0
 
 
-def _write_results(definition: "Study", table: xr.Dataset, folder: Path) -> None:
-    """Print and write the table of a study, draw it, and write the findings of a comparison."""
+def _write_results(definition: "Study", table: xr.Dataset, folder: Path) -> list[Doubt]:
+    """Print, write and draw the table of a study, with comparisons, and return its doubts."""
+    from archfem.cases.report.study_findings import collect_findings, say_what_changes
     from archfem.studies.comparison import file_name, study_table, write_finding
     from archfem.studies.study import NOT_COMPUTED, Comparison
     from archfem.view.studies import draw_findings, draw_study
@@ -65,6 +67,9 @@ def _write_results(definition: "Study", table: xr.Dataset, folder: Path) -> None
     text = study_table(findings) if findings else format_table(table)
     if isinstance(definition, Comparison) and definition.statements:
         text = f"{definition.answers(table)}\n\n{text}"
+    found = collect_findings(definition.title, text, table)
+    said = [*say_what_changes(found), *(f"{DOUBT_MARK}{doubt}" for doubt in found.doubts)]
+    text = "\n\n".join(filter(None, [text, "\n".join(said)]))
     print(text)
     left = table["error"].values.ravel().tolist().count(NOT_COMPUTED)
     title = definition.title + f", interrupted: {left} points are not computed" * (left > 0)
@@ -78,3 +83,4 @@ def _write_results(definition: "Study", table: xr.Dataset, folder: Path) -> None
         write_files({"study.png": picture}, folder)
     except InvalidInput as error:
         print(f"no picture: {error}")
+    return found.doubts

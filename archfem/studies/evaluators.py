@@ -14,7 +14,7 @@ from archfem._validation import validate_arguments
 from archfem.cases.analysis_keys import rate_case
 from archfem.cases.case import Case
 from archfem.cases.provenance import hash_inputs, remove_presentation
-from archfem.cases.result_text import site_acceleration
+from archfem.cases.result_text import STATED_DOUBTS, site_acceleration
 from archfem.cases.run import DeadLoadResult, log_prefix
 from archfem.dynamics.analysis import Analysis
 from archfem.dynamics.history import (
@@ -37,6 +37,7 @@ from archfem.joints.criteria import (
 )
 from archfem.limit.mechanism_count import Mechanism
 from archfem.masonry.structure import suggest_name
+from archfem.models.model import write_doubts
 from archfem.motion.motion import Motion
 from archfem.statics.equilibrium import Equilibrium
 from archfem.studies.cache import dead_load_of, ground_motion, ground_suite, lowest_modes
@@ -86,7 +87,9 @@ class PreparedRuns:
 
 def evaluate_history(case: Case) -> Findings:
     """Return the findings of the time history of a case."""
-    return of_history(run_motion(dead_load_of(case), ground_motion(case)))
+    result = dead_load_of(case)
+    run = run_motion(result, ground_motion(case))
+    return of_history(run.with_doubts((*result.doubts, *run.doubts)))
 
 
 @validate_arguments
@@ -125,7 +128,8 @@ def of_history(run: History, mechanisms: Mapping[str, Mechanism | None] | None =
         mechanism by each definition [s], infinite if there is none, and its class. How the run
         `ended`. `fall`, the state after a collapse, "" for small displacements. `energy_drift`, the
         largest energy error at any step over the exchanged energy [-]. `assessed`, which joints
-        count, if not all do. `doubts`, the number of warnings.
+        count, if not all do. `doubts`, the number of doubts, and `doubts, stated`, all of them
+        as JSON.
     """
     findings: Findings = {**largest_values(run), "outcome": classify_outcome(run)}
     for definition, first in (mechanisms or first_mechanisms(run)).items():
@@ -135,7 +139,8 @@ def of_history(run: History, mechanisms: Mapping[str, Mechanism | None] | None =
     assessed = describe_assessed_joints(run.joints)
     findings |= {"assessed": assessed} if assessed else {}
     drift = float(run.dataset.attrs["energy_drift"])
-    return findings | {"energy_drift": drift, "doubts": float(len(run.doubts))}
+    findings |= {"energy_drift": drift, "doubts": float(len(run.doubts))}
+    return findings | {STATED_DOUBTS: write_doubts(run.doubts)}
 
 
 def largest_values(run: History) -> dict[str, float]:

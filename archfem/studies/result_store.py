@@ -26,6 +26,7 @@ from archfem._display import PROGRESS_INTERVAL, write_progress_line
 from archfem._netcdf import read_dataset, write_dataset
 from archfem._validation import validate_arguments
 from archfem.cases.provenance import describe_version
+from archfem.cases.result_text import STATED_DOUBTS
 from archfem.errors import InvalidInput, StudyStopped, logger
 from archfem.studies.evaluators import Evaluator
 from archfem.studies.parameter_space import PAIR_KEY, Axis, StudyPoint
@@ -412,7 +413,7 @@ def _to_cell(value: Any) -> Any:
 
 def format_table(table: xr.Dataset, max_rows: int = 50) -> str:
     """Return the table of a study as text: keys, and the findings in which points differ."""
-    frame = _flatten(table).drop(columns="error")
+    frame = _flatten(table).drop(columns=["error", STATED_DOUBTS], errors="ignore")
     differs = {name: frame[name].nunique(dropna=False) > 1 for name in frame}
     names = [name for name in frame if name in table.coords]
     names += [name for name in frame if differs[name] and name not in names]

@@ -1136,6 +1136,39 @@ def test_a_study_stands_in_a_report(kept, unplotted, tmp_path, capsys):
     assert "has no study.txt: its study is not finished" in capsys.readouterr().err
 
 
+def test_studies_have_names_and_their_doubts_stand_in_a_report(kept, unplotted, tmp_path, capsys):
+    """Long steps are a doubt of a stone that slides, and none of one that cannot."""
+    large = CASE.replace("[record]", '[contacts."stone to stone"]\nfriction = 0.2\n[record]')
+    large = large.replace('"rigid"\n', '"rigid"\ndisplacements = "large"\n[analysis]\ndt = 0.01\n')
+    (tmp_path / "column.toml").write_text(large.replace("pga = 1.0", "pga = 4.0"))
+    rough = "[\"contacts.'stone to stone'.friction=2\"]"
+    for title, compute in (("Slides", "history"), ("Pushes", "limit")):
+        (tmp_path / f"{title}.toml").write_text(
+            f'title = "{title}"\ncase = "column.toml"\nset = ["limit.horizontal=1"]\n'
+            f'compute = "{compute}"\n[cases]\n"as given" = {{}}\n"rough" = {{ set = {rough} }}\n'
+        )
+    folders = {name: str(tmp_path / name) for name in ("Slides", "Pushes")}
+    studies = {name: ["study", f"{place}.toml", "--out", place] for name, place in folders.items()}
+    assert af.commands.main([*studies["Slides"], "--workers", "1"]) == 3
+    doubts = [x for x in capsys.readouterr().out.splitlines() if x.startswith("in doubt: ")]
+    words = "'as given' under 'first', 'as given' under 'second': steps of 10 ms are long for"
+    assert all("'rough'" not in doubt for doubt in doubts)
+    assert any(doubt.startswith(f"in doubt: {words} sliding") for doubt in doubts)
+    assert af.commands.main([*studies["Pushes"], "--workers", "1"]) == 0
+    shown = [each for place in folders.values() for each in ("--study", place)]
+    assert af.commands.main(["report", str(kept), *shown]) == 0
+    text = " ".join(words_of(kept / "report.html").split())
+    head, _, rest = text.partition("What would change the answer?")
+    said = "In the study 'Slides' under 'first' and 'second' none of 2 cases falls"
+    for part in (head, rest):
+        assert said in part
+        assert "In the study 'Pushes' none lowers the push of 'as given'" in part
+    assert "o property was varied" not in head
+    assert f"In doubt, study: {words[0].upper()}{words[1:]}" in text
+    assert "In doubt, study" in rest
+    assert rest.count(words) == 2
+
+
 def test_parts_of_a_bridge_state_the_lengths_that_are_left_out():
     rows = tabulate_inputs(report_data.ReportData(af.Case.of(tomllib.loads(BRIDGE)), {})).rows
     left = {name: value for name, value, mark in rows if mark == "default"}

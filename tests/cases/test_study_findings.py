@@ -10,15 +10,29 @@ from archfem.studies.evaluators import evaluate_limit
 from archfem.view import draw_findings
 
 
-def study(falls=(), cases=30, **attrs):
-    """Return the findings of cases under two motions; some fall under the second."""
+def study(falls=(), cases=30, dislocated=(), failed=(), doubts=None, **attrs):
+    """Return the findings of cases under two motions; some fall under the second.
+
+    Others are dislocated under both, or fail under the second.
+    """
     rows = [(f"case {k}", pair) for k in range(cases) for pair in ("first", "second")]
     sizes = [0.001 * (1 + k // 2) for k in range(2 * cases)]
     for k in falls:
         sizes[2 * k + 1] = 1.7
     states = ["fallen" if size == 1.7 else "stands" for size in sizes]
+    errors = [""] * 2 * cases
+    for k in dislocated:
+        states[2 * k : 2 * k + 2] = ["dislocated"] * 2
+    for k in failed:
+        states[2 * k + 1], sizes[2 * k + 1], errors[2 * k + 1] = "", np.nan, "DidNotConverge"
+    stated = [af.models.model.write_doubts((doubts or {}).get(k, ())) for k in range(2 * cases)]
     table = xr.Dataset(
-        {"residual_displacement": ("point", sizes, {"units": "m"}), "fall": ("point", states)},
+        {
+            "residual_displacement": ("point", sizes, {"units": "m"}),
+            "fall": ("point", states),
+            "error": ("point", errors),
+            "doubts, stated": ("point", stated),
+        },
         {
             "point": np.arange(2 * cases),
             "case": ("point", [case for case, _ in rows]),
@@ -101,6 +115,41 @@ def test_cases_with_doubts_stand_before_others():
 )
 def test_one_sentence_says_what_changes_the_answer(falls, words):
     assert [*study_findings.say_what_changes(study(falls, 9))] == [words]
+
+
+@pytest.mark.parametrize(
+    ("states", "words"),
+    [
+        (
+            {"dislocated": [8]},
+            "none of 9 cases falls; 1 is dislocated: 'case 8', under 2 of 2 motions; of the others "
+            "'case 7' raises the residual displacement most, from 1 mm to 8 mm",
+        ),
+        (
+            {"falls": [5], "dislocated": [0, 8], "failed": [7]},
+            "1 of 9 cases falls: 'case 5', under 1 of 2 motions; 2 are dislocated: 'case 0', under "
+            "2 of 2 motions; 'case 8', under 2 of 2 motions; 1 has no outcome: 'case 7', under 1 "
+            # the first case, which is the given one, is not among these
+            "of 2 motions; of the others the residual displacement is largest, 7 mm, at 'case 6'",
+        ),
+    ],
+)
+def test_cases_that_are_dislocated_or_have_no_outcome_fail_too(states, words):
+    found = study(cases=9, **states)
+    (said,) = study_findings.say_what_changes(found)
+    assert said == f"in the study under 'first' and 'second' {words}"
+    rows = {row[0]: row[-1] for row in study_findings.tabulate_study(found).rows}
+    assert rows["case 8"] == "dislocated, in 2 of 2"
+
+
+def test_a_study_states_each_doubt_of_its_runs_once_and_their_cases():
+    steps = [af.models.model.Doubt("steps of {:g} ms are long", "halve them", (x,)) for x in (5, 2)]
+    drift = af.models.model.Doubt("the energy drifts")
+    found = study(cases=3, doubts={1: steps[:1], 2: [drift], 4: steps[1:]})
+    assert [*map(str, found.doubts)] == [
+        "'case 0' under 'second', 'case 2' under 'first': steps of 2 to 5 ms are long; halve them",
+        "'case 1' under 'first': the energy drifts",
+    ]
 
 
 @pytest.mark.parametrize(

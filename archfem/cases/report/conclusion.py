@@ -14,6 +14,7 @@ from archfem.cases.case import REPORT_KEYS
 from archfem.cases.report.demands import find_largest_demand, name_spectrum, tabulate_demands
 from archfem.cases.report.doubts import (
     HISTORIES,
+    STUDIES,
     VARIATIONS,
     list_checks,
     list_decisive_doubts,
@@ -29,7 +30,7 @@ from archfem.cases.report.doubts import (
 from archfem.cases.report.motion_rules import check_motions, find_rule
 from archfem.cases.report.report_data import SHOWN_RESULTS, ReportData
 from archfem.cases.report.scales import describe_scales, find_first_failures, say_fragile
-from archfem.cases.report.study_findings import read_study, say_what_changes
+from archfem.cases.report.study_findings import read_studies, say_what_changes
 from archfem.cases.result_text import PushFactors, peak_of_spectrum, site_acceleration
 from archfem.cases.run import CASE_FILE
 from archfem.dynamics.collapse_state import (
@@ -65,6 +66,7 @@ MAX_DOUBTS = 3
 SECTIONS = {
     HISTORIES: "Response",
     VARIATIONS: "Range over uncertain properties",
+    STUDIES: "Study of many cases",
     RESULTS["limit"]: "Limit analysis",
     RESULTS["pushover"]: "Pushover",
     RESULTS["rating"]: "Rating for a vehicle",
@@ -123,7 +125,10 @@ def _say_plainly(data: ReportData, doubtful: Sequence[str]) -> Iterator[str]:
         yield from _say_survival(data, doubtful, assessed if failed else [])
         yield from _say_first_failures(data)
         yield from say_fragile(data)
-        yield _say_what_decides(data.verdict_ranges)
+        studied = [next(say_what_changes(each), "") for each in read_studies(data)]
+        if data.verdict_ranges or not any(studied):
+            yield _say_what_decides(data.verdict_ranges)
+        yield from filter(None, studied)
     yield from [] if data.runs and failed else assessed
     for name, stated in data.statements.items():
         yield from (pushes := [*_say_pushes(data, name, stated)])
@@ -388,8 +393,7 @@ def _build_paragraphs(data: ReportData, doubtful: Sequence[str]) -> dict[str, li
         answer += [*stated[0]] if len(data.statements) == 1 and stated else [x for x, *_ in stated]
     answer += [*_describe_ends(data), *_describe_ranges(data)]
     changes = [*_say_causes(data.verdict_ranges)]
-    if (study := read_study(data)) is not None:
-        changes += say_what_changes(study)
+    changes += [text for study in read_studies(data) for text in say_what_changes(study)]
     if fill := join_names(list_elastic_fill(data)):
         changes.append(f"{fill} is elastic in the runs and carries tension, which soil does not")
     changes += ["the checks of the numbers raise no doubt"] * (bool(data.runs) and not doubtful)

@@ -78,4 +78,4 @@ def player_of_case(result: Run | ResultFolder, run: str | None = None) -> Player
 
 def _collect_data(result: Run | ResultFolder) -> ReportData:
     """Return the data of a report on the results of a case."""
-    return ReportData(result.case, result.runs, result.folder, result.missing, result.study)
+    return ReportData(result.case, result.runs, result.folder, result.missing, result.studies)

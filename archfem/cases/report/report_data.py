@@ -1,6 +1,6 @@
 """Data of a report: case, runs, files of the folder, and the model rebuilt for the player."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from csv import reader
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -45,7 +45,7 @@ class ReportData:
     runs: Mapping[str, History]  # by the names of their motions
     folder: Path | None = None
     missing: tuple[str, ...] = ()  # names of the pairs of the suite without a run
-    study: Path | None = None  # folder of a study; that of the results may have one
+    studies: Sequence[Path] = ()  # folders of studies; that of the results may have one
 
     @cached_property
     def dead(self) -> xr.Dataset | None:

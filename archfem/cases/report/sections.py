@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from archfem._display import NOTE_MARK
+from archfem._display import DOUBT_MARK, NOTE_MARK
 from archfem._files import read_listed
 from archfem.cases.answers import Ratios, read_numbers
 from archfem.cases.defaults import describe_friction_margin
@@ -25,7 +25,7 @@ from archfem.cases.report.response import (
     build_ground_section,
     build_run_sections,
 )
-from archfem.cases.report.study_findings import read_study, tabulate_study
+from archfem.cases.report.study_findings import StudyFindings, read_studies, tabulate_study
 from archfem.cases.run import DRAWING_FILE
 from archfem.dynamics.collapse_state import DISLOCATION, FALLEN_STATES, shallowest_part
 from archfem.dynamics.history import SIGN_CONVENTION
@@ -75,6 +75,7 @@ _METHODS = (
 
 def build_sections(data: ReportData) -> list[Section]:
     """Build all sections of a report; those without any result are left out."""
+    studies = [piece for each in read_studies(data) for piece in _build_study(data, each)]
     sections = [
         build_conclusion(data),
         build_input_section(data),
@@ -85,7 +86,7 @@ def build_sections(data: ReportData) -> list[Section]:
         Section("Scale of the motion", _build_scale(data)),
         Section("Range over uncertain properties", _build_range(data)),
         Section("Annual rate of collapse", data.read_result("risk", *_RISK_CAPTIONS)),
-        Section("Study of many cases", _build_study(data)),
+        Section("Study of many cases", studies),
         build_check_section(data),
         build_method_section(data),
         build_source_section(data),
@@ -397,18 +398,14 @@ def _build_search(data: ReportData, name: str, pair: str) -> list[Any]:
     return [TextBlock(text, "lines"), table, *blocks[1:]]
 
 
-def _build_study(data: ReportData) -> list[Any]:
+def _build_study(data: ReportData, found: StudyFindings) -> list[Any]:
     """Build table and picture of a study: of a comparison of cases those that it has written."""
-    if (found := read_study(data)) is None:
-        return []
     caption = f"Study: {found.title}{found.under}"
     if not len(found.worst):
-        place = data.study or data.folder
-        assert place is not None  # where the study was read
-        read_listed(place, "study.png")
+        read_listed(found.folder, "study.png")
         return [
             TextBlock(found.text, "lines", caption),
-            FigureBlock.read(place / "study.png", caption),
+            FigureBlock.read(found.folder / "study.png", caption),
         ]
     blocks: list[Any] = [tabulate_study(found)]
     limit, key = DISLOCATION * shallowest_part(data.case.structure)[0], "residual displacement"
@@ -417,7 +414,8 @@ def _build_study(data: ReportData) -> list[Any]:
         dotted = f", dotted the limit of dislocation of the case, {format_mm(limit)}"
         caption += f"; all points{dotted * (key in found.numbers)}"
         blocks.append(FigureBlock.of(figure, sentence(caption)))
-    return blocks
+    doubts = (f"{DOUBT_MARK}{replace(doubt, remedy='')}" for doubt in found.doubts)
+    return [*blocks, *(TextBlock(text, "lines") for text in doubts)]
 
 
 def _build_range(data: ReportData) -> list[Any]:

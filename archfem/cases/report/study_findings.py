@@ -2,8 +2,9 @@
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,9 +13,11 @@ import xarray as xr
 from archfem._files import read_listed
 from archfem._netcdf import read_dataset
 from archfem.cases.report.report_data import ReportData
+from archfem.cases.result_text import STATED_DOUBTS
 from archfem.dynamics.collapse_state import COLLAPSE_STATES, FALLEN_STATES
 from archfem.errors import InvalidInput
-from archfem.masonry.structure import join_words
+from archfem.masonry.structure import join_names, join_words
+from archfem.models.model import Doubt, group_doubts, merge_doubts, read_doubts
 from archfem.units import format_mm
 from archfem.view.pages.document import Grid
 
@@ -26,6 +29,13 @@ _SIZES = ("largest_displacement", "residual_displacement")
 MAX_CASES = 24
 MIN_CHANGE = 0.1  # of a finding that is worth a sentence [-]
 MAX_NAMES = 4  # of cases in a sentence
+
+# What cases are counted by, those that fail first, as verbs of one case and of several
+_COUNTED = {
+    "falls": ("falls", "fall"),
+    "dislocated": ("is dislocated", "are dislocated"),
+    "failed": ("has no outcome", "have no outcome"),
+}
 
 # Coordinates that are motions of one case, and those that number points too
 _MOTIONS = ("pair", "suite.pair")
@@ -53,7 +63,10 @@ class StudyFindings:
     table: xr.Dataset
     keys: tuple[str, ...]  # coordinates that tell cases apart
     names: tuple[str, ...]  # findings that are shown, that which decides first
-    worst: Any  # DataFrame of the cases in the order of the study; `falls`, of `runs` motions
+    # DataFrame of the cases in the order of the study; `falls`, `dislocated` and `failed` of `runs`
+    worst: Any
+    folder: Path = Path()
+    name: str = "the study"  # with its title if it is one of several
 
     @cached_property
     def numbers(self) -> xr.Dataset:
@@ -79,6 +92,18 @@ class StudyFindings:
             return f" under {len(names)} motions"
         return f" under {join_words(names)}" if names else ""
 
+    @cached_property
+    def doubts(self) -> list[Doubt]:
+        """Doubts of the runs, each kind once, with the cases and motions that have it."""
+        found = list[Doubt]()
+        for row in self.table.to_dataframe().reset_index().to_dict("records"):
+            motion = [f"under '{row[name]}'" for name in _MOTIONS if name in {*row} - {*self.keys}]
+            place = " ".join([*filter(None, [self.label(row)]), *motion])
+            own = read_doubts(row.get(STATED_DOUBTS) or "[]")
+            found += [replace(doubt, place=place) for doubt in own]
+        groups = ((each, dict.fromkeys(x.place for x in each)) for each in group_doubts(found))
+        return [merge_doubts(each, join_names([*places])) for each, places in groups]
+
     def label(self, row: Any) -> str:
         """Return the name of the case of a row."""
         if self.keys == ("case",):
@@ -86,18 +111,25 @@ class StudyFindings:
         return ", ".join(f"{key.replace('_', ' ')} = {_format(row[key])}" for key in self.keys)
 
 
-def read_study(data: ReportData) -> StudyFindings | None:
-    """Read the study of a report, or of its results; None if there is none."""
-    place = data.study or data.folder
-    if place is None or not (place / "study.txt").is_file():
-        if data.study is not None:
-            begun = (data.study / "progress.json").is_file()
-            words = "its study is not finished: run it again, which continues it"
-            words = words if begun else "run `archfem study`, which writes it"
-            raise InvalidInput(f"{place} has no study.txt: {words}")
-        return None
+@lru_cache(maxsize=1)
+def read_studies(data: ReportData) -> list[StudyFindings]:
+    """Read the studies of a report, or that of its results, if there is one."""
+    own = [data.folder] if data.folder and (data.folder / "study.txt").is_file() else []
+    found = [_read_study(place) for place in data.studies or own]
+    names = [f"the study '{each.title}'" if len(found) > 1 else each.name for each in found]
+    return [replace(each, name=name) for each, name in zip(found, names, strict=True)]
+
+
+def _read_study(place: Path) -> StudyFindings:
+    """Read the study in a folder."""
+    if not (place / "study.txt").is_file():
+        begun = (place / "progress.json").is_file()
+        words = "its study is not finished: run it again, which continues it"
+        words = words if begun else "run `archfem study`, which writes it"
+        raise InvalidInput(f"{place} has no study.txt: {words}")
     title, _, text = read_listed(place, "study.txt").decode("utf-8").strip().partition("\n\n")
-    return collect_findings(title, text, read_dataset(place / "results.nc", "table"))
+    found = collect_findings(title, text, read_dataset(place / "results.nc", "table"))
+    return replace(found, folder=place)
 
 
 def collect_findings(title: str, text: str, table: xr.Dataset) -> StudyFindings:
@@ -117,12 +149,13 @@ def collect_findings(title: str, text: str, table: xr.Dataset) -> StudyFindings:
 def _find_worst(frame: Any, keys: list[str], names: list[str]) -> Any:
     """Return the worst outcome of each case and the worst of each finding over its motions."""
     states = frame["fall"] if "fall" in frame else frame[names[0]].map(lambda _: "")
-    rank = states.map(lambda state: COLLAPSE_STATES.index(state) if state else 0)
+    rank = states.map(lambda state: COLLAPSE_STATES.index(state) if state in COLLAPSE_STATES else 0)
     size = frame[names[0]] if names[0] in _FACTORS else -frame[names[0]]
     ranked = frame.assign(rank=-rank, size=size, falls=states.isin(FALLEN_STATES), runs=1)
+    ranked = ranked.assign(dislocated=states == "dislocated", failed=frame.get("error", "") != "")
     cases = ranked.groupby(keys, sort=False, dropna=False)
     ways = {name: "min" if name in _FACTORS else "max" for name in names}
-    ways |= {"falls": "sum", "runs": "sum"}
+    ways |= dict.fromkeys((*_COUNTED, "runs"), "sum")
     ranked = ranked.assign(**{name: cases[name].transform(way) for name, way in ways.items()})
     return ranked.sort_values(["rank", "size"]).drop_duplicates(keys).sort_index()
 
@@ -140,7 +173,8 @@ def tabulate_study(found: StudyFindings) -> Grid:
     for _, row in order.head(MAX_CASES).iterrows():
         cells = [_format(row[name]) for name in found.keys]
         cells += [_format_finding(row, name) for name in found.names]
-        count = f", in {row['falls']} of {row['runs']}" if several and row["falls"] else ""
+        failed = row["falls"] or row["dislocated"]
+        count = f", in {failed} of {row['runs']}" if several and failed else ""
         rows.append([*cells, f"{row['fall']}{count}"] if state else cells)
     caption = f"Study: {found.title}{found.under}"
     caption += "; of each case the worst of each column over its motions" if several else ""
@@ -169,44 +203,53 @@ def _format(value: Any) -> str:
 
 
 def say_what_changes(found: StudyFindings) -> Iterator[str]:
-    """Yield a sentence: which cases of a study fall, and which differs most from the first."""
+    """Yield a sentence: which cases of a study fail, and which other differs most from the first.
+
+    Cases fail if they fall, are dislocated, or have no outcome.
+    """
     if not len(found.worst):
         return
     rows, name = found.worst.to_dict("records"), found.decides
-    falling = [
-        found.label(row) + f", under {row['falls']} of {row['runs']} motions" * (row["runs"] > 1)
-        for row in rows
-        if row["falls"]
-    ]
-    more = f" and {len(falling) - MAX_NAMES} more" * (len(falling) > MAX_NAMES)
-    study = f"in the study{found.under}"
-    text, then = f"{study} none of {len(rows)} cases falls", ", and "
-    if falling:
-        count = f"{len(falling)} of {len(rows)} cases fall{'s' * (len(falling) == 1)}"
-        text = f"{study} {count}: {'; '.join(falling[:MAX_NAMES])}{more}"
-        then = "; of the others "
-    elif "fall" not in found.table:
-        text, then = "", f"{study} "
-    others = [row for row in rows if not row["falls"] and np.isfinite(row[name])]
-    compared = _compare_cases(found, others) if len(others) > 1 else ""
-    yield from filter(None, [f"{text}{then}{compared}" if compared else text])
+    counted, others = list[str](), rows
+    for count, verbs in _COUNTED.items():
+        failing = [row for row in others if row[count]]
+        others = [row for row in others if not row[count]]
+        if failing:
+            of = "" if counted else f" of {len(rows)} cases"
+            verb = verbs[len(failing) > 1]
+            runs = (f", under {x[count]} of {x['runs']} motions" * (x["runs"] > 1) for x in failing)
+            listed = [f"{found.label(x)}{under}" for x, under in zip(failing, runs, strict=True)]
+            counted.append(f"{len(failing)}{of} {verb}: {_list_few(listed)}")
+        elif count == "falls" and any(row.get("fall") for row in rows):
+            counted.append(f"none of {len(rows)} cases falls")
+    then = ", and " if len(others) == len(rows) else "; of the others "
+    others = [row for row in others if np.isfinite(row[name])]
+    compared = _compare_cases(found, others, rows[0]) if len(others) > 1 else ""
+    if counted or compared:
+        said = then.join(filter(None, ["; ".join(counted), compared]))
+        yield f"in {found.name}{found.under} {said}"
     # undefined without a demand
     below = [row for row in rows if row.get(OVER_SITE, np.nan) < 1.0]
     if below:
         listed = [f"{found.label(row)}, at {row[OVER_SITE]:.3g} of it" for row in below]
         count = f"{len(below)} of {len(rows)} cases begin{'s' * (len(below) == 1)} to move"
-        more = f" and {len(below) - MAX_NAMES} more" * (len(below) > MAX_NAMES)
-        yield f"{count} below the site's acceleration: {'; '.join(listed[:MAX_NAMES])}{more}"
+        yield f"{count} below the site's acceleration: {_list_few(listed)}"
 
 
-def _compare_cases(found: StudyFindings, rows: list[Any]) -> str:
+def _list_few(names: list[str]) -> str:
+    """List the first names, and count the others."""
+    more = f" and {len(names) - MAX_NAMES} more" * (len(names) > MAX_NAMES)
+    return "; ".join(names[:MAX_NAMES]) + more
+
+
+def _compare_cases(found: StudyFindings, rows: list[Any], given: Any) -> str:
     """Say which of some cases changes the finding that decides most; "" if none does by much."""
     name, first = found.decides, rows[0]
     least, words = name in _FACTORS, name.replace("_", " ")
     extreme = (min if least else max)(rows, key=lambda row: row[name])
     unit = found.table[name].attrs.get("units", "")
     show = format_mm if unit == "m" else lambda value: f"{value:.3g} {unit}".strip()
-    if found.keys != ("case",):  # none of them is the given one
+    if found.keys != ("case",) or first is not given:  # none of them is the given one
         end = "least" if least else "largest"
         return f"the {words} is {end}, {show(extreme[name])}, at {found.label(extreme)}"
     verb = "lowers" if least else "raises"
