@@ -60,7 +60,7 @@ class Ratios(NamedTuple):
 
     check: str
     directions: Sequence[str]
-    least: float
+    least: float  # with the weights of blocks apart
     most: float  # over what is assumed of a fill
     needed: str = ""  # assumptions on the fill under which alone it passes
     linear: bool = False  # whether accelerations are checked, rather than displacements
@@ -77,8 +77,13 @@ class Ratios(NamedTuple):
 
     @property
     def decisive(self) -> float:
-        """The least ratio, with one weight a body too where that decides whether it passes [-]."""
-        return self.least if self.bodies is None or not self.by_split else self.bodies
+        """The least ratio, by either split of weights [-]."""
+        return self.least if self.bodies is None else self.bodies
+
+    @property
+    def ends(self) -> Ends:
+        """The least ratio, and the largest over what is assumed of a fill [-]."""
+        return Ends((self.decisive, self.most if self.most > self.least else self.decisive))
 
     @property
     def by_split(self) -> bool:
@@ -88,7 +93,8 @@ class Ratios(NamedTuple):
     @property
     def beside(self) -> str:
         """The other ratios, in brackets."""
-        texts = {"by displacements": self.moved, "with one weight a body": self.bodies}
+        apart = None if self.bodies is None else self.least
+        texts = {"by displacements": self.moved, "with the weights apart": apart}
         texts |= {"with e* = 1": self.floor}
         each = "; ".join(
             f"{format_ratio(x)} {words}" for words, x in texts.items() if x is not None
@@ -97,7 +103,7 @@ class Ratios(NamedTuple):
 
     def __str__(self) -> str:
         """Return all ratios in words."""
-        return f"{Ends.of((self.least, self.most)):ratio}{self.beside}"
+        return f"{self.ends:ratio}{self.beside}"
 
 
 class Scales(NamedTuple):
@@ -285,7 +291,9 @@ def describe_margin(found: Iterable[KinematicAssessment]) -> str:
     same = [x.over_fill for x, _ in alike if x.over_fill is not None]
     if same:
         over = FillRange.least_of(same)
-        text, outcome = f"{over.describe(digits=3)}{ratios.beside}", over.outcome
+        text, outcome = over.describe(digits=3), over.outcome
+        if ratios.bodies is not None:
+            text = f"{format_ratio(ratios.bodies)} with one weight a body, {text} with them apart"
         outcome = check.words if outcome == "passes" else outcome
         return f"least margin {text}, by {check.name}: {outcome}"
     side = f", pushed to the {'right' if sense > 0.0 else 'left'}"

@@ -168,7 +168,9 @@ def test_a_push_is_no_margin_of_what_moves(case, outcomes, verified, moves):
     site = "the site's 0.2 g"
     bounded, elastic = PushFactors(1.04, 1.04, site, 0.9), PushFactors(1.02, 1.02, site)
     stated = {"limit": state("limit analysis", bounded), "pushover": state("pushover", elastic)}
-    end = f"that is no margin: {moves}" if moves else "to move is no collapse"
+    end = "to move is no collapse"
+    if moves:
+        end = "runs that are no stronger move it, so that this is no margin"
     assert say_margin(data, **stated) == [
         f"pushed sideways as rigid blocks it begins to move at 1.04 times {site}, the least that a "
         f"search found, and is proved to stand up to 0.9 times; {end}",
@@ -384,6 +386,12 @@ def test_the_answer_has_displacements_the_first_fall_and_the_checks(case):
         (passed, "rocks", "it withstands at rest alone, and moves in the runs,"),
         (passed._replace(bodies=0.9), None, "it withstands or not, by the split of weights,"),
         (passed._replace(bounded=True), None, "alone it is not shown to withstand the EC8"),
+        # of both splits of weights the least
+        (
+            passed._replace(bounded=True, bodies=1.04),
+            None,
+            "alone it is not shown to withstand the EC8 spectrum of PGA 0.2 g, as its ratio, 1.04,",
+        ),
     ):
         data.runs["a"].verdict.mechanisms["verified"] = verified
         data.statements["assessment"] = state("assessment", ratios)._replace(doubts=[bound])
@@ -392,6 +400,9 @@ def test_the_answer_has_displacements_the_first_fall_and_the_checks(case):
         assert facts["in doubt"] == "kinematic assessment, scale of the motion"
     assert "; " not in facts["verdict"]
     said = " ".join(say_margin(data, assessment=data.statements["assessment"]))
+    assert (
+        "the least margin is 1.04 (0.842 by displacements; 1.1 with the weights apart), on" in said
+    )
     assert "by damage, right, an upper bound: the runs do not decide, for 3 at least are" in said
 
 
@@ -553,8 +564,8 @@ def test_a_displacement_has_the_range_of_its_time_steps_and_single_changes_are_s
     data = data_of(case, ranges[0], a=verdict_of(displacement=0.1), b=verdict_of())
     (row, *_) = (row for _, row in conclusion._capacity_rows(data))
     assert row[2] == (
-        "stands in 2 of 2 runs; displaced by up to 100 mm (over time steps 20 to 120 mm under "
-        "'a'), 0 mm at the end"
+        "stands in 2 of 2 runs; displaced by up to 100 mm under 'a', 0 mm at the end; over time "
+        "steps by 20 to 120 mm under 'a'"
     )
     same = "it falls with none of 1 single changes"
     moved = "unvaried it is displaced by 20 mm, by 120 mm with half the time step"

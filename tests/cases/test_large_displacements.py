@@ -9,13 +9,9 @@ import pytest
 import xarray as xr
 
 import archfem as af
-from archfem.cases.report.conclusion import (
-    build_conclusion,
-    list_facts,
-    summarise_outcome,
-)
+from archfem.cases.report.conclusion import build_conclusion, list_facts
 from archfem.cases.report.report_data import ReportData
-from archfem.cases.report.response import _build_mechanism
+from archfem.cases.report.response import _build_mechanism, summarise_outcome
 from archfem.cases.result_text import tabulate_runs
 from archfem.commands.run import run as run_command
 from archfem.dynamics.history import with_fall

@@ -291,7 +291,7 @@ def test_a_mechanism_is_stated_once(runs, piers):
     (text,) = response._build_mechanism(data, found["first"])
     assert "Mechanism: verified, local mechanism of arch at 2.000 s by joint 1" in text.text
     other = SimpleNamespace(mechanisms={"verified": None, "any joints at once": hit})
-    assert conclusion.describe_mechanism(other).startswith("by any joints at once, local mech")
+    assert response.describe_mechanism(other).startswith("by any joints at once, local mech")
     (row, *_) = (row for _, row in conclusion._capacity_rows(data))
     assert row[2] == "fallen in 2 of 2 runs"
 

@@ -261,7 +261,10 @@ def _judge_check(data: ReportData, check: Ratios) -> tuple[str, str]:
         words = ", which it fails with one weight a body"
         return f"it withstands or not, by the split of weights, {of}", words
     if check.bounded:
-        bound, test = f"its ratio, {format_ratio(check.least)}, is an upper bound", _say_test(data)
+        bound, test = (
+            f"its ratio, {format_ratio(check.decisive)}, is an upper bound",
+            _say_test(data),
+        )
         words = f"alone it is not shown to withstand {of}, as {bound}: {test}"
         return words, f", an upper bound: {test}"
     if check.moved and _say_motion(data, check.least, peak_of_spectrum(data.case)):
@@ -285,18 +288,6 @@ def _say_test(data: ReportData) -> str:
 def _describe_peaks(runs: Iterable[History]) -> str:
     """Return the least and the largest peak acceleration of some runs."""
     return f"PGA {Ends.of(map(peak_of_ground, runs)):.2f} g"
-
-
-def summarise_outcome(data: ReportData, run: History) -> str:
-    """Return the outcome of a run, with its doubts or its range."""
-    own = run.dataset.attrs.get("motion")
-    ranges = {each.dataset.attrs.get("motion"): each for each in data.verdict_ranges}
-    found = ranges.get(own)
-    if found is None and len(data.runs) == 1:  # a range over several motions has no name
-        found = next(iter(ranges.values()), None)
-    # lost blocks have a line of their own, and the conclusion says what was not varied
-    text = run.verdict.brief
-    return text if found is None else f"{text}; {found.count}{found.unanswered}"
 
 
 def build_conclusion(data: ReportData) -> Section:
@@ -475,7 +466,7 @@ def _describe_push(data: ReportData, name: str, push: PushFactors) -> Iterator[s
         proved = push.proved and f"is proved to stand up to {format_ratio(push.proved)} times"
         text += f", the least that a search found, and {proved or NO_PROOF}"
     if moves and push.least >= 1.0:  # shaken it moves before
-        yield f"{text}; that is no margin: {moves}"
+        yield f"{text}; runs that are no stronger move it, so that this is no margin"
         return
     yield f"{text}; to move is no collapse"
     if then := moves if data.runs else "shaken it may begin to move at less":
@@ -490,10 +481,10 @@ def _describe_check(data: ReportData, check: Ratios) -> tuple[float, list[str]]:
     if check.moved is not None and moves:  # what moves at less than the push that begins it is
         begins = f"the check passes for what is at rest, and {moves}"  # judged by how far
         return check.moved, [f"{check.moved:.3g} by displacements, {by}", begins]
-    ends, (_, fails) = f"{Ends((check.least, check.most)):ratio}", _judge_check(data, check)
-    texts = [f"{ends}{over}{check.beside}, {by}{fails}"]
+    _, fails = _judge_check(data, check)
+    texts = [f"{check.ends:ratio}{over}{check.beside}, {by}{fails}"]
     if check.moved is not None:
-        texts.append(f"{ends} times the spectrum begins to move it")
+        texts.append(f"{check.ends:ratio} times the spectrum begins to move it")
         texts.append(f"if it moved, it could be displaced by {check.moved:.3g} times the demand")
     return check.decisive, texts
 
@@ -530,13 +521,16 @@ def _capacity_rows(data: ReportData) -> Iterator[tuple[str, Row]]:
         outcome = result_text.count_outcomes(verdicts) if len(verdicts) > 1 else outcome
         outcome += f"; not run: {', '.join(data.missing)}" * bool(data.missing)
         # of a fall it is the way to the ground
-        held = [(x.displacement, x.residual) for x in verdicts if x.outcome not in FALLEN_STATES]
-        if (sizes := np.array(held)).size and np.isfinite(sizes).all():
+        held = {k: run.verdict for k, run in data.runs.items()}
+        held = {k: x for k, x in held.items() if x.outcome not in FALLEN_STATES}
+        sizes = np.array([(x.displacement, x.residual) for x in held.values()])
+        if sizes.size and np.isfinite(sizes).all():
             largest, residual = map(format_mm, sizes.max(axis=0))
             over = "time steps" if data.fidelity == VARIED_FIDELITY else "time steps and fidelity"
             steps = ", ".join(_list_ranges_of_steps(data))
-            beside = f" (over {over} {steps})" * bool(steps)
-            outcome += f"; displaced by up to {largest}{beside}, {residual} at the end"
+            under = f" under '{[*held][sizes[:, 0].argmax()]}'" * (len(data.runs) > 1)
+            outcome += f"; displaced by up to {largest}{under}, {residual} at the end"
+            outcome += f"; over {over} by {steps}" * bool(steps)
         yield HISTORIES, Row(HISTORIES, demand, outcome, "-", {})
     for computed in data.verdict_ranges:
         motion = computed.dataset.attrs.get("motion")
@@ -599,14 +593,6 @@ def _describe_ends(data: ReportData) -> Iterator[str]:
         yield f"under {join_words([*lost])} it loses {which}"
     if moving := [f"'{name}'" for name, fall in falls.items() if fall and not fall.resting]:
         yield f"blocks still move at the end of {join_words(moving)}"
-
-
-def describe_mechanism(verdict: Any) -> str:
-    """Return the first mechanism of a run, verified or by another definition."""
-    for definition in ("verified", *verdict.mechanisms):
-        if (found := verdict.mechanisms.get(definition)) is not None:
-            return f"{'by ' * (definition != 'verified')}{definition}, {found}"
-    return f"none by any definition{verdict.until}"
 
 
 def describe_lost(structure: Structure, falls: Sequence[CollapseState]) -> str:

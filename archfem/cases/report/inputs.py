@@ -246,7 +246,7 @@ def _list_properties(data: ReportData, item: Material | Contact) -> Iterator[Row
             own = value_text(section, key, in_unit(given[key], "N/m**3", key))
             text = text if own == text else f"{own}, {text} with the spandrels"
         if key in defaults:
-            text += f" ({reason.partition(';')[0]})"
+            text += f" ({reason if key == 'young' else reason.partition(';')[0]})"
         elif mark == "default" and value is not None:
             mark = "inferred"  # from the shape
         if key not in unused | follows:

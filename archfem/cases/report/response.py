@@ -9,13 +9,7 @@ import xarray as xr
 
 from archfem.cases import result_text
 from archfem.cases.case import Case
-from archfem.cases.report.conclusion import (
-    describe_lost,
-    describe_mechanism,
-    list_lost,
-    sentence,
-    summarise_outcome,
-)
+from archfem.cases.report.conclusion import describe_lost, list_lost, sentence
 from archfem.cases.report.motion_rules import find_target, tabulate_checks
 from archfem.cases.report.report_data import ReportData, build_player
 from archfem.dynamics.collapse_state import FALLEN_STATES
@@ -168,6 +162,26 @@ def _tabulate_joints(data: ReportData, run: History) -> Grid:
         right = cells[half:] + blank
         head, cells = [*head, *head], [a + b for a, b in zip(cells[:half], right, strict=True)]
     return Grid(head, cells, caption)
+
+
+def summarise_outcome(data: ReportData, run: History) -> str:
+    """Return the outcome of a run, with its doubts or its range."""
+    own = run.dataset.attrs.get("motion")
+    ranges = {each.dataset.attrs.get("motion"): each for each in data.verdict_ranges}
+    found = ranges.get(own)
+    if found is None and len(data.runs) == 1:  # a range over several motions has no name
+        found = next(iter(ranges.values()), None)
+    # lost blocks have a line of their own, and the conclusion says what was not varied
+    text = run.verdict.brief
+    return text if found is None else f"{text}; {found.count}{found.unanswered}"
+
+
+def describe_mechanism(verdict: Any) -> str:
+    """Return the first mechanism of a run, verified or by another definition."""
+    for definition in ("verified", *verdict.mechanisms):
+        if (found := verdict.mechanisms.get(definition)) is not None:
+            return f"{'by ' * (definition != 'verified')}{definition}, {found}"
+    return f"none by any definition{verdict.until}"
 
 
 def _build_mechanism(data: ReportData, run: History) -> list[Any]:
