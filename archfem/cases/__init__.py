@@ -15,6 +15,7 @@
     run              carry out a case, resume, result classes
     structure_keys   [structure], [materials] and [contacts]: read and written
     toml_file        reading, writing, merging, overriding TOML tables
+    verdict_keys     [verdict]: ranges of properties
 
 Imports all rooms before it. Start reading at `case`, then at `run`.
 """

@@ -36,6 +36,7 @@ from archfem.cases.toml_file import (
     remove_keys,
     set_value,
 )
+from archfem.cases.verdict_keys import VERDICT_KEYS, parse_verdict
 from archfem.dynamics.analysis import Analysis
 from archfem.dynamics.recorder import Record
 from archfem.errors import ArchfemError, InvalidInput
@@ -69,6 +70,7 @@ class Case:
         rating: arguments of `archfem.rate` from [rating].
         assessment: kinematic assessment; without [assessment] that of the case's motion or suite.
         risk: hazard, alternatives and sampling of `archfem.collapse_risk`, or None.
+        verdict: arguments of `archfem.verdict_range` from [verdict].
         output: checked keys of [output]: pictures and films.
         report: checked keys of [report]: project, place and the like, which a report shows.
         settings: tables of the case as they were read, changes included.
@@ -84,6 +86,7 @@ class Case:
     rating: Table
     assessment: AssessmentSettings
     risk: RiskSettings | None
+    verdict: dict[str, Any]
     output: dict[str, Any]
     report: dict[str, str]
     settings: dict[str, Any] = field(repr=False)
@@ -162,6 +165,7 @@ class Case:
             rating=analysis_keys.parse_rating(settings.get("rating", {})),
             assessment=analysis_keys.parse_assessment(assessed, limit, structure),
             risk=None if (risk := settings.get("risk")) is None else parse_risk(risk, folder),
+            verdict=parse_verdict(settings.get("verdict", {})),
             output=output,
             report=report,
             settings=dict(settings),
@@ -351,6 +355,7 @@ def section_keys() -> Mapping[str, Table]:
         "rating": analysis_keys.rating_keys(),
         "assessment": analysis_keys.assessment_keys(),
         "risk": RISK_KEYS,
+        "verdict": VERDICT_KEYS,
         "dead_load": DEAD_LOAD_KEYS,
         "output": OUTPUT_KEYS,
         "report": REPORT_KEYS,

@@ -69,7 +69,7 @@ def verdict(options: argparse.Namespace) -> int:
     print(case.title)
     folder = None if options.out is None else path_inside(Path(options.out), "variations")
     sampling = {"workers": options.workers, "samples": options.samples, "folder": folder}
-    computed = verdict_range(case.analysis, motion, fidelity="rigid", **sampling)
+    computed = verdict_range(case.analysis, motion, fidelity="rigid", **case.verdict, **sampling)
     _, falls = check_across(case.structure, {motion.name: motion})
     head, line, text = str(computed).partition("\n")
     text = f"{head}{falls}{line}{text}"

@@ -19,6 +19,7 @@ from archfem.cases import (
     motion_keys,
     risk_keys,
     structure_keys,
+    verdict_keys,
 )
 from archfem.dynamics import schemes
 from archfem.dynamics.analysis import Analysis
@@ -48,6 +49,7 @@ from archfem.statics.newton import Newton
 from archfem.statics.pushover import Stop, pushover
 from archfem.studies.statements import Statement
 from archfem.studies.study import STUDIED_CASE_KEYS, STUDY_KEYS
+from archfem.studies.variations import verdict_range
 
 Schema = dict[str, Any]
 
@@ -97,6 +99,7 @@ _DECLARATIONS: Mapping[str, Any] = {
     "pushover": (pushover, BodyForce),
     "rating": rate,
     "assessment": kinematic_assessment,
+    "verdict": verdict_range,
 }
 
 
@@ -194,6 +197,7 @@ def _other_values() -> dict[str, Schema]:
         "limit_state": _any([{"type": "string"}, _table_of(LimitState)]),
         "hazard": _table(risk_keys.HAZARD_KEYS, measure=_choice(*MEASURES)),
         "alternatives": _by_name(_table(risk_keys.ALTERNATIVE_KEYS)),
+        "vary": _object({name: _range_of(*labels) for name, labels in verdict_keys.RANGES.items()}),
         "stages": _any([_choice("none", "usual"), _list(_table_of(Stage))]),
     }
 
@@ -297,6 +301,11 @@ def _list(schema: Schema) -> Schema:
 def _one_or_several(schema: Schema) -> Schema:
     """Return the schema of a value, or a list of such."""
     return _any([schema, _list(schema)])
+
+
+def _range_of(*labels: Any) -> Schema:
+    """Return the schema of some labels, or of the ends of a range of numbers."""
+    return _one_or_several(_choice(*labels) if isinstance(labels[0], str) else {"type": "number"})
 
 
 def _by_name(schema: Schema) -> Schema:

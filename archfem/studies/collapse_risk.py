@@ -38,6 +38,7 @@ from archfem._validation import (
     validate_arguments,
     validate_methods,
 )
+from archfem.cases.verdict_keys import DEFAULT_RANGES, check_ranges
 from archfem.dynamics.analysis import Analysis
 from archfem.dynamics.collapse_state import FALLEN_STATES, CollapseState, doubt_soft_blocks
 from archfem.dynamics.recorder import Record
@@ -63,10 +64,8 @@ from archfem.studies.fragility import (
 )
 from archfem.studies.result_store import evaluate_with_progress
 from archfem.studies.variations import (
-    DEFAULT_RANGES,
     Variation,
     as_falling,
-    check_ranges,
     doubt_steps_of_sliding,
     draw_samples,
     prepare_runs,

@@ -14,6 +14,7 @@ import xarray as xr
 
 from archfem._display import ResultDisplay
 from archfem._validation import check_number, check_type, validate_arguments, validate_methods
+from archfem.cases.verdict_keys import check_ranges
 from archfem.dynamics.analysis import Analysis
 from archfem.dynamics.collapse_state import FALLEN_STATES, doubt_soft_blocks
 from archfem.dynamics.history import History, classify_outcome
@@ -26,7 +27,7 @@ from archfem.motion.suite import Suite
 from archfem.studies.evaluators import PreparedRuns, largest_values
 from archfem.studies.parameter_space import WholePoint
 from archfem.studies.result_store import evaluate_with_progress
-from archfem.studies.variations import change_properties, check_ranges
+from archfem.studies.variations import change_properties
 
 # Properties that a change may have, as `verdict_range` varies them
 CHANGED = ("k_n", "k_s", "friction", "damping_ratio", "damping_kind", "finish")

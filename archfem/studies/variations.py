@@ -17,12 +17,13 @@ import numpy as np
 import xarray as xr
 from scipy.stats import qmc
 
-from archfem._validation import check_integer, check_number, validate_arguments
+from archfem._validation import check_integer, validate_arguments
 from archfem.cases.case import Case
 from archfem.cases.defaults import list_default_keys
 from archfem.cases.result_text import ResultTable
 from archfem.cases.structure_keys import find_table
 from archfem.cases.toml_file import Table, format_key
+from archfem.cases.verdict_keys import DEFAULT_RANGES, NEUTRAL, check_ranges
 from archfem.dynamics.analysis import Analysis, with_one_facet
 from archfem.dynamics.collapse_state import CollapseState, classify_collapse, doubt_soft_blocks
 from archfem.dynamics.damping import damping_kind, resolve_effective_damping, vary_damping
@@ -36,7 +37,7 @@ from archfem.dynamics.verdict_range import VerdictRange
 from archfem.errors import DidNotConverge, InvalidInput, InvalidStructure, logger
 from archfem.limit.fill_strength import PlasticFill
 from archfem.limit.rating import ASSUMED_STRENGTH, Rating, rate_again
-from archfem.masonry.joint_closing import FINISHES, with_finish
+from archfem.masonry.joint_closing import with_finish
 from archfem.masonry.structure import Structure
 from archfem.models.model import Doubt, write_doubts
 from archfem.motion.motion import Motion
@@ -46,40 +47,11 @@ from archfem.studies.parameter_space import Point, WholePoint
 from archfem.studies.result_store import evaluate_with_progress
 from archfem.units import MPa, in_unit
 
-# What is varied by default: values, of which numbers are the ends of a range
-DEFAULT_RANGES: dict[str, tuple[Any, ...]] = {
-    # exact integration, springs at the ends and the middle (as in 3DEC), rigid contact
-    "joint_rule": ("exact", "three points", "rigid"),
-    "k_n": (1.0 / 3.0, 3.0),
-    "k_s": (1.0 / 3.0, 3.0),
-    "friction": (-0.1, 0.1),
-    "damping_ratio": (0.5, 2.0),
-    "damping_kind": ("stiffness", "mass and stiffness"),
-    "sign": ("as given", "reversed"),
-    "dt": ("as given", "half"),
-}
-
-# What is varied on request: finish of the faces, whose usual law of closing replaces that given
-FINISH_RANGE = {"finish": ("as given", *FINISHES)}
-
 # Row of a rating with the worst value of each property
 ALL_AT_ONCE = "all unfavourable at once"
 
 # A property that is varied beside a rating, its value in words, and keys of the case with it
 Change = tuple[str, str, dict[str, Any]]
-
-# Values at which a run is as given
-NEUTRAL: dict[str, Any] = {
-    "joint_rule": "exact",
-    "finish": "as given",
-    "k_n": 1.0,
-    "k_s": 1.0,
-    "friction": 0.0,
-    "damping_ratio": 1.0,
-    "scale": 1.0,
-    "sign": "as given",
-    "dt": "as given",
-}
 
 
 @dataclass(frozen=True, eq=False)
@@ -252,38 +224,6 @@ def verdict_range_of_bracket(
     ratio = bracket.upper / bracket.lower if bracket.upper < inf else 2.0
     vary = {"scale": (1.0, ratio), **options.pop("vary", {})}
     return verdict_range(structure, motion.scaled(bracket.lower), vary=vary, **options)
-
-
-def check_ranges(ranges: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the ranges, or refuse unknown names and values."""
-    checked: dict[str, Any] = {}
-    for name, values in ranges.items():
-        if isinstance(values, Mapping):
-            for value in values.values():
-                if not isinstance(value, Structure | Motion):
-                    raise InvalidInput(
-                        f"{name} = {value!r}: give labels with structures or with motions"
-                    )
-            checked[name] = dict(values)
-            continue
-        known = {**NEUTRAL, "damping_kind": ""}
-        if name not in known:
-            raise InvalidInput(
-                f"{name!r} cannot be varied: name one of {sorted(known)}, or give a mapping from "
-                "labels to structures or to motions"
-            )
-        values = (values,) if isinstance(values, str | float | int) else tuple(values)
-        labels = {**DEFAULT_RANGES, **FINISH_RANGE}.get(name, (0.0,))
-        if isinstance(labels[0], str):
-            unknown = [value for value in values if value not in labels]
-            if unknown or not values:
-                raise InvalidInput(f"{name} = {values!r}: give some of {labels}")
-        else:
-            values = tuple(float(check_number(value, name)) for value in values)
-            if not values or (name != "friction" and min(values) <= 0.0):
-                raise InvalidInput(f"{name} = {values!r}: give the ends of a range above 0")
-        checked[name] = values
-    return checked
 
 
 def sample_changes(ranges: Mapping[str, Any], samples: int, seed: int) -> list[dict[str, Any]]:

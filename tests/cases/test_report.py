@@ -170,7 +170,8 @@ def test_demand_and_capacity_stand_beside_their_doubts(kept, undrawn):
     ]
     verdicts = [run.verdict for run in data.runs.values()]
     sizes = np.max([[each.displacement, each.residual] for each in verdicts], axis=0)
-    moved = "up to {}, {} at the end".format(*map(format_mm, sizes))
+    moved = "up to {} under 'second', {} at the end".format(*map(format_mm, sizes))
+    assert np.argmax([each.displacement for each in verdicts]) == [*data.runs].index("second")
     assert table.rows == [
         ("time histories", "PGA 0.05 g", f"no mechanism in 2 of 2 runs; displaced by {moved}", "-"),
         ("limit analysis", "the given load", "it turns, at 4.8 times the load (in doubt)", "4.8"),

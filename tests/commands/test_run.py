@@ -214,6 +214,26 @@ def test_a_range_in_doubt_has_the_exit_code_of_doubts(small, unplotted, monkeypa
     )
 
 
+def test_a_range_is_that_of_the_case_and_marked_as_given(small, unplotted):
+    """Ranges of a survey in [verdict]; 1 is the run as given, and a single value is held."""
+    out, ranges = small.parent / "out", '[verdict.vary]\nk_n = [0.1, 20]\nsign = "as given"\n'
+    small.write_text(f"{small.read_text(encoding='utf-8')}{ranges}", encoding="utf-8")
+    assert run(small) == 0
+    given = ["verdict", str(small), "--samples", "1", "--pair", "first", "--out", str(out)]
+    assert af.commands.main(given) == 0
+    found = xr.load_dataset(out / "first" / "verdict_range.nc")
+    alone = found.isel(run=slice(-1))
+    assert {*alone["k_n"].values.tolist()} == {0.1, 1.0, 20.0}
+    assert {*alone["k_s"].values.tolist()} == {1.0 / 3.0, 1.0, 3.0}
+    assert {*found["sign"].values.tolist()} == {"as given"}
+    assert af.commands.main(["report", str(out)]) == 0
+    words = " ".join(read_page((out / "report.html").read_text(encoding="utf-8")).words)
+    stiff = found.attrs["k_n"] / 1e9
+    assert f"k_n {0.1 * stiff:.3g} to {20.0 * stiff:.3g} MPa/mm given" in words
+    assert "sign as given given" in words
+    assert re.search(r"k_s \S+ to \S+ MPa/mm default", words)
+
+
 @pytest.mark.parametrize("out", [[], ["--out", "out"]])
 def test_a_range_keeps_its_runs_in_its_folder(small, monkeypatch, capsys, out):
     def interrupted(analysis, motion, *, folder, **options):

@@ -82,6 +82,10 @@ def test_a_misspelt_key_is_refused_where_the_reader_refuses_it(name, validator):
         (("analysis", "until"), {"name": "counted mechanism", "kind": ["local"]}),
         (("output", "animation"), "yes"),
         (("report", "author"), 7),
+        (("verdict", "vary"), {"joint_rule": ["exact", "five"]}),
+        (("verdict", "vary"), {"k_m": [0.1, 10.0]}),
+        (("verdict", "vary"), {"friction": "low"}),
+        (("verdict", "vary"), {"survey": {}}),
     ],
 )
 def test_a_wrong_value_is_refused_by_both(path, value, validator):

@@ -8,14 +8,11 @@ import pytest
 from pages import read_page
 
 import archfem as af
+from archfem.cases.verdict_keys import DEFAULT_RANGES, NEUTRAL
 from archfem.dynamics import CollapseState, analysis
 from archfem.dynamics.damping import vary_damping
 from archfem.studies import evaluators, variations
-from archfem.studies.variations import (
-    DEFAULT_RANGES,
-    Variation,
-    evaluate_variation,
-)
+from archfem.studies.variations import Variation, evaluate_variation
 
 HELD = {name: values[0] for name, values in DEFAULT_RANGES.items()} | {
     **{"k_n": 1.0, "k_s": 1.0, "friction": 0.0, "damping_ratio": 1.0},
@@ -254,7 +251,7 @@ def test_the_run_as_given_comes_first_then_each_change_alone(column, motion, cal
     found = af.verdict_range(column, motion, samples=3)
     rows = found.dataset.isel(run=np.flatnonzero(~found.dataset["sampled"].values))
     assert found.properties == tuple(DEFAULT_RANGES)
-    neutral = {**variations.NEUTRAL, "damping_kind": "stiffness"}
+    neutral = {**NEUTRAL, "damping_kind": "stiffness"}
     changed = [
         {
             name: rows[name].values[k]

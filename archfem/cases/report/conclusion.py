@@ -391,7 +391,7 @@ def _build_paragraphs(data: ReportData, doubtful: Sequence[str]) -> dict[str, li
     if doubtful:
         changes.append(f"the doubts below, on {join_names(doubtful)}, may change this")
     ranges = dict.fromkeys(row for x in data.verdict_ranges for row in list_ranges(data, x))
-    changes += [f"by its finish {name} is {wider}" for name, _, wider in ranges if wider]
+    changes += [f"by its finish {name} is {wider}" for name, *_, wider in ranges if wider]
     if single := list_unvaried(data):
         none = ", and displacements have no range" * (bool(data.runs) and not data.verdict_ranges)
         changes.append(f"{join_words(single)} were not varied{none}")

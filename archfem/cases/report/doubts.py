@@ -169,9 +169,9 @@ def list_notes(data: ReportData) -> dict[str, list[str]]:
     return notes
 
 
-def list_ranges(data: ReportData, found: VerdictRange) -> list[tuple[str, str, str]]:
-    """Return each varied property, its range, and a stated one that is wider."""
-    rows, stated = list[tuple[str, str, str]](), dict[str, tuple[float, float, float]]()
+def list_ranges(data: ReportData, found: VerdictRange) -> list[tuple[str, str, str, str]]:
+    """Return each varied property, its range, the mark of this, and a stated one that is wider."""
+    rows, stated = list[tuple[str, str, str, str]](), dict[str, tuple[float, float, float]]()
     structure, contacts = data.case.structure, data.case.settings.get("contacts", {})
     for joint in structure.joints:
         if finish := contacts.get(joint.contact.name, {}).get("finish"):
@@ -179,8 +179,10 @@ def list_ranges(data: ReportData, found: VerdictRange) -> list[tuple[str, str, s
             stated = {"k_n": law.initial, "k_s": law.shear} | stated  # of the first, as inputs
     for name in found.properties:
         values, wider = found.dataset[name].values, ""
+        mark = "given" if name in data.case.verdict.get("vary", ()) else "default"
         if values.dtype.kind != "f":
-            rows.append((property_text(name), ", ".join(dict.fromkeys(map(str, values))), ""))
+            words = ", ".join(dict.fromkeys(map(str, values)))
+            rows.append((property_text(name), words, mark, ""))
             continue
         ends, unit = Ends.of(values), " × that of the case"
         if name in found.dataset.attrs:
@@ -190,7 +192,7 @@ def list_ranges(data: ReportData, found: VerdictRange) -> list[tuple[str, str, s
             if low < 0.99 * ends[0] or high > 1.01 * ends[1]:
                 wider = f"{low:.2g} to {high:.2g} MPa/mm, wider than was varied"
         unit = " added to that of the case" if name == "friction" else unit
-        rows.append((property_text(name), f"{ends:.3g}{unit}", wider))
+        rows.append((property_text(name), f"{ends:.3g}{unit}", mark, wider))
     return rows
 
 
