@@ -3,6 +3,7 @@
 The files of a run appear in its folder together, when all of them exist (`archfem._files`).
 """
 
+import shutil
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -97,11 +98,17 @@ class ResultFolder(CaseResult):
         """Write a page to a path, or into the folder in place of an earlier one."""
         if path is not None:
             return write(path)
-        group = _files.group_of(_files.read_file_list(self.folder), CASE_FILE)
+        with _files.lock_folder(self.folder):  # refused now if another command writes
+            group = _files.group_of(_files.read_file_list(self.folder), CASE_FILE)
         assert group is not None
-        with _files.replace_results(self.folder, name, group.inputs) as draft:
-            write(draft / f"{name}.html")
-        return self.folder / f"{name}.html"
+        # others write meanwhile: figures take minutes
+        with _files.temporary_folder() as made:
+            page = write(made / f"{name}.html")
+            with _files.replace_results(self.folder, name, group.inputs) as draft:
+                if _files.group_of(_files.read_file_list(self.folder), CASE_FILE) != group:
+                    raise InvalidInput(f"{self.folder} has other results now: write it again")
+                shutil.copyfile(page, draft / page.name)
+        return self.folder / page.name
 
 
 @validate_arguments

@@ -50,6 +50,26 @@ def run_into(folder, small, change):
     return case
 
 
+def test_other_commands_write_while_a_page_is_drawn(small, tmp_path):
+    """But a page of results that were replaced meanwhile is refused."""
+    run_into(tmp_path, small, "suite.scale=1")
+    opened, own = results.open_results(tmp_path), read_file_list(tmp_path)["run"].inputs
+
+    def write_beside(path, command="verdict", inputs=own):
+        with replace_results(tmp_path, command, inputs) as draft:
+            name = "case.toml" if command == "run" else f"{command}.txt"
+            (draft / name).write_text("words")
+        Path(path).write_text("a page")
+        return Path(path)
+
+    assert opened._write("report", write_beside, None).read_text() == "a page"
+    assert (tmp_path / "verdict.txt").read_text() == "words"
+    assert "report.html" in read_file_list(tmp_path)["report"].files
+    with pytest.raises(af.InvalidInput, match="other results now"):
+        opened._write("report", lambda path: write_beside(path, "run", "others"), None)
+    assert "report" not in read_file_list(tmp_path)
+
+
 @pytest.fixture(scope="module", autouse=True)
 def undoubted_runs():
     """Runs are not compared with finer ones, which test_run.py tests: a third of their time."""
