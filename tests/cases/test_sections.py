@@ -150,9 +150,9 @@ def test_falls_by_property_are_a_table_whose_cells_wrap(piers, tmp_path):
     )
     assert low < 0.6 or high > 6.0
     wider = f"{low:.2g} to {high:.2g} MPa/mm, wider than was varied"
-    assert varied.rows == [("k_n", "0.6 to 6 MPa/mm", wider)]
-    settings["contacts"] = {}
-    assert sections._build_range(data)[1].rows == [("k_n", "0.6 to 6 MPa/mm", "")]
+    assert varied.rows == [("k_n", "0.6 to 6 MPa/mm", "default", wider)]
+    settings |= {"contacts": {}, "verdict": {"vary": {"k_n": [0.3, 3.0]}}}
+    assert sections._build_range(data)[1].rows == [("k_n", "0.6 to 6 MPa/mm", "given", "")]
     assert found.sentence in text.text
     assert "explains" not in text.text
     assert table.head == ["property", "explains, of the variance of the outcome", "falls"]

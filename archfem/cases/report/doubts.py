@@ -179,7 +179,7 @@ def list_ranges(data: ReportData, found: VerdictRange) -> list[tuple[str, str, s
             stated = {"k_n": law.initial, "k_s": law.shear} | stated  # of the first, as inputs
     for name in found.properties:
         values, wider = found.dataset[name].values, ""
-        mark = "given" if name in data.case.verdict.get("vary", ()) else "default"
+        mark = "given" if name in data.read_table("verdict").get("vary", ()) else "default"
         if values.dtype.kind != "f":
             words = ", ".join(dict.fromkeys(map(str, values)))
             rows.append((property_text(name), words, mark, ""))
