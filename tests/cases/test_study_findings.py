@@ -222,6 +222,16 @@ def test_of_factors_the_least_is_the_worst():
     assert text == "in the study the factor is least, 0.4, at friction = 0.4, width = 2"
 
 
+def test_words_and_states_of_the_users_own_function_are_no_findings():
+    """It may give any names, and the command states findings of each study."""
+    cases = {"case": [*"ab"]}
+    words = xr.Dataset({"factor": ("case", ["low", "high"])}, cases)
+    assert not [*study_findings.say_what_changes(study_findings.collect_findings("", "", words))]
+    other = xr.Dataset({"factor": ("case", [0.6, 0.5]), "fall": ("case", ["leans", ""])}, cases)
+    (text,) = study_findings.say_what_changes(study_findings.collect_findings("", "", other))
+    assert text.endswith("'b' lowers the factor most, from 0.6 to 0.5")
+
+
 def test_the_table_of_a_study_names_what_it_varies(tmp_path):
     """Also what named cases change; a value that all cases share is not varied."""
     (tmp_path / "column.toml").write_text(

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -111,7 +111,6 @@ class StudyFindings:
         return ", ".join(f"{key.replace('_', ' ')} = {_format(row[key])}" for key in self.keys)
 
 
-@lru_cache(maxsize=1)
 def read_studies(data: ReportData) -> list[StudyFindings]:
     """Read the studies of a report, or that of its results, if there is one."""
     own = [data.folder] if data.folder and (data.folder / "study.txt").is_file() else []
@@ -140,7 +139,8 @@ def collect_findings(title: str, text: str, table: xr.Dataset) -> StudyFindings:
     frame = table.to_dataframe().reset_index()
     differing = [str(name) for name in table.coords if frame[name].nunique() > 1]
     keys = [name for name in differing if name not in _NO_CASE] or differing
-    shown = [name for name in (*_FACTORS, *_SIZES) if name in table.data_vars]
+    numbers = [name for name, each in table.data_vars.items() if each.dtype.kind == "f"]
+    shown = [name for name in (*_FACTORS, *_SIZES) if name in numbers]
     names = [name for name in shown if name != "factor" or "push" not in shown]
     worst = _find_worst(frame, keys, names) if keys and names else frame.head(0)
     return StudyFindings(title, text, table, tuple(keys), tuple(names), worst)
