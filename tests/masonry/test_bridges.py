@@ -343,7 +343,7 @@ def test_gravity_width_and_material_are_passed_on():
         ),
         (
             {"arches": FEW, "piers": (af.shapes.Pier(breadth=0.4, height=2.0),)},
-            r"on a breadth of 0.4 m, and one stone would take over 1/4 of .*: give a wider one",
+            r"on a breadth of 0.4 m, and one stone would take over 1/6 of .*: give a wider one",
         ),
         ({"sidewalls": walls(setback=1.9)}, "nothing is left of its length 2 m behind the ring"),
         ({"sidewalls": walls(length=0.2)}, "nothing is left of its length 0.2 m"),

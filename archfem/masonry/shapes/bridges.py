@@ -32,7 +32,7 @@ MIN_GAP = 0.01
 
 # A skewback takes at most the voussoirs of a ring over this at each springing [-]: no stone of an
 # arch is larger
-MAX_SHARED = 4
+MAX_SHARED = 6
 
 # One length for all parts, or one for each, from left to right
 Lengths = Metres | Sequence[Metres]
