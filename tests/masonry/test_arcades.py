@@ -68,7 +68,7 @@ def test_an_arch_between_buttresses():
     ("change", "says"),
     [
         ({"heights": [2.0, 2.0]}, "2 heights: give one for all, or 3"),
-        ({"breadths": 0.3}, "a ring does not stand on a breadth of 0.3 m"),
+        ({"breadths": [0.3, 1.5, 0.3]}, "a ring does not stand on a breadth of 0.3 m"),
         ({"rises": 1.5}, "either embrace or rise"),
     ],
 )
