@@ -1,14 +1,14 @@
-"""Range of a result over unmeasured properties of a fill: place of its inertia, passive pressure.
+"""Range of a result over unmeasured properties of a fill: place of inertia, pressure, backing.
 
 Horizontal forces on a fill act at the feet of its columns or at their centroids. From the feet,
 shear carries their moment to ends that hold; at the centroids the stones below carry all of it. Its
-passive pressure needs movement to develop. Both are assumed, so a result must hold for all of their
-values.
+passive pressure needs movement to develop, and backing behind haunches is seldom opened. All are
+assumed, so a result must hold for all of their values.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import product
+from itertools import chain, combinations, product
 from typing import NamedTuple
 
 from archfem.limit.fill_strength import Fill, change_fill
@@ -24,15 +24,18 @@ WEAKER_FILLS: Mapping[str, Sequence[str]] = {
     "full_pressure": ("by_pressure", "factor", "without_backing"),
 }
 
+_NONE = "no backing"
+
 
 class FillAssumption(NamedTuple):
-    """Words of one assumption on a fill: on its inertia, and on its passive pressure."""
+    """Words of one assumption on a fill: on its inertia, passive pressure and backing."""
 
     inertia: str
     pressure: str  # empty where no pressure counts
+    backing: str = ""  # empty where none is given
 
     def __str__(self) -> str:
-        """Return both in words."""
+        """Return all in words."""
         return ", ".join(filter(None, self))
 
 
@@ -44,23 +47,30 @@ def vary_fill(fill: Fill | None) -> dict[FillAssumption, tuple[float, Fill | Non
     own = (0.0, 0.0) if fill is None else (fill.lever, fill.mobilisation)
     pairs = [own, *product((1.0, 0.0), (own[1], 0.0))]
     assumed = dict[FillAssumption, tuple[float, Fill | None]]()
-    for lever, mobilisation in pairs:
+    for (backing, held), (lever, mobilisation) in product(_vary_backing(fill).items(), pairs):
         between = f"lever of {lever:g}"
         place = {0.0: "columns' feet", 1.0: "columns' centroids"}.get(lever, between)
         pressure = f"{say_part(mobilisation)} of its passive pressure"
-        words = f"the fill's inertia at its {place}", "" if fill is None else pressure
-        changed = fill and change_fill(fill, lever=lever, mobilisation=mobilisation)
+        words = f"the fill's inertia at its {place}", "" if fill is None else pressure, backing
+        changed = held and change_fill(held, lever=lever, mobilisation=mobilisation)
         assumed.setdefault(FillAssumption(*words), (lever, changed))
     return assumed
 
 
+def _vary_backing(fill: Fill | None) -> dict[str, Fill | None]:
+    """Return a fill as it is and, where backing is given, without it, by words."""
+    if fill is None or (fill.backing is None and fill.backing_height is None):
+        return {"": fill}
+    return {"the backing": fill, _NONE: change_fill(fill, backing=None, backing_height=None)}
+
+
 def vary_pressure(fill: Fill) -> dict[str, Fill]:
     """Return a fill with none and with all of its passive pressure, and without its backing."""
-    none = change_fill(fill, mobilisation=0.0, active=0.0)
-    fills = {"without_pressure": none, "full_pressure": change_fill(fill, mobilisation=1.0)}
-    if fill.backing is not None:
-        fills["without_backing"] = change_fill(fill, backing=None)
-        fills["without_either"] = change_fill(none, backing=None)
+    none = {"mobilisation": 0.0, "active": 0.0}
+    fills = {"without_pressure": change_fill(fill, **none)}
+    fills["full_pressure"] = change_fill(fill, mobilisation=1.0)
+    if bare := _vary_backing(fill).get(_NONE):
+        fills |= {"without_backing": bare, "without_either": change_fill(bare, **none)}
     return fills
 
 
@@ -137,8 +147,11 @@ class FillRange:
         good = [key for key, value in self.values.items() if value >= 1.0]
         if len(good) in (0, len(self.values)):
             return ""
-        words = dict.fromkeys(word for key in good for word in key if word)
-        # words, on inertia or pressure alone, with which it passes in any case
-        enough = [x for x in words if all(key in good for key in self.values if x in key)]
-        rest = [" and ".join(filter(None, key)) for key in good if not {*key} & {*enough}]
-        return " or ".join([*enough, *rest])
+        words = [*filter(None, dict.fromkeys(chain(*good)))]
+        enough = list[tuple[str, ...]]()
+        # the fewest words with which it passes in any case
+        for each in chain(*(combinations(words, count) for count in (1, 2, 3))):
+            under = [value for key, value in self.values.items() if {*each} <= {*key}]
+            if min(under, default=0.0) >= 1.0 and not any({*x} <= {*each} for x in enough):
+                enough.append(each)
+        return " or ".join(" and ".join(each) for each in enough)

@@ -84,6 +84,39 @@ def test_a_stone_turns_into_a_fill_at_a_factor_by_each_assumption(verified):
     assert down.over_fill is None
 
 
+def test_a_stone_turns_into_a_fill_with_and_without_its_backing(verified):
+    """Backing holds its part of the face by its strength alone; without it the fill is as ever."""
+    strength, level, passive = 1e5, HEIGHT / 2.0, 3.0
+    fill = af.limit.Fill(friction_angle=30.0, backing=level, backing_strength=strength)
+    options = {"live": af.BodyForce(1.0), "friction": None}
+    found = af.collapse_factor(buried_stone(), fill=fill, **options)
+    expected = {
+        key._replace(backing="no backing"): factor
+        for key, (factor, _) in turning_factors(passive).items()
+    }
+    weights = np.array([HEIGHT * af.STONE.unit_weight, DEPTH * SOIL.unit_weight]) * BREADTH
+    # moment of γ (top - y) above the backing
+    levels, top = np.array([level, HEIGHT]), HEIGHT + DEPTH
+    above = SOIL.unit_weight * np.diff(top * levels**2 / 2.0 - levels**3 / 3.0)[0]
+    for place, pressure in product((FEET, CENTROIDS), (THIRD, NONE)):
+        heights = np.array([HEIGHT / 2.0, HEIGHT + DEPTH / 2.0 * (place == CENTROIDS)])
+        held = weights.sum() * BREADTH / 2.0 + strength * level**2 / 2.0
+        held += above * (passive / 3.0 if pressure == THIRD else 1.0 / passive)
+        key = FillAssumption(place, pressure, "the backing")
+        expected[key] = held / (weights @ heights)
+    assert found.over_fill.values == pytest.approx(expected, rel=1e-9)
+    least = min(expected.values())
+    verified("stone in a backed fill: least factor", least, "moments", found.range[0])
+    assert f"at {least:.4g} g ({CENTROIDS}, {NONE}, no backing) to" in str(found)
+    assert f"({FEET}, {THIRD}, the backing)" in str(found)
+    settings = LimitAnalysis((af.BodyForce(1.0),), None, fill=fill)
+    assert settings.solve_least(settings.solve(buried_stone())).factor == pytest.approx(least)
+    assessed = af.kinematic_assessment(buried_stone(), SITE, fill=fill, friction=None)
+    bare = af.limit.Fill(friction_angle=30.0)
+    bare = af.kinematic_assessment(buried_stone(), SITE, fill=bare, friction=None)
+    assert assessed.linear.over_fill.ends[0] == pytest.approx(bare.linear.over_fill.ends[0])
+
+
 def test_an_assessment_passes_only_with_what_it_needs():
     """Linear ratios by hand; the margin of the displacement check is that of each fill alone."""
     structure, fill = buried_stone(), af.limit.Fill(friction_angle=30.0)
@@ -160,3 +193,24 @@ def test_outcomes_hold_over_the_range(values, words):
     assert FillRange(dict.fromkeys(found.values, 1.0)).describe().startswith("1 whatever is")
     halved = FillRange({key: value / 2.0 for key, value in found.values.items()})
     assert FillRange.least_of([found, halved]) == halved
+
+
+@pytest.mark.parametrize(
+    ("passing", "words"),
+    [
+        ("backing", "the backing"),
+        ("backing and feet", f"{FEET} and the backing"),
+        ("backing or third", f"{THIRD} or the backing"),
+    ],
+)
+def test_outcomes_state_the_backing_where_they_need_it(passing, words):
+    values = {}
+    for key in product((FEET, CENTROIDS), (THIRD, NONE), ("the backing", "no backing")):
+        backed = key[2] == "the backing"
+        passes = {
+            "backing": backed,
+            "backing and feet": backed and key[0] == FEET,
+            "backing or third": backed or key[1] == THIRD,
+        }
+        values[FillAssumption(*key)] = 0.9 + 0.2 * passes[passing]
+    assert FillRange(values).outcome == f"passes only with {words}"
