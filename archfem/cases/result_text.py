@@ -361,15 +361,9 @@ def note_masses(
 
 def tabulate_ratings(ratings: Iterable[Rating]) -> ResultTable:
     """Tabulate the ratings of a bridge for several vehicles."""
-    columns, rated = ["factor", "without_pressure", "full_pressure"], list(ratings)
-    if any(isinstance(found.fill, PlasticFill) for found in rated):
-        columns.insert(1, "by_pressure")
-    if any(getattr(found.fill, "backing", None) is not None for found in rated):
-        columns += ["without_backing", "without_either"]
-    columns.append("geometric")
-    rows = []
-    for found in rated:
-        numbers = [getattr(found, column) for column in columns]
+    rows, columns = [], list[str]()
+    for found in ratings:
+        columns, numbers = [*found.factors], found.factors.values()
         cells = ["-" if np.isnan(value) else f"{value:.4g}" for value in numbers]
         values = {"live": found.live, "impact": found.impact}
         by = ("none" if key in found.missing else f"{x:g}" for key, x in values.items())

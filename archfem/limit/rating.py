@@ -141,6 +141,16 @@ class Rating(ResultDisplay):
         return self.moving.worst.factor
 
     @property
+    def factors(self) -> dict[str, float]:
+        """Least factors by state of the fill, and the geometric one, by the names above [-]."""
+        names = ["factor", "without_pressure", "full_pressure"]
+        if isinstance(self.fill, PlasticFill):
+            names.insert(1, "by_pressure")
+        if self._has_backing:
+            names += ["without_backing", "without_either"]
+        return {name: float(getattr(self, name)) for name in [*names, "geometric"]}
+
+    @property
     def passes(self) -> bool:
         """Whether the bridge carries the factored vehicle everywhere; no if it falls unloaded."""
         return bool(self.factor >= 1.0)

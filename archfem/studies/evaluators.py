@@ -208,11 +208,10 @@ def evaluate_limit(case: Case) -> Findings:
 
 
 def evaluate_rating(case: Case) -> Findings:
-    """Return the rating factor of a case, where the vehicle stands, and the range over pressure."""
+    """Return the factor of a case in each state of its fill, and the place of the vehicle."""
     found = rate_case(case.structure, case.rating, case.limit)
-    names = ("factor", "without_pressure", "full_pressure", "geometric")
-    findings: Findings = {name: float(getattr(found, name)) for name in names}
-    return findings | {"position": found.moving.position, "hinges": len(found.moving.worst.hinges)}
+    place = {"position": found.moving.position, "hinges": len(found.moving.worst.hinges)}
+    return found.factors | place
 
 
 def evaluate_comparison(

@@ -20,7 +20,7 @@ from study_tables import equal_tables
 import archfem as af
 from archfem.cases import provenance
 from archfem.studies import parameter_axes, process_pool, result_store
-from archfem.studies.evaluators import Evaluator
+from archfem.studies.evaluators import Evaluator, evaluate_rating
 from archfem.studies.parameter_space import group_by_model
 from archfem.studies.result_store import Store
 from archfem.studies.shared_results import compute_once, share_results
@@ -583,6 +583,31 @@ def test_a_study_of_ratings_has_the_factors_of_rate(small):
     for dead, factor in zip((1.0, 2.0), table["factor"].values, strict=True):
         vehicle = af.limit.Vehicle("axle", (10e3,), live=1.5, impact=1.2)
         assert factor == af.rate(case.structure, vehicle, dead=dead).factor
+
+
+def test_a_study_of_ratings_states_those_without_backing(monkeypatch):
+    """The factor without the backing is that of a case that has none, here far below."""
+    monkeypatch.setattr(af.limit.rating, "_places_along", lambda *_: (3.5, 4.5))
+    arch = {"span": "5 m", "rise": "1.8 m", "thickness": "0.35 m", "voussoirs": 9}
+    wall = {"length": "2 m", "height": "1.5 m", "state": "fixed"}
+    given = {
+        "structure": {
+            **{"shape": "bridge", "width": "3 m", "arches": {"arch": arch}},
+            **{"sidewalls": {"left": wall, "right": wall}, "backfill": {"cover": "0.4 m"}},
+        },
+        "rating": {"vehicle": {"name": "axle", "axles": ["10 kN"], "live": 1.5, "impact": 1.2}},
+        "limit": {"strength": "5 MPa"},
+    }
+    strength = {"friction_angle": "30 degree"}
+    found = {}
+    for name, fill in (("backed", strength | {"backing_height": "1 m"}), ("bare", strength)):
+        case = af.Case.of(given | {"limit": given["limit"] | {"fill": fill}})
+        found[name] = evaluate_rating(case)
+    backed, bare = found.values()
+    assert backed["without_backing"] == pytest.approx(bare["factor"], rel=1e-6)
+    assert backed["without_either"] == pytest.approx(bare["without_pressure"], rel=1e-6)
+    assert backed["without_pressure"] > 1.1 * backed["without_either"]
+    assert "without_backing" not in bare
 
 
 def test_pairs_that_all_fail_have_their_errors(small, tmp_path, monkeypatch):

@@ -24,7 +24,10 @@ from archfem.view.pages.document import Grid
 # Findings that a report shows, those that decide first: of factors the least is the worst, and
 # those of a push are shown in g
 OVER_SITE = "over the site's acceleration"
-_FACTORS = ("least_push", "push", OVER_SITE, "factor", "without_pressure")
+_FACTORS = (
+    *("least_push", "push", OVER_SITE),
+    *("factor", "without_pressure", "without_backing", "without_either"),
+)
 _SIZES = ("largest_displacement", "residual_displacement")
 MAX_CASES = 24
 MIN_CHANGE = 0.1  # of a finding that is worth a sentence [-]
