@@ -225,7 +225,9 @@ def state_ratings(
         outcome = f"rating for {first.vehicle.name}: factor {first.factor:.4g}, {outcome}"
         sentences = [outcome, *others, f"worst {first.place}"]
     if len(rated) > 1:
-        sentences.append(f"of {len(rated)} vehicles it has the least factor")
+        least, code = first.least_by_codes
+        words = f", {least:.4g} {code}" * bool(code)
+        sentences.append(f"of {len(rated)} vehicles it has the least factor{words}")
     sentences += [*first.describe_codes(), *first.describe_pressure(), *first.describe_backing()]
     least_first = [row for _, row in sorted(rows, key=lambda each: each[0])]
     stated = Statement(sentences, least_first)

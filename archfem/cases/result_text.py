@@ -361,14 +361,18 @@ def note_masses(
 
 def tabulate_ratings(ratings: Iterable[Rating]) -> ResultTable:
     """Tabulate the ratings of a bridge for several vehicles."""
-    rows, columns = [], list[str]()
-    for found in ratings:
+    rows, columns, rated = [], list[str](), list(ratings)
+    by_codes = any(found.least_by_codes[1] for found in rated)
+    for found in rated:
         columns, numbers = [*found.factors], found.factors.values()
         cells = ["-" if np.isnan(value) else f"{value:.4g}" for value in numbers]
         values = {"live": found.live, "impact": found.impact}
         by = ("none" if key in found.missing else f"{x:g}" for key, x in values.items())
         outcome = f"{found.outcome}, {found.place}"
+        least, code = found.least_by_codes
+        cells += [f"{least:.4g} {code.partition(' (')[0]}".strip()] * by_codes
         rows.append([found.vehicle.name, " × ".join(by), *cells, outcome])
+    columns += ["least by codes"] * by_codes
     head = ["vehicle", "live × impact", *(column.replace("_", " ") for column in columns)]
     return ResultTable([*head, "outcome, and axles at the worst place"], rows)
 

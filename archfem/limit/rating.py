@@ -421,6 +421,13 @@ class Rating(ResultDisplay):
         return {name: self._with_factors(of) for name, of in found.items()}
 
     @property
+    def least_by_codes(self) -> tuple[float, str]:
+        """Least factor by codes of a vehicle without factors, and of which; else its own, ""."""
+        own = self.factor, ""
+        codes = self.by_codes if self.missing else {}
+        return min([(each.factor, by) for by, each in codes.items()] or [own])
+
+    @property
     def _is_multiple(self) -> bool:
         """Whether the factor with other factors on the vehicle is a multiple of this one."""
         return not self.area_load and (self.impact == 1.0 or self.vehicle.impact_on == "all axles")

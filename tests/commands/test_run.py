@@ -892,6 +892,26 @@ def test_vehicles_are_rated_together(tmp_path, unplotted, capsys, monkeypatch):
     assert "van" in (out / "rating.toml").read_text()
 
 
+def test_a_vehicle_without_factors_has_the_rank_of_the_worst_code(tmp_path, unplotted, monkeypatch):
+    """One axle of 50 kN is 171 kN by CS 454, more than 126 kN of 60 kN with 1.5 × 1.4."""
+    path, out = tmp_path / "ring.toml", tmp_path / "out"
+    own = '{ name = "given", axles = ["60 kN"], live = 1.5, impact = 1.4 }, '
+    own += '{ name = "bare", axles = ["50 kN"] }'
+    path.write_text(f"{LIMIT.replace('= 17', '= 7')}[rating]\nvehicle = [{own}]\n")
+    monkeypatch.setattr("archfem.limit.rating._places_along", lambda *_: (0.9, 1.2))
+    assert af.commands.main(["rate", str(path), "--out", str(out)]) in (0, 3)
+    rows = pd.read_csv(out / "vehicles.csv").set_index("vehicle")
+    assert [*rows.index] == ["bare", "given"]
+    assert rows["factor"]["bare"] > 2.5 * rows["factor"]["given"]
+    least, by = rows["least by codes"]["bare"].split(" ", 1)
+    assert float(least) == pytest.approx(rows["factor"]["bare"] / (1.9 * 1.8), rel=1e-3)
+    assert by == "by CS 454"
+    assert float(rows["least by codes"]["given"]) == rows["factor"]["given"]
+    kept = json.loads((out / "rating.json").read_text())["sentences"]
+    words = f"it has the least factor, {least} by CS 454 (1.9, and 1.8 on the worst axle, "
+    assert any(words in each for each in kept)
+
+
 def test_the_vehicle_that_decides_is_varied(tmp_path, unplotted, monkeypatch):
     """Its factor is the nearest to 1: of a worse one other properties would change no outcome."""
     path, out = tmp_path / "ring.toml", tmp_path / "out"
