@@ -5,13 +5,13 @@ from collections.abc import Sequence
 import numpy as np
 from scipy import sparse
 
-from archfem._validation import check_between, check_choice, check_number, check_type
+from archfem._validation import check_between, check_choice, check_type
 from archfem.errors import InvalidInput
 from archfem.limit.backfill import SELF_WEIGHT, BlocksWithFill, attach_fill
 from archfem.limit.fill_strength import Fill
 from archfem.limit.linear_programme import Optimum, Programme, RigidBlocks
 from archfem.masonry.loads import Action
-from archfem.masonry.materials import STONE
+from archfem.masonry.materials import STONE, check_strength
 from archfem.masonry.structure import Structure
 
 
@@ -35,7 +35,7 @@ def check_options(structure: Structure, friction: str | None, strength: float | 
         return min(filter(None, own), default=np.inf)
     if strength != np.inf:
         check_between(strength, "strength [Pa]", 0.0, remedy="leave it out for no limit")
-        check_number(strength, "strength [Pa], of which 5 MPa are 5e6,", minimum=1e3)
+        check_strength(strength, "strength")
     return strength
 
 

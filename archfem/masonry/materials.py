@@ -69,8 +69,14 @@ class Material:
                     f"unit_weight {number} N/m³ of '{self.name}' looks like {unit}: give it in "
                     f"N/m³: {number} {unit} have {self.unit_weight * factor:.4g}"
                 )
-        if self.strength is not None:  # no building material has less
-            check_number(self.strength, f"strength of '{self.name}' [Pa]", minimum=1e3)
+        if self.strength is not None:
+            check_strength(self.strength, f"strength of '{self.name}'")
+
+
+def check_strength(strength: float, name: str) -> None:
+    """Refuse a compressive strength that no masonry has, by a wrong unit [Pa]."""
+    # lumps of dry clay have ten times as much (from memory)
+    check_number(strength, f"{name} [Pa], of which 5 MPa are 5e6,", minimum=5e4)
 
 
 @dataclass(frozen=True)

@@ -133,7 +133,8 @@ def test_the_strength_of_a_material_is_that_of_its_stones_and_no_default_is(monk
     assert af.stands(brittle, strength=np.inf)
     for wrong, says in (
         (-1.0, "is not above 0: leave it out for no limit"),
-        (5.0, r"strength \[Pa\], of which 5 MPa are 5e6, = 5.0 is below 1000"),
+        (5.0, r"strength \[Pa\], of which 5 MPa are 5e6, = 5.0 is below 50000"),
+        (9e3, r"strength \[Pa\], of which 5 MPa are 5e6, = 9000.0 is below 50000"),
     ):
         with pytest.raises(af.InvalidInput, match=says):
             af.collapse_factor(stones, live=SIDEWAYS, strength=wrong)

@@ -13,7 +13,8 @@ from archfem.masonry import BACKFILL, SOIL_TO_STONE, STONE_TO_STONE
         (lambda: af.Material(30e9, 0.5, 20e3), "poisson of .* = 0.5 is not between"),
         (lambda: af.Material(30e9, 0.2, 2e6), "unit_weight of .* = 2000000.0 is not"),
         (lambda: af.Material(30e9, 0.2, 20.0), "looks like kN/m³: .* have 2e.04"),
-        (lambda: af.Material(30e9, 0.2, 20e3, -1.0), r"\[Pa\] = -1.0 is below 1000"),
+        (lambda: af.Material(30e9, 0.2, 20e3, -1.0), r"5e6, = -1.0 is below 50000"),
+        (lambda: af.Material(30e9, 0.2, 20e3, 9e3), "5 MPa are 5e6, = 9000.0 is below 50000"),
         (lambda: af.Contact(1.48, 0.3e9), "normal_stiffness of .* = 1.48 is not"),
         (lambda: af.Contact(1.48e9, 0.3e9, -0.1), "friction of .* = -0.1 is not"),
         (
@@ -69,7 +70,7 @@ BOUNDS = [
     (lambda x: af.Material(3e10, x, 2e4), -1.0, 0.5),
     (lambda x: af.Material(3e10, 0.2, x), 1e-3, 1000.0),
     (lambda x: af.Material(3e10, 0.2, x), 4000.0, 250e3),
-    (lambda x: af.Material(3e10, 0.2, 2e4, x), 1e3, None),
+    (lambda x: af.Material(3e10, 0.2, 2e4, x), 5e4, None),
     (lambda x: af.Contact(x, 3e8), 1e3, 1e16),
     (lambda x: af.Contact(1.48e9, x), 1e3, 1e16),
     (lambda x: af.Contact(1.48e9, 3e8, x), 0.0, 10.0),

@@ -55,7 +55,8 @@ WALL = {"length": 2.0, "height": 2.3, "above": 0.8}
             lambda: af.shapes.Backfill(cover=0.4, spandrels=-1.0),
             r"'backfill': spandrels \[m\] = -1.0 is not",
         ),
-        (lambda: af.shapes.Backfill(cover=300.0), r"cover \[m\] = 300.0 is not between 0 and 100"),
+        (lambda: af.shapes.Backfill(cover=300.0), r"cover \[m\] = 300.0 is not between 0 and 30"),
+        (lambda: af.shapes.Backfill(cover=45.0), r"cover \[m\] = 45.0 is not between 0 and 30"),
         (
             lambda: af.bridge(arches=[af.shapes.Arch(**RING)], width=4000.0),
             r"width \[m\] = 4000.0 is not between 0.001 and 300: give metres",

@@ -193,7 +193,8 @@ class Backfill:
 
     def __post_init__(self) -> None:
         """Check the lengths."""
-        _check_lengths(self, "cover", "erosion", "hump", "spandrels", zero=True, high=100.0)
+        _check_lengths(self, "cover", zero=True, high=30.0)
+        _check_lengths(self, "erosion", "hump", "spandrels", zero=True, high=100.0)
 
     def surface(self, left: float, right: float, crown: Point) -> list[Point]:
         """Return points of the surface, from left to right [m].
