@@ -29,7 +29,7 @@ from archfem.dynamics.verdict import ALL_DEFINITIONS, Verdict
 from archfem.errors import InvalidInput
 from archfem.joints.criteria import assessed_joints, envelope, first_time, longest_duration
 from archfem.limit.collapse import Collapse, Outcome, describe_crushing, describe_fill
-from archfem.limit.fill_strength import Fill, PlasticFill, as_pressure
+from archfem.limit.fill_strength import Fill, PlasticFill, as_pressure, has_backing
 from archfem.limit.instability import explain_instability
 from archfem.limit.mechanism_count import duration_text
 from archfem.limit.rating import Rating
@@ -249,6 +249,8 @@ def describe_dead_load(result: DeadLoadResult, *, explain: bool = False) -> str:
         *describe_friction_margin(result.case, structure),
         *note_masses(structure, parapets=result.case.parapets),
     ]
+    if has_backing(result.case.limit.fill):
+        lines.append(f"{NOTE_MARK}the backing of [limit] is fill here, in dead load and runs")
     across = structure.transverse_remark
     if result.case.has_motion and structure.heads.any():
         across = across.replace(UNCHECKED_ACROSS, CHECKED_ACROSS)

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from itertools import chain, combinations, product
 from typing import NamedTuple
 
-from archfem.limit.fill_strength import Fill, change_fill
+from archfem.limit.fill_strength import Fill, change_fill, has_backing
 
 # Fills of `vary_pressure`, and as given ("factor") or as the pressure of a plastic one, with those
 # whose pressures are within theirs, so that their factors are bounds from below; the weakest first
@@ -59,7 +59,7 @@ def vary_fill(fill: Fill | None) -> dict[FillAssumption, tuple[float, Fill | Non
 
 def _vary_backing(fill: Fill | None) -> dict[str, Fill | None]:
     """Return a fill as it is and, where backing is given, without it, by words."""
-    if fill is None or (fill.backing is None and fill.backing_height is None):
+    if fill is None or not has_backing(fill):
         return {"": fill}
     return {"the backing": fill, _NONE: change_fill(fill, backing=None, backing_height=None)}
 

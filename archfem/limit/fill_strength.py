@@ -237,6 +237,11 @@ def _in_words(degrees: float) -> Any:
     return f"{degrees!r} degree"
 
 
+def has_backing(fill: Fill | PlasticFill | None) -> bool:
+    """Return whether masonry holds the haunches, up to a level or a height."""
+    return fill is not None and (fill.backing, fill.backing_height) != (None, None)
+
+
 def find_clear_springing(structure: Structure) -> float:
     """Return the lowest end of the intrados of any ring; NaN without one [m]."""
     ends = [joint.intrados[1] for joint in structure.joints if joint.role == "ring"]

@@ -13,7 +13,7 @@ from archfem._validation import validate_arguments
 from archfem.errors import InvalidInput
 from archfem.limit.collapse import describe_crushing, describe_fill
 from archfem.limit.fill_range import WEAKER_FILLS, say_part, vary_pressure
-from archfem.limit.fill_strength import Fill, PlasticFill, as_pressure, place_backing
+from archfem.limit.fill_strength import Fill, PlasticFill, as_pressure, has_backing, place_backing
 from archfem.limit.self_weight import check_options, is_balanced, self_weight_programme
 from archfem.limit.thickness import find_geometric_factor
 from archfem.limit.vehicles import (
@@ -146,7 +146,7 @@ class Rating(ResultDisplay):
         names = ["factor", "without_pressure", "full_pressure"]
         if isinstance(self.fill, PlasticFill):
             names.insert(1, "by_pressure")
-        if self._has_backing:
+        if has_backing(self.fill):
             names += ["without_backing", "without_either"]
         return {name: float(getattr(self, name)) for name in [*names, "geometric"]}
 
@@ -199,11 +199,6 @@ class Rating(ResultDisplay):
         return f"factor {self.factor:.4g} {self.place}, {self.outcome}"
 
     @property
-    def _has_backing(self) -> bool:
-        """Whether masonry holds the haunches."""
-        return self.fill is not None and self.fill.backing is not None
-
-    @property
     def _as_given(self) -> str:
         """Of which state of the fill a number alone is, in words."""
         return ", with the fill as given" if self.fill is not None else ""
@@ -218,7 +213,7 @@ class Rating(ResultDisplay):
         names: dict[tuple[str, ...], str] = {(): "factor"}
         if self.fill is not None:
             names[_PRESSURE,] = "without_pressure"
-        if self._has_backing:
+        if has_backing(self.fill):
             names |= {(_BACKING,): "without_backing", (_PRESSURE, _BACKING): "without_either"}
         states = {parts: known[name] for parts, name in names.items()}
         if self.crushing:
@@ -369,7 +364,7 @@ class Rating(ResultDisplay):
 
     def describe_backing(self) -> list[str]:
         """Return the line on what the backing adds, if there is some."""
-        if not self._has_backing:
+        if not has_backing(self.fill):
             return []
         with_pressure, neither = (
             "the bridge does not stand" if np.isnan(factor) else f"{factor:.4g}"

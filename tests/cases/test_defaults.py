@@ -121,6 +121,15 @@ def test_the_dead_load_says_whether_it_stands_and_what_is_in_doubt():
         assert f"dead load: stands under its own weight{doubted}: |e| ≤ " in text
 
 
+@pytest.mark.parametrize("backing", [{}, {"backing": 0.5}, {"backing_height": 0.5}])
+def test_the_dead_load_says_that_backing_is_fill(backing):
+    limit = {"horizontal": 1.0, "fill": {"friction_angle": 30.0, **backing}}
+    case = af.Case.of({**BARE, "model": {"fidelity": "rigid"}, "limit": limit})
+    text = describe_dead_load(af.cases.DeadLoadResult.of(case))
+    note = "\nnote: the backing of [limit] is fill here, in dead load and runs\n"
+    assert (note in text) == (len(backing) > 0)
+
+
 def test_head_joints_are_apart_in_the_line_of_the_dead_load(tmp_path):
     """Two stones side by side under a third: their joint carries nothing."""
     corners = {"a": (0, 0, 1, 1), "b": (1, 0, 2, 1), "c": (0, 1, 2, 2), "ground": (0, -1, 2, 0)}
