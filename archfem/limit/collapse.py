@@ -82,8 +82,9 @@ class Collapse(ResultDisplay):
 
     Attributes:
         factor: multiple of the live load at collapse [-]; infinite where it never collapses,
-            undefined (NaN) where it does not stand. For a settlement, work of the weights on it
-            [N m]: for a translation by 1 m, the thrust on the support along it, in N.
+            undefined (NaN) where it does not stand, or where no state was found. For a settlement,
+            work of the weights on it [N m]: for a translation by 1 m, the thrust on the support
+            along it, in N.
         outcome: how the analysis ended; `outcome.sentence` gives its meaning.
         hinges: joints that turn, with the face where the blocks stay in contact.
         sliding: numbers of the joints that slide.
@@ -100,8 +101,7 @@ class Collapse(ResultDisplay):
         fill_motion: velocities of a `PlasticFill` by triangle, and strain rates over the largest;
             else None.
         upper: bound that no state of equilibrium exceeds: the factor itself, with a `PlasticFill`
-            the bound from above. `factor` is the bound from below then, and `lower` another name of
-            it.
+            the bound from above. `factor` is the bound from below then, as `lower` is.
         over_fill: factors over all assumptions on a `Fill` that is pushed sideways; else None.
         strength: compressive strength at which joints crush [Pa]; infinite where they do not.
         live: the growing actions, or the settlement.
@@ -132,7 +132,9 @@ class Collapse(ResultDisplay):
 
     @property
     def lower(self) -> float:
-        """The factor, which is on the safe side of all others with the same strength [-]."""
+        """The factor, or a proved bound where none was found: none is below it [-]."""
+        if self.outcome is Outcome.BRACKETED and self.solutions:
+            return self.solutions.bracket[0]
         return self.factor
 
     @property
@@ -148,7 +150,7 @@ class Collapse(ResultDisplay):
     @property
     def range(self) -> tuple[float, float]:
         """Least and largest factor: over all assumptions on a fill, or both bounds [-]."""
-        return (self.factor, self.upper) if self.over_fill is None else self.over_fill.ends
+        return (self.lower, self.upper) if self.over_fill is None else self.over_fill.ends
 
     @property
     def push(self) -> float:
@@ -163,7 +165,7 @@ class Collapse(ResultDisplay):
         if self.outcome not in (Outcome.COLLAPSES, Outcome.BRACKETED):
             return self._headline
         unit = abs(self.push) or 1.0
-        ends = self.range if self.outcome is Outcome.COLLAPSES else (self.factor, self.upper)
+        ends = self.range if self.outcome is Outcome.COLLAPSES else (self.lower, self.upper)
         low, high = (f"{unit * bound:.4g}" for bound in ends)
         place, words = f"at {low}" if low == high else f"at {low} to {high}", self._name_load()
         if self.outcome is Outcome.BRACKETED:
@@ -228,10 +230,8 @@ class Collapse(ResultDisplay):
         sides = [f"{name} at the {side}" for (_, side), name in turning]
         hinges = list_or_count(sides) or "none"
         sliding = list_or_count(self.sliding_names) or "none"
-        bound = (
-            "" if self.upper == self.factor or np.isnan(self.factor) else f" to {self.upper:.4g}"
-        )
-        text = f"{self._headline}: factor {self.factor:.4g}{bound}; hinges: {hinges}; "
+        bound = "" if self.upper == self.lower or np.isnan(self.lower) else f" to {self.upper:.4g}"
+        text = f"{self._headline}: factor {self.lower:.4g}{bound}; hinges: {hinges}; "
         solutions = "" if self.solutions is None else f"; {self.solutions}"
         over = f"; {self.describe_range()}" if self.over_fill else ""
         crushing = ""
@@ -317,8 +317,7 @@ def collapse_factor(
         The motion is one of the possible ones where several have the same factor. Without
         associated flow factors are not unique: `solutions` of the result gives the range of those
         from the search and the bounds of all. The factor is the least of the search, or for a
-        settlement the greatest work. Where the search has none it is the proven bound, and the
-        outcome says so.
+        settlement the greatest work. Where the search has none it is NaN, and the outcome says so.
 
     References:
         Heyman, Int. J. Solids Struct. 2 (1966) 249-279. Livesley, Int. J. Numer. Meth. Eng. 12
@@ -332,7 +331,7 @@ def collapse_factor(
         warn_lift(loads)
     stays = tuple(list_loads(dead)) if dead else ()
     result = _solve_loads(structure, loads, stays, friction, strength, fill)
-    if isinstance(fill, Fill) and result.outcome is not Outcome.INFEASIBLE:
+    if isinstance(fill, Fill) and not np.isnan(result.factor):
         result = replace(result, over_fill=_vary_assumptions(result, friction, strength, fill))
     return result
 
@@ -532,8 +531,8 @@ def _vary_assumptions(
         return None
     values = {}
     for assumption, (_, assumed) in vary_fill(fill).items():
-        values[assumption] = found.factor
         if assumed == fill:
+            values[assumption] = found.factor
             continue
         given = found.structure, friction, strength, assumed, found.dead
         stones, programme = self_weight_programme(*given)
@@ -541,13 +540,16 @@ def _vary_assumptions(
             values[assumption] = 0.0
             continue
         loaded = programme.with_load_factor(stones.load(found._loads))
-        optimum, least = loaded.solve(), np.inf
+        optimum = loaded.solve()
         if friction == "nonassociated":
             optimum, solutions = search_nonassociated(loaded, optimum, -1.0)
             if solutions.interrupted:
                 raise Interrupted(found)
-            least = solutions.bracket[0]  # where none was found
-        values[assumption] = least if optimum is None else -optimum.value
+            if optimum is None and np.isfinite(solutions.bracket[0]):
+                words = "the range over the fill leaves out %s, with which %s"
+                logger.warning(words, assumption, Outcome.BRACKETED.sentence)
+                continue
+        values[assumption] = np.inf if optimum is None else -optimum.value
     return FillRange(values)
 
 
@@ -566,7 +568,7 @@ def _read_without_optimum(
     if not np.isfinite(bound):
         return _read_result(stones, dead, unbounded, np.inf, at_rest)
     shown = _without_forces(associated or at_rest)
-    result = _read_result(stones, dead, Outcome.BRACKETED, bound, shown)
+    result = _read_result(stones, dead, Outcome.BRACKETED, np.nan, shown)
     return replace(result, upper=upper)
 
 

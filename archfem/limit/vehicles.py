@@ -371,6 +371,7 @@ def moving_load(  # noqa: PLR0913  (loads, their places, and the strength of the
         worst = replace(worst, live=laid[row], structure=structure)
     else:
         worst = collapse_factor(structure, live=list(laid[row]), **options)
+        worst = replace(worst, factor=worst.lower)  # where none was found, the bound
     if friction == "nonassociated":
         factors[direction, place] = worst.factor  # by the whole search: may be a weaker state
     length = area_load and -strips[0].force[1] / (area_load * structure.width)  # of a strip
@@ -657,7 +658,7 @@ def collapse_factors(
         if state is not None:
             factors[row] = -state.value
         elif associated[row] is not None:  # the whole search, or a bound
-            factors[row] = collapse_factor(stones.whole, live=list(row), **options).factor
+            factors[row] = collapse_factor(stones.whole, live=list(row), **options).lower
     if np.inf in factors.values():
         warn_locking(stones.whole, options["friction"], options["fill"])
     return factors

@@ -434,7 +434,7 @@ class _Search:
         dry = [replace(x, contact=replace(x.contact, cohesion=0.0)) for x in structure.joints]
         wall, live = replace(structure, joints=tuple(dry)), BodyForce(placed.direction)
         found = collapse_factor(wall, live=live, friction="nonassociated", strength=np.inf)
-        if not found.motion.any():
+        if not np.isfinite(found.factor):
             words = "a search without dilatancy found none: hold a motion"
             return first, replace(dilates, remedy=words)
         contacts, doubt = placed.touching(joints), None

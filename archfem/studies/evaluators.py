@@ -190,7 +190,8 @@ def scales_of(result: DeadLoadResult, motion: Motion, **options: Any) -> Finding
 def evaluate_limit(case: Case) -> Findings:
     """Return the collapse factor of a case by limit analysis, and the size of its mechanism.
 
-    An infinite factor never makes a mechanism; NaN is that of a case which does not stand.
+    An infinite factor never makes a mechanism; NaN is that of a case which does not stand, or of
+    one without a state without dilatancy, which `factor_at_most` bounds.
     """
     collapse = case.limit.solve(case.structure)
     findings: Findings = {
@@ -198,6 +199,8 @@ def evaluate_limit(case: Case) -> Findings:
         "hinges": len(collapse.hinges),
         "slides": len(collapse.sliding),
     }
+    if collapse.solutions is not None:
+        findings["factor_at_most"] = float(collapse.upper)
     if collapse.push:
         site = site_acceleration(case)
         findings["push"] = least = float(collapse.factor) * abs(collapse.push)

@@ -159,7 +159,8 @@ def capacity_findings(case: Case) -> dict[str, Any]:
     for (joint, _), step in zip(push.hinges, push.hinge_steps, strict=True):
         steps.setdefault(step, []).append(joint)
     order = " then ".join(" and ".join(map(str, sorted(each))) for each in steps.values())
-    return {"factor": float(collapse.factor), "peak": push.factor, "order": order}
+    factors = {"factor": float(collapse.factor), "factor_at_most": float(collapse.upper)}
+    return {**factors, "peak": push.factor, "order": order}
 
 
 def _first(rows: Rows) -> Mapping[str, Any]:
@@ -217,7 +218,10 @@ def _describe_modes(rows: Rows, statement: Statement) -> str:
 def _describe_capacity(rows: Rows, statement: Statement) -> str:
     """Return the largest load factor by pushover, and that of limit analysis."""
     row = _first(rows)
-    return f"pushover {row['peak']:.4g}, limit analysis {row['factor']:.4g}"
+    known = f"{row['factor']:.4g}"
+    if np.isnan(row["factor"]):
+        known = f"at most {row['factor_at_most']:.4g}"
+    return f"pushover {row['peak']:.4g}, limit analysis {known}"
 
 
 FINDINGS: Mapping[str, Callable[[Rows, Statement], str]] = {

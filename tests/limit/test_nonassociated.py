@@ -511,14 +511,17 @@ def test_without_a_solution_the_bound_is_the_answer(monkeypatch):
     found = af.collapse_factor(structure, live=push, friction="nonassociated")
     upper = af.collapse_factor(structure, live=push).factor
     assert found.outcome is Outcome.BRACKETED
-    assert found.solutions.bracket == pytest.approx((found.factor, found.upper))
-    assert 0.0 < found.factor < found.upper == pytest.approx(upper)
+    assert np.isnan(found.factor)
+    assert found.solutions.bracket == pytest.approx((found.lower, found.upper))
+    assert 0.0 < found.lower < found.upper == pytest.approx(upper)
+    assert found.range == (found.lower, found.upper)
+    assert f"factor {found.lower:.4g} to {upper:.4g}; hinges" in str(found)
     assert found.sentence == (
-        f"no state without dilatancy was found; it is between {found.factor:.4g} and {upper:.4g} "
+        f"no state without dilatancy was found; it is between {found.lower:.4g} and {upper:.4g} "
         "times 1 kN at x = 0 m"
     )
     solutions = replace(found.solutions, bracket=(1e-8 * upper, upper))  # round-off of the bound
-    unknown = replace(found, factor=1e-8 * upper, solutions=solutions)
+    unknown = replace(found, solutions=solutions)
     assert "no lower bound is known" in str(unknown)
     assert f"was found; it is at most {upper:.4g} times 1 kN" in unknown.sentence
     assert "; it is at least" in replace(found, upper=np.inf).sentence
@@ -621,14 +624,15 @@ def test_a_least_factor_found_by_chance_is_doubted(caplog, agreeing, lower, word
     assert f"(by 9 of 21 starting states, the least by {least})" in str(bounds)
 
 
-def test_where_dilatancy_locks_a_strut_the_factor_is_the_proven_bound():
+def test_where_dilatancy_locks_a_strut_the_answer_is_the_proven_bound():
     """Its own load presses three stones between walls; nothing is known of the largest factor."""
     dry = af.Contact(1e9, 3e8, 0.6)
     strut = af.circular_arch(radius=5.0, thickness=1.0, embrace=20.0, voussoirs=3, contact=dry)
     found = af.collapse_factor(strut, live=af.PointLoad(0.0, (0.0, -1e4)), friction="nonassociated")
     assert found.outcome is af.limit.Outcome.BRACKETED
     assert 0.0 < found.solutions.bracket[0] < found.solutions.bracket[1] == np.inf
-    assert found.factor == found.solutions.bracket[0]
+    assert np.isnan(found.factor)
+    assert found.lower == found.solutions.bracket[0]
     assert f"none is below {found.solutions.bracket[0]:.4g}" in str(found.solutions)
 
 

@@ -625,6 +625,27 @@ def test_values_may_be_an_array(small_ring):
     assert [dict(point.changes)["structure.thickness"] for point in study.points] == [0.5, 0.6]
 
 
+def test_a_state_that_was_not_found_is_no_number(ring_file, tmp_path, capsys, monkeypatch):
+    """Its factor is undefined and its bound known: the associated factor of the static theorem."""
+    monkeypatch.setattr("archfem.limit.nonassociated.find_solution", lambda *_, **__: None)
+    monkeypatch.setattr("archfem.limit.nonassociated.descend", lambda *_, **__: [])
+    path, folder = tmp_path / "study.toml", tmp_path / "out"
+    push = "limit.horizontal=1.0"
+    path.write_text(
+        f'case = "ring.toml"\ncompute = "limit"\nset = ["{push}"]\n'
+        '[vary]\nlimit.friction = ["nonassociated", "coulomb"]\n'
+    )
+    assert af.commands.main(["study", str(path), "--out", str(folder), "--workers", "1"]) == 3
+    words = "without a state without dilatancy: their factors are bounded alone, by factor_at_most"
+    assert f"in doubt: 1 of 2 points {words}\n" in capsys.readouterr().out
+    table = af.studies.read_table(folder / "results.nc")
+    case = af.Case.read(ring_file, [push])
+    bound = case.limit.solve(case.structure).factor
+    assert table["factor"].values == pytest.approx([np.nan, bound], nan_ok=True)
+    assert table["push"].values == pytest.approx([np.nan, bound], nan_ok=True)
+    assert table["factor_at_most"].values[0] == pytest.approx(bound)
+
+
 def test_a_case_above_the_tables_is_that_of_those_that_name_none(tmp_path):
     for name, thickness in (("ring", 0.5), ("thin", 0.4)):
         text = f'[structure]\nshape = "circular_arch"\nradius = 2.0\nthickness = {thickness}\n'
