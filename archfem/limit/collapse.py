@@ -388,8 +388,8 @@ def _solve_loads(
     result = replace(result, strength=crushes, live=actions, dead=stays, structure=structure)
     if result.outcome is Outcome.BRACKETED:
         logger.warning(
-            "%s: the factor is only a bound, whose mechanism dilates; %s; a pushover finds a state "
-            "of elastic joints, or a friction 1 %% higher or lower one nearby",
+            "%s: the mechanism is of the bound, and dilates; %s; a pushover finds a state of "
+            "elastic joints",
             *(result.sentence, result.solutions),
         )
     if result.solutions is not None and result.solutions.interrupted:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from kinematics import gaps
 from scipy import sparse
-from scipy.optimize import Bounds, LinearConstraint, milp
+from scipy.optimize import Bounds, LinearConstraint, linprog, milp
 
 import archfem as af
 from archfem.errors import Interrupted
@@ -353,8 +353,12 @@ def test_a_symmetric_structure_is_searched_once_for_both_senses(monkeypatch):
 
 
 @pytest.mark.usefixtures("few_starts")
-def test_from_the_weakest_of_the_starts_the_search_goes_down(caplog):
-    """A wedge of this wall that does not slide is found from no start with much friction."""
+def test_from_the_weakest_of_the_starts_the_search_goes_down(monkeypatch, caplog):
+    """A wedge of this wall that does not slide is found from no start with much friction.
+
+    States that settle lead to it: without them the descent is the last that finds it.
+    """
+    monkeypatch.setattr(nonassociated, "SETTLING_SHARES", ())
     least = af.collapse_factor(wall(DOOR_WALL, 0.6), live=SIDEWAYS, friction="nonassociated")
     structure = wall(DOOR_WALL, 0.8)
     found = af.collapse_factor(structure, live=SIDEWAYS, friction="nonassociated")
@@ -532,6 +536,54 @@ def test_without_a_solution_the_bound_is_the_answer(monkeypatch):
     assert found.hinges == dilating.hinges
 
 
+def test_a_facade_in_bond_settles_at_a_state(monkeypatch):
+    """Neither what relaxes by a share of 0.1 alone nor the associated state leads to a state."""
+    openings = {
+        "door": {"left": "-0.5 m", "breadth": "1 m", "head": "1.5 m"},
+        "window": {"left": "-0.3 m", "breadth": "0.6 m", "sill": "2.1 m", "head": "2.7 m"},
+    }
+    lengths = {"breadth": 5.0, "height": 4.9, "eaves": 3.6, "width": 0.55, "course": 0.3}
+    settings = {"shape": "wall", "stone": 0.9, "openings": openings} | lengths
+    structure = af.Case.of({"structure": settings}).structure
+    joints = [replace(joint, contact=rough(0.65)) for joint in structure.joints]
+    structure = replace(structure, joints=tuple(joints))
+    monkeypatch.setattr(nonassociated, "MAX_START_COUNT", 1)
+    monkeypatch.setattr(nonassociated, "_follow_friction", lambda *_: ([], []))
+    monkeypatch.setattr(nonassociated, "descend", lambda *_, **__: iter([]))
+    found = af.collapse_factor(structure, live=SIDEWAYS, friction="nonassociated")
+    check(structure, SIDEWAYS, found)
+    assert 0.5 < found.factor < 0.9 * found.solutions.bracket[1]
+    # independent programme: friction as held by the normal forces of the state is its own optimum
+    assert optimum_with_shear(structure, found) == pytest.approx(found.factor, rel=1e-6)
+
+
+def optimum_with_shear(structure, found):
+    """Largest factor of any state whose shear is at most μ N of a given one, by SciPy alone."""
+    centre = structure.centroids
+    width = 3 * len(structure.blocks)
+    rows = np.zeros((3 * len(structure.joints), width))
+    for k, (one, other) in enumerate(structure.pairs):
+        places = (*structure.ends[k], structure.ends[k][0])
+        axes = (structure.normals[k], structure.normals[k], structure.tangents[k])
+        for part, (place, axis) in enumerate(zip(places, axes, strict=True)):
+            for block, sign in ((one, -1.0), (other, 1.0)):
+                arm = place - centre[block]
+                turn = arm[0] * axis[1] - arm[1] * axis[0]
+                row = rows[part * len(structure.joints) + k]
+                row[3 * block : 3 * block + 3] += sign * np.array([*axis, turn])
+    free = np.repeat([not block.fixed for block in structure.blocks], 3)
+    weight = np.array([b.area * b.material.unit_weight for b in structure.blocks])
+    weight = weight * structure.width / 1e3
+    dead, push = np.zeros((2, width))
+    dead[1::3], push[0::3] = -weight, weight
+    balance = np.hstack([rows[:, free].T, push[free, None]])
+    held = structure.friction * found.joints["N"].values / 1e3 + 1e-7
+    count = len(structure.joints)
+    limits = [(0.0, None)] * (2 * count) + [*zip(-held, held, strict=True), (0.0, None)]
+    cost = np.append(np.zeros(3 * count), -1.0)
+    return -linprog(cost, A_eq=balance, b_eq=-dead[free], bounds=limits).fun
+
+
 GATEWAY = Path(__file__).parent / "gateway.geojson"
 
 
@@ -581,7 +633,7 @@ def test_an_interrupted_search_leaves_the_least_factor_so_far(monkeypatch, caplo
     else:
         assert found.outcome is Outcome.BRACKETED
         assert found.upper == pytest.approx(upper)
-        bound = "the factor is only a bound, whose mechanism dilates"
+        bound = "the mechanism is of the bound, and dilates"
         assert f"{bound}; the search was interrupted: " in caplog.text
 
 
@@ -709,7 +761,8 @@ def test_bounds_are_those_of_the_weakest_and_the_strongest_solution(monkeypatch)
     state, bounds = nonassociated.search_nonassociated(programme, optimum, -1.0)
     assert state.value == -0.3
     assert bounds.between == (0.3, 0.5)
-    assert bounds.starts == (45, 4)  # three from less friction, and fourteen chains of three
+    # three from less friction, fourteen chains of three, and two that settle
+    assert bounds.starts == (47, 4)
     assert bounds.agreeing == 2
     assert bounds.bracket[1] == pytest.approx(optimum.unknowns[0])
 
