@@ -9,6 +9,7 @@ from backfilled import SOIL, rectangle
 
 import archfem as af
 from archfem.cases.analysis_keys import LimitAnalysis
+from archfem.limit import collapse
 from archfem.limit.fill_range import FillAssumption, FillRange, vary_fill
 
 SITE = af.Eurocode8(ag=0.25, ground="C")
@@ -47,6 +48,25 @@ def turning_factors(passive, mobilisation=1.0 / 3.0):
         words = CENTROIDS if lever else FEET, THIRD if part else NONE
         expected[FillAssumption(*words)] = factor, share
     return expected
+
+
+def test_an_assumption_without_a_state_is_left_out_of_the_range(monkeypatch, caplog):
+    """No state without dilatancy is found with it: a factor of 0 would say that nothing stands."""
+    search, calls = collapse.search_nonassociated, []
+
+    def search_once(*given):
+        calls.append(1)
+        state, bounds = search(*given)
+        return (state if len(calls) == 1 else None), bounds
+
+    monkeypatch.setattr(collapse, "search_nonassociated", search_once)
+    fill = af.limit.Fill(friction_angle=30.0)
+    live = af.BodyForce(1.0)
+    found = af.collapse_factor(buried_stone(), live=live, friction="nonassociated", fill=fill)
+    assert len(calls) == 4
+    assert [*found.over_fill.values.values()] == [found.factor]
+    assert caplog.text.count("the range over the fill leaves out the fill's inertia at") == 3
+    assert "with which no state without dilatancy was found" in caplog.text
 
 
 def test_a_stone_turns_into_a_fill_at_a_factor_by_each_assumption(verified):

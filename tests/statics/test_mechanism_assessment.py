@@ -412,6 +412,17 @@ def wedge():
     return found, af.kinematic_assessment(wall, SPECTRUM)
 
 
+def test_a_search_that_finds_nothing_leaves_the_mechanism_that_dilates(monkeypatch):
+    """Its factor is the upper bound of the static theorem, and no lower bound of the search."""
+    monkeypatch.setattr("archfem.limit.nonassociated.find_solution", lambda *_, **__: None)
+    monkeypatch.setattr("archfem.limit.nonassociated.descend", lambda *_, **__: [])
+    wall = bonded_wall(7, half=1.0)
+    found = af.kinematic_assessment(wall, SPECTRUM)
+    dilating = af.collapse_factor(wall, live=af.BodyForce(1.0), strength=np.inf)
+    assert found.alpha_0 == pytest.approx(dilating.factor)
+    assert "a search without dilatancy found none: hold a motion" in str(found.doubts)
+
+
 def test_a_wedge_of_a_wall_in_bond_has_the_linear_check_alone(wedge, verified):
     """e*, M* and a0* by hand from displacements at rest, alpha_0 by their work and of friction.
 

@@ -7,7 +7,7 @@ import pytest
 
 import archfem as af
 from archfem.errors import InvalidInput
-from archfem.studies.statements import edge_factor
+from archfem.studies.statements import FINDINGS, edge_factor
 
 CASE = """
 title = "a ring"
@@ -165,3 +165,8 @@ def test_the_edge_stress_balances_the_force_and_its_moment(away):
 def test_statements_that_nothing_answers_are_refused(folder, text, words):
     with pytest.raises(InvalidInput, match=words):
         read(folder, text)
+
+
+def test_a_capacity_that_was_not_found_is_a_bound():
+    row = {"peak": 0.5, "factor": np.nan, "factor_at_most": 0.6}
+    assert FINDINGS["capacity"]({"": row}, None) == "pushover 0.5, limit analysis at most 0.6"
