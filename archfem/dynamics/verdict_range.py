@@ -239,12 +239,13 @@ class VerdictRange(ResultDisplay):
             return []
         fallen, held = ([x for x in others if (x.rank > 1) is down] for down in (True, False))
         count = f"of {len(others)} single changes"
-        if given.outcome in FALLEN_STATES:
-            names = join_names([each.name for each in held])
-            few = (
-                f"with {len(held)} {count} it does not: {names}" if held else f"so with all {count}"
-            )
-            return [f"unvaried it falls, and {few}"]
+        falls = given.rank > 1
+        if falls or (given.rank and not fallen):
+            free = [each.name for each in others if each.rank < (2 if falls else 1)]
+            state, negated = ("falls", "does not") if falls else ("is dislocated", "is not")
+            few = f"with {len(free)} {count} it {negated}: {join_names(free)}"
+            moved = [] if falls else [self._compare_displacements(given, others)]
+            return [f"unvaried it {state}, and {few if free else f'so with all {count}'}", *moved]
         names = f"{len(fallen)} {count}: {join_names([each.name for each in fallen])}"
         parted = [each.name for each in held if each.rank > given.rank]
         neither = "is dislocated or " * (self.is_dislocation_worst and not parted)
@@ -347,7 +348,9 @@ class VerdictRange(ResultDisplay):
         decisive, conditions = self.decisive[self.answered], self._explained[2]
         runs, verb = COUNTED[self.counted]
         if not conditions:
-            return f"no property separates {runs} from the others by more than chance"
+            sampled = self.answers["sampled"].values
+            among = f" among the {sampled.sum()} that vary all" * bool(~sampled.all())
+            return f"no property separates {runs} from the others by more than chance{among}"
         chosen = np.all([each.holds(self.answers) for each in conditions], axis=0)
         where = " and ".join(map(self._condition_text, conditions))
         inside = int(decisive[chosen].sum())

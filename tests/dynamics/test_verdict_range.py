@@ -225,6 +225,27 @@ def test_single_changes_say_what_would_change_the_answer(falls, parted, clauses)
         ]
 
 
+def test_single_changes_that_end_a_dislocation_are_said_and_chance_counts_the_samples():
+    """Unvaried it is dislocated; of 12 samples, which alone are tested, one is."""
+    rules = ["exact", "exact", "rigid", "three points"] + ["exact", "rigid"] * 6
+    friction, rows = [0.0, -0.1, 0.0, 0.0] + [0.0] * 12, np.arange(16)
+    sizes = [0.04, 0.09, 0.001, 0.02] + [0.0] * 12
+    columns = {"joint_rule": rules, "friction": friction}
+    found = made_up(rows < 0, rows > 3, residual=sizes, parted=[0, 1, 4], **columns)
+    assert found.what_changes == [
+        "unvaried it is dislocated, and with 2 of 3 single changes it is not: joint rule "
+        "'three points', joint rule 'rigid'",
+        "unvaried it remains displaced by 40 mm, by 90 mm with friction - 0.1",
+    ]
+    where = "no property separates dislocations from the others by more than chance among the 12 "
+    assert found.where == f"{where}that vary all"
+    assert "exact: 3 of 8, rigid: 0 of 7, three points: 0 of 1" in found.table()
+    found = made_up(rows < 0, rows > 3, residual=sizes, parted=[*range(5)], **columns)
+    assert found.what_changes[0] == (
+        "unvaried it is dislocated, and so with all of 3 single changes"
+    )
+
+
 def test_a_broken_single_change_is_the_last_and_counts_for_none():
     found = made_up([False] * 3, [False] * 3, residual=[0.02, np.nan, 0.01], sign=list("abc"))
     found.dataset["outcome"][1] = "unknown"
