@@ -585,10 +585,11 @@ def _print_run(run: Run, at_rest: DeadLoadResult) -> None:
         print(f"wrote {run.path}")
     defaults = describe_defaults(run.case)
     given = run.case.structure, history, at_rest.dead.joints
-    _, falls = check_across(run.case.structure, {motion.name: motion})
+    across, falls = check_across(run.case.structure, {motion.name: motion})
+    # what all motions do across is printed once, after their runs
     said, text = (
-        "\n\n".join(filter(None, [result_text.describe_run(*given, count, falls), defaults]))
-        for count in (MAX_PRINTED_JOINTS, None)
+        "\n\n".join(filter(None, [result_text.describe_run(*given, count, falls), line, defaults]))
+        for count, line in ((MAX_PRINTED_JOINTS, ""), (None, across))
     )
     print(said)
     write(results.run_files(run, at_rest, text), run.path.parent)

@@ -12,9 +12,10 @@ from loose_blocks import BREADTH, HEIGHT, G, overturns, sine
 
 import archfem as af
 from archfem.cases import answers
-from archfem.cases.report import conclusion, doubts, report_data, sections
+from archfem.cases.report import conclusion, demands, doubts, report_data, sections
 from archfem.cases.report.report_data import ReportData
 from archfem.cases.result_text import PushFactors, site_acceleration
+from archfem.cases.run import MOTION_VARIABLE
 from archfem.cases.toml_file import format_tables
 from archfem.commands import margin
 from archfem.dynamics import VerdictRange
@@ -52,7 +53,10 @@ def data_of(case, found=None, **verdicts):
         name: SimpleNamespace(
             verdict=verdict,
             dataset=xr.Dataset(
-                {"ground": (("t", "x"), [[2.0, 0.0]])},
+                {
+                    "ground": (("t", "x"), [[2.0, 0.0]]),
+                    MOTION_VARIABLE: (("sample", "axis"), [[2.0, 0.0]] * 2, {"dt": 0.01}),
+                },
                 attrs={"motion": name, "pga": 2.0, "fidelity": ""},
             ),
         )
@@ -853,6 +857,7 @@ def test_a_run_of_a_wall_says_at_which_scale_it_falls_across_its_plane(
     # the first lines of the summary and of the range of the verdict have it too
     summary = (folder / "summary.txt").read_text(encoding="utf-8").splitlines()
     assert (said in summary[0]) is bool(falls)
+    assert line in summary
     # one statement on what is checked across the plane, with the push that overturns it
     assert not [line for line in lines if "nothing is checked across" in line]
     (line,) = [line for line in lines if "begins to overturn" in line]
@@ -879,16 +884,35 @@ def test_a_range_of_the_verdict_says_that_a_wall_falls_across_its_plane(
     assert not [line for line in rest if "across" in line]
 
 
-def test_a_structure_with_rings_has_the_falls_across_its_plane_that_occur_alone(monkeypatch):
-    """An arch over a wall in bond is more than a wall, of which "falls at none" says little."""
-    wall, ring = wall_in_bond(), af.circular_arch(span=4.0, rise=1.5, thickness=0.5, voussoirs=3)
-    falls = {"strip": (FirstFall(np.inf, None), "m"), "whole": (FirstFall(1.5, None), "m")}
+def test_a_structure_with_rings_that_stands_across_its_plane_was_checked(monkeypatch):
+    """A ring beside a wall in bond, which a run checks as one rigid body too."""
+    given = wall_in_bond().settings["structure"]
+    beside = [[[6, y], [7, y], [7, y + 1], [6, y + 1]] for y in (-1, 0, 1)]
+    ring = [
+        {"name": f"r{k}", "outline": x, "part": "r", "role": "ring"} for k, x in enumerate(beside)
+    ]
+    ring[0] = {"name": "rock", "outline": beside[0], "fixed": True}
+    data = data_of(
+        af.Case.of({"structure": given | {"blocks": given["blocks"] + ring}}), m=verdict_of()
+    )
+    assert "ring" in {joint.role for joint in data.case.structure.joints}
+    falls = {"strip": (FirstFall(np.inf, None), "m"), "whole": (FirstFall(np.inf, None), "m")}
     monkeypatch.setattr(report_data, "find_falls_across", lambda *_: falls)
-    for rings, kept in ([], ["strip", "whole"]), (ring.joints, ["whole"]):
-        joints = [*wall.structure.joints, *rings]
-        structure = SimpleNamespace(joints=joints, heads=wall.structure.heads)
-        data = ReportData(SimpleNamespace(structure=structure), {})
-        assert [*data.across[0]] == kept
+    (text,) = conclusion._build_transverse(data)
+    assert text.text.startswith("Held by nothing else, ")
+    assert "not checked" not in dict(conclusion.list_facts(data))["verdict"]
+    rows = [row.outcome for name, row in conclusion._capacity_rows(data) if not name]
+    assert rows == ["as one rigid body it falls at none, held by nothing else"] * 2
+
+
+def test_the_vertical_peak_of_a_demand_is_that_of_the_motion_and_not_of_a_run_that_ended(case):
+    """The run ends before the motion's vertical peak of 1 m/s²."""
+    motion = np.array([[2.0, 0.4], [0.0, -1.0]])
+    data = data_of(case, m=verdict_of())
+    data.runs["m"].dataset["ground"][0, 1] = 0.4
+    data.runs["m"].dataset[MOTION_VARIABLE] = ("sample", "axis"), motion, {"dt": 0.01}
+    ((name, *_),) = demands.list_demands(data)
+    assert name == "motions, with vertical ones of up to 0.1 g"
 
 
 def test_a_wall_that_stands_again_says_so_beside_its_first_fall():

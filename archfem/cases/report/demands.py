@@ -18,8 +18,9 @@ def list_demands(data: ReportData) -> Iterator[tuple[str, Ends, str, list[str]]]
     case, limit = data.case, data.case.limit.demand
     pushes = [RESULTS[name] for name in ("limit", "pushover") if name in data.statements]
     if data.runs:
-        vertical = max(np.abs(x.dataset["ground"][:, 1]).max().item() for x in data.runs.values())
-        vertical /= STANDARD_GRAVITY
+        # whole motions: the ground of a run ends with it
+        up = [x.vertical for x in data.motions.values() if x.vertical is not None]
+        vertical = max((np.abs(x).max().item() for x in up), default=0.0) / STANDARD_GRAVITY
         also = f", with vertical ones of up to {vertical:.2g} g" * bool(vertical)
         peaks, source = map(peak_of_ground, data.runs.values()), "[suite]"
         used = ["time histories, and what varies or scales them"]

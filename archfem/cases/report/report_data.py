@@ -7,7 +7,6 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import xarray as xr
 
 from archfem._display import DOUBT_MARK
@@ -61,17 +60,12 @@ class ReportData:
 
     @cached_property
     def across(self) -> tuple[dict[str, tuple[FirstFall, str]], str]:
-        """Least first falls of a wall in bond across its plane, and why they are not known.
-
-        Of a structure with rings, which is more than a wall, only those that occur.
-        """
+        """Least first falls of a wall in bond across its plane, and why they are not known."""
         structure = self.case.structure
         try:
-            found = find_falls_across(structure, self.motions) if structure.heads.any() else {}
+            return find_falls_across(structure, self.motions) if structure.heads.any() else {}, ""
         except ArchfemError as error:  # one paragraph fails, and no report
             return {}, f"; not checked against the motions across: {error}"
-        rings = any(joint.role == "ring" for joint in structure.joints)
-        return {k: x for k, x in found.items() if x[0].scale < np.inf or not rings}, ""
 
     @cached_property
     def fidelity(self) -> str:
