@@ -59,7 +59,7 @@ def explain_instability(structure: Structure) -> str | None:
         return f"{moves}: {cut}"
     if _stands(dead, friction=unlimited):
         least = _least_value(dead, "friction", float(dead.blocks.structure.friction.min()), 10.0)
-        text = f"joints slide ({sliding}): it stands from a coefficient of friction of {least:.2g}"
+        text = f"joints slide ({sliding}): {_say_friction(least)}"
         if end := name_free_end(rigid, falling):
             return f"{text}; {end}"
         return text + ", and no thickness helps" * (not _stands(dead, depth=unlimited))
@@ -110,7 +110,12 @@ def describe_friction(structure: Structure) -> str:
     if (least := least_friction(structure)) is None:
         return ""
     less = " or less" if least == _LITTLE_FRICTION else ""
-    return f"it stands from a coefficient of friction of {least:.2g}{less}"
+    return f"{_say_friction(least)}{less}"
+
+
+def _say_friction(least: float) -> str:
+    """Say from which friction it stands, rounded up: with a thousandth less it might not."""
+    return f"it stands from a coefficient of friction of {np.ceil(1e3 * least) / 1e3:g}"
 
 
 def name_free_end(structure: Structure, falling: Collection[int]) -> str:

@@ -54,6 +54,16 @@ def test_the_least_friction_of_a_block_on_a_slope(slope, friction, least):
         assert words.endswith(" or less") == (least == 0.05)
 
 
+@pytest.mark.parametrize("slope", [0.1947, 0.344])
+def test_a_block_on_a_slope_stands_with_the_friction_that_is_printed(slope):
+    """Both are less when rounded to two digits."""
+    cube = [[0.0, 0.0], [1.0, 0.0], [1.0, 0.5], [0.0, 0.5]]
+    words = describe_friction(on_a_bed(cube, friction=0.6, tilt=np.arctan(slope)))
+    said = value(r"coefficient of friction of ([\d.]+)", words)
+    assert slope <= said < 1.01 * slope
+    assert af.stands(on_a_bed(cube, friction=said, tilt=np.arctan(slope)))
+
+
 def test_a_block_that_leans_out_needs_a_bed_up_to_its_centroid():
     """A parallelogram, its centroid 0.8 m from the middle of a bed of half a metre to each side."""
     leaning = [[0.0, 0.0], [1.0, 0.0], [2.6, 2.0], [1.6, 2.0]]
