@@ -671,6 +671,35 @@ def test_of_outlines_the_inputs_have_lengths_that_are_measured():
         assert {*expected} <= {*rows.items()}
 
 
+def test_the_rise_of_a_pointed_arch_is_that_of_its_apex_within_the_key_stone():
+    """Two arcs of 2 m about centres 0.8 m beside the middle; the key has the apex in its face."""
+    apex, spread = np.arccos(-0.4), np.radians(8.0)
+
+    def points(angles, radius, sense):
+        x, y = 0.8 + radius * np.cos(angles), radius * np.sin(angles)
+        return np.column_stack([sense * x, y])
+
+    half, stones = np.linspace(np.pi, apex + spread, 6), []
+    for sense in (1, -1):
+        inner, outer = (points(half, radius, sense) for radius in (2.0, 2.35))
+        stones += [[inner[k], outer[k], outer[k + 1], inner[k + 1]][::-sense] for k in range(5)]
+    sides = [[points(half[-1:], r, s)[0] for s in (1, -1)] for r in (2.0, 2.35)]
+    tops = [[0.0, np.sqrt(r**2 - 0.64)] for r in (2.0, 2.35)]
+    stones.append([sides[0][0], tops[0], sides[0][1], sides[1][1], tops[1], sides[1][0]])
+    blocks = [
+        {"name": f"{k}", "outline": np.array(x).tolist(), "part": "arch", "role": "ring"}
+        for k, x in enumerate(stones)
+    ]
+    blocks += [
+        {"name": f"f{x}", "outline": [[x, -1], [x + 1, -1], [x + 1, 0], [x, 0]], "fixed": True}
+        for x in (-1.8, 0.8)
+    ]
+    case = af.Case.of({"structure": {"shape": "blocks", "blocks": blocks}})
+    rows = {row[0]: row[1] for row in tabulate_inputs(report_data.ReportData(case, {})).rows}
+    rise = np.sqrt(4.0 - 0.64)
+    assert rows["arch"].startswith(f"clear span 2.4 m, rise {rise:.3g} m, thickness 0.35 ")
+
+
 def test_a_verdict_that_was_broken_off_is_a_doubt(kept):
     """Until all of its runs are finished; so is a study in the folder."""
     found = af.cases.open_results(kept)

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from archfem._typing import Array
 from archfem._validation import declared_keys
 from archfem.cases.defaults import (
     DECIDING_VALUES,
@@ -140,7 +141,8 @@ def _measure_rows(structure: Structure) -> Iterator[Row]:
     """Yield lengths of rings and piers that are given block by block, and sizes of stones."""
     for part, (low, high) in find_clear_spans(structure).items():
         own = [each for each in structure.joints if each.role == "ring" and each.part == part]
-        rise = np.ptp([joint.intrados[1] for joint in own])
+        stones = [block.points for block in structure.blocks if block.part == part]
+        rise = _find_crown(stones, low, high) - min(joint.intrados[1] for joint in own)
         depths = Ends.of(joint.depth for joint in own)
         depth = f", rise {rise:.3g} m, thickness" if rise > 1e-6 else ", bearings"
         text = f"clear span {high - low:.3g} m{depth} {depths:.3g} m"
@@ -149,6 +151,18 @@ def _measure_rows(structure: Structure) -> Iterator[Row]:
         yield part or "pier", words, "inferred"
     areas = Ends.of(structure.blocks[number].area for number in structure.free)
     yield "stones", f"{len(structure.free)} that can move, of {areas:.2g} m²", "inferred"
+
+
+def _find_crown(stones: Sequence[Array], low: float, high: float) -> float:
+    """Return the highest level of the underside between the ends of a clear span [m]."""
+    edges = np.concatenate([np.stack([x, np.roll(x, -1, axis=0)], axis=1) for x in stones])
+    a, b = np.moveaxis(edges[edges[:, 0, 0] != edges[:, 1, 0]], 1, 0)
+    # the apex of a pointed arch may be within the face of a stone
+    at = np.unique(np.clip(edges[..., 0], low, high))
+    share = (at[:, None] - a[:, 0]) / (b - a)[:, 0]
+    levels = np.where(np.abs(share - 0.5) <= 0.5 + 1e-9, a[:, 1] + share * (b - a)[:, 1], np.inf)
+    underside = levels.min(axis=1)
+    return float(underside[np.isfinite(underside)].max())
 
 
 def _list_left_out(declaration: Callable[..., Any], given: set[str]) -> str:
