@@ -368,16 +368,17 @@ def check_overlaps(
     both, (first, second) = common[deepest[0]], pairs[deepest[0]]
     one, other, where = names[first], names[second], place(middles[0])
     areas = [measure_polygon(outlines[k])[0] for k in (first, second)]
-    if both.area > (1.0 - 1e-6) * max(areas):
-        raise InvalidStructure(f"'{one}' and '{other}' at {where} are the same: leave one out")
     found = [
         ("overlap", names[pairs[k][0]], names[pairs[k][1]], middle)
         for k, middle in zip(deepest, middles, strict=True)
     ]
+    others = say_others("the deepest", found, place)
+    if both.area > (1.0 - 1e-6) * max(areas):
+        same = f"'{one}' and '{other}' at {where} are the same{others}: leave one out"
+        raise InvalidStructure(same, found)
     raise InvalidStructure(
         f"'{one}' and '{other}' overlap by {1e4 * both.area:.3g} cm², about "
-        f"{1e3 * depth[deepest[0]]:.3g} mm deep at {where}"
-        f"{say_others('the deepest', found, place)}: correct their outlines"
+        f"{1e3 * depth[deepest[0]]:.3g} mm deep at {where}{others}: correct their outlines"
         f"{', or leave out the one drawn twice' if both.area > 0.5 * min(areas) else ''}",
         found,
     )

@@ -74,6 +74,7 @@ def draw_outlines(
     axes = figure.add_subplot()
     style_axes(axes, f"x [{frame.unit}]", f"y [{frame.unit}]")
     axes.set_aspect("equal")
+    axes.ticklabel_format(style="plain", useOffset=False)  # of a survey, to be found in a drawing
     _draw_layers(axes, closed, scale)
     for line in lines:
         style = {"color": Colour.LOAD, "lw": 1.8, "zorder": 4}
@@ -118,7 +119,8 @@ def _mark_faults(axes: Axes, faults: Sequence[Array], kind: str) -> None:
     if kind == CLOSED_BY_SNAP:
         add_polygons(axes, faults, colour, edge=colour, zorder=5, label=f"{kind} ({len(faults)})")
         return
-    add_polygons(axes, faults, colour, edge=colour, width=1.5, zorder=5)
+    # what is below a stone drawn twice stays visible
+    add_polygons(axes, faults, f"{colour}80", edge=colour, width=1.5, zorder=5)
     places = np.array([fault.mean(axis=0) for fault in faults])
     style = {"mfc": "none", "mec": colour, "ms": 13.0, "mew": 1.6, "ls": "", "zorder": 7}
     axes.plot(*places.T, "o", label=f"{kind} ({len(faults)})", **style)

@@ -4,6 +4,7 @@ import json
 
 import ezdxf
 import pytest
+import shapely
 
 import archfem as af
 from archfem.view import draw_outlines
@@ -169,6 +170,34 @@ def test_the_picture_marks_what_the_message_names(tmp_path):
     assert x == pytest.approx(1.0)
     assert 0.996 <= y <= 1.0
     assert figure.axes[0].get_title() == "short.dxf as read: 5 closed outlines, 1 fault"
+
+
+def test_a_stone_amid_gaps_and_one_drawn_twice_are_marked_at_their_faults_alone(tmp_path):
+    """Joints of 0.8 mm around a stone are one with the two of 3 mm; below, two are alike."""
+    boxes = {
+        "left": (0, 0.9992, 0, 1.0022),
+        "amid": (1, 2, 0, 1),
+        "right": (2.003, 3, 0, 1.0022),
+        "top": (0, 3, 1.003, 2),
+        "foot": (0, 3, -1, -0.0008),
+        "again": (0, 3, -1, -0.0008),
+    }
+    drawing = ezdxf.new(units=ezdxf.units.MM)
+    for name, (x0, x1, y0, y1) in boxes.items():
+        points = [(x0, y0), (x1, y0), (x1, y1), (x0, y1)]
+        points = [(1e6 + 1e3 * x, 1e6 + 1e3 * y) for x, y in points]
+        drawing.modelspace().add_lwpolyline(points, close=True, dxfattribs={"layer": name})
+    drawing.saveas(path := tmp_path / "amid.dxf")
+    figure = draw_outlines(path)
+    assert legend(figure)[len(boxes) :] == ["overlap (1)", "gap (2)"]
+    gaps = next(x for x in figure.axes[0].collections if len(x.get_paths()) == 2)
+    sizes = [shapely.Polygon(x.vertices).area / 1e6 for x in gaps.get_paths()]
+    assert max(sizes) < 0.01  # m², and 1 with the stone
+    ((x, y),) = ring_of(figure, "overlap")
+    assert (x, y) == pytest.approx((1e6 + 1.5e3, 1e6 - 500.4))
+    figure.canvas.draw()
+    labels = [label.get_text() for label in figure.axes[0].get_xticklabels()]
+    assert "1001000" in labels
 
 
 def test_all_faults_of_a_drawing_are_listed_in_one_pass(tmp_path):

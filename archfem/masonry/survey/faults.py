@@ -34,56 +34,75 @@ def sketch_drawing(
 def find_faults(closed: Sequence[Outline], snap: float, error: str) -> dict[str, list[Array]]:
     """Return places where outlines do not fit by kind, in coordinates of the drawing.
 
-    Overlaps are those that an error names, and apart from them those that snap closes. Gaps are
-    narrow ones that it leaves open. Stones that the error names otherwise are not joined.
+    Overlaps and gaps are those that close_gaps names, and apart from them overlaps that snap
+    closes. Where all fits, stones that the error names are not joined.
     """
     import shapely
 
     if not closed:
         return {}
     factor, names = closed[0].frame.factor, [each.name for each in closed]
-    near, named = snap / factor, list[Fault]()
+    near, named, fits = snap / factor, list[Fault](), True
     try:
         for each in closed:
             check_simple(each.points, each.name)
         close_gaps(list(closed), snap)
     except InvalidStructure as wrong:
-        named = list(wrong.faults)
+        named, fits = list(wrong.faults), False
     polygons = shapely.make_valid(np.array([shapely.Polygon(each.drawn) for each in closed]))
     one, other = shapely.STRtree(polygons).query(polygons, predicate="intersects")
     common = shapely.intersection(polygons[one], polygons[other])
     pairs = [(names[a], names[b]) for a, b in zip(one, other, strict=True)]
     refused = {fault[1:3] for fault in named if fault[0] == "overlap"}
     is_refused = np.array([pair in refused for pair in pairs])
-    whole, reach = shapely.union_all(polygons), 0.5 * AMBIGUOUS_GAP_RATIO * near
-    # what is narrower than the reach to both sides closes where the outline grows and shrinks
-    grown = shapely.buffer(whole, reach, join_style="mitre", mitre_limit=10.0)
-    filled = shapely.buffer(grown, -reach, join_style="mitre", mitre_limit=10.0)
-    # as deep as half of snap in the mean, or wider than snap at one place
-    found = {
-        "overlap": _trace(common[is_refused], 0.0, 0.0),
-        "gap": _trace(shapely.difference(filled, whole), 0.0, near),
-        "short contact": [np.array([x[3]]) / factor for x in named if x[0] == "short contact"],
-        CLOSED_BY_SNAP: _trace(common[~is_refused & (one < other)], 0.5 * near, 0.0),
+    places = {
+        kind: [(fault[1:3], np.array([fault[3]]) / factor) for fault in named if fault[0] == kind]
+        for kind in ("gap", "short contact")
     }
-    if not (named or found["gap"]):
-        stones = [
-            polygon for polygon, name in zip(polygons, names, strict=True) if f"'{name}'" in error
-        ]
+    whole, stones = shapely.union_all(polygons), dict(zip(names, polygons, strict=True))
+    # overlaps that snap closes are as deep as half of snap in the mean
+    found = {
+        "overlap": _trace(common[is_refused], 0.0),
+        "gap": [
+            _trace_gap([stones[name] for name in pair], whole, place, AMBIGUOUS_GAP_RATIO * near)
+            for pair, place in places["gap"]
+        ],
+        "short contact": [place for _, place in places["short contact"]],
+        CLOSED_BY_SNAP: _trace(common[~is_refused & (one < other)], 0.5 * near),
+    }
+    if fits:
         found["face not joined"] = [
-            x for stone in stones for x in _find_unjoined(stone, polygons, near)
+            x
+            for name, stone in stones.items()
+            if f"'{name}'" in error
+            for x in _find_unjoined(stone, polygons, near)
         ]
     return found
 
 
-def _trace(shapes: Any, mean: float, widest: float) -> list[Array]:
-    """Return the outlines of what is deeper in the mean, and wider at one place, than lengths."""
+def _trace_gap(pair: Sequence[Any], whole: Any, place: Array, widest: float) -> Array:
+    """Return the outline of the gap at a place between two stones, or the place (n, 2)."""
+    import shapely
+
+    # what is narrower than the reach to both sides closes where the outline grows and shrinks
+    grown = shapely.buffer(
+        shapely.union_all(pair), 0.5 * widest, join_style="mitre", mitre_limit=10.0
+    )
+    filled = shapely.buffer(grown, -0.5 * widest, join_style="mitre", mitre_limit=10.0)
+    open_parts = shapely.get_parts(shapely.difference(filled, whole))
+    if not len(open_parts):
+        return place
+    nearest = shapely.distance(open_parts, shapely.Point(place[0])).argmin()
+    return shapely.get_coordinates(open_parts[nearest].exterior)[:-1]
+
+
+def _trace(shapes: Any, mean: float) -> list[Array]:
+    """Return the outlines of what is deeper in the mean than a length."""
     import shapely
 
     parts = shapely.get_parts(shapely.get_parts(shapes))
     parts = parts[shapely.area(parts) > 0.0]
     deep = 2.0 * shapely.area(parts) / shapely.length(parts) > mean
-    deep &= ~shapely.is_empty(shapely.buffer(parts, -0.5 * widest))
     return [shapely.get_coordinates(part.exterior)[:-1] for part in parts[deep]]
 
 
@@ -96,4 +115,4 @@ def _find_unjoined(stone: Any, polygons: Any, near: float) -> list[Array]:
     if least > 0.1 * stone.length:
         return [shapely.get_coordinates(stone)]
     beside = polygons[(away > near) & (away < 2.0 * least)]
-    return _trace(shapely.intersection(shapely.buffer(stone, 2.0 * least), beside), 0.0, 0.0)
+    return _trace(shapely.intersection(shapely.buffer(stone, 2.0 * least), beside), 0.0)
