@@ -236,12 +236,19 @@ def describe_dead_load(result: DeadLoadResult, *, explain: bool = False) -> str:
     lines += [] if model.prediction is None else [f"model: {model.prediction.text}"]
     # without equilibrium there is no result; doubts may be about it, and are printed below
     doubted = ", in doubt as below" if result.doubts else ""
-    lines.append(f"dead load: stands under its own weight{doubted}: {_describe_largest(joints)}")
+    # a steep bed of a wall in bond is not the worst of a ring and of its piers
+    walls = np.unique(result.dead.joints["part"].values[structure.heads])
+    beds = np.isin(joints["part"].values, walls)
+    first = joints if beds.all() else joints.isel(joint=~beds)
+    lines.append(f"dead load: stands under its own weight{doubted}: {_describe_largest(first)}")
     if (idle := joints["name"][joints["N"] <= 1e-6 * joints["N"].max()]).size:
         lines[-1] += f", as nothing is carried by {join_joint_names(idle.values.tolist())}"
     used = result.dead.joints["friction"].values >= (1.0 - 1e-3) * structure.friction
     if spent := int(np.count_nonzero(used & structure.judged)):
         lines[-1] += f"; V/N is μ at {spent} joint{'s' * (spent > 1)}, which makes no mechanism"
+    if 0 < beds.sum() < len(beds):
+        own = _describe_largest(joints.isel(joint=beds))
+        lines[-1] += f"; of beds of {join_names(walls.tolist())}, {own}"
     if structure.heads.any():
         heads = result.dead.joints.isel(joint=structure.heads)
         lines[-1] += f"; of head joints, which do not count, {_describe_largest(heads)}"

@@ -137,7 +137,10 @@ def describe_assessment(
     if len(left_out) > 4:  # too many to be named
         words = np.where(heads, "head joints ", "")[~judged]
         counts = Counter(zip(words, labels[~judged], strict=True))
-        left_out = [f"{count} {word}of {part}" for (word, part), count in counts.items()]
+        left_out = [
+            f"{count} {word.replace('joints', 'joint') if count == 1 else word}of {part}"
+            for (word, part), count in counts.items()
+        ]
     return (
         f"assessed: {np.count_nonzero(judged)} of {len(judged)} joints (rings and piers: "
         f"{join_names(list(dict.fromkeys(labels[judged])))}); not assessed: "

@@ -15,6 +15,7 @@ from archfem.cases.defaults import (
 )
 from archfem.cases.report.sections import _describe_extent
 from archfem.cases.result_text import describe_dead_load
+from archfem.masonry.structure import describe_assessment
 
 COLUMN = {"shape": "column", "breadth": 0.6, "heights": [1.2, 1.2]}
 BARE = {"structure": COLUMN, "motion": {"synthetic": {"seed": 1, "duration": 1.0, "pga": 1.0}}}
@@ -128,6 +129,32 @@ def test_the_dead_load_says_that_backing_is_fill(backing):
     text = describe_dead_load(af.cases.DeadLoadResult.of(case))
     note = "\nnote: the backing of [limit] is fill here, in dead load and runs\n"
     assert (note in text) == (len(backing) > 0)
+
+
+def test_beds_of_a_wall_in_bond_follow_the_other_piers_in_the_line_of_the_dead_load():
+    """A pier of two stones, the upper 3 m high, beside a wall of 2 m with a head joint."""
+    boxes = {
+        "wall": [(0, 0, 1, 1), (1, 0, 2, 1), (0, 1, 2, 2)],
+        "pier": [(3, 0, 4, 1), (3, 1, 4, 4)],
+        "ground": [(0, -1, 4, 0)],
+    }
+    blocks = [
+        {"name": f"{part} {k}", "outline": [[a, c], [b, c], [b, d], [a, d]], "part": part}
+        | {"role": "other" if part == "ground" else "pier", "fixed": part == "ground"}
+        for part, own in boxes.items()
+        for k, (a, c, b, d) in enumerate(own)
+    ]
+    case = af.Case.of({"structure": {"shape": "blocks", "blocks": blocks}})
+    text = describe_dead_load(af.cases.DeadLoadResult.of(case))
+    (line,) = [each for each in text.splitlines() if each.startswith("dead load: stands")]
+    pier, beds = line.split("; of head joints")[0].split("; of beds of wall, ")
+    weight = 1e-3 * af.STONE.unit_weight
+    assert pier.endswith(f"N ≥ {3.0 * weight:.2f} kN")
+    assert beds.endswith(f"N ≥ {weight:.2f} kN")
+    names, parts = [f"{k}" for k in range(6)], ["wall"] + ["fill"] * 4 + ["ring"]
+    judged, heads = np.arange(6) == 5, np.arange(6) == 0
+    said = describe_assessment(names, parts, judged, heads)
+    assert said.endswith("not assessed: 1 head joint of wall; 4 of fill")
 
 
 def test_head_joints_are_apart_in_the_line_of_the_dead_load(tmp_path):
