@@ -14,6 +14,7 @@
     risk_keys        [risk]: hazard, sampling, alternatives
     run              carry out a case, resume, result classes
     structure_keys   [structure], [materials] and [contacts]: read and written
+    structure_text   structures as text
     toml_file        reading, writing, merging, overriding TOML tables
     verdict_keys     [verdict]: ranges of properties
 

@@ -2,9 +2,7 @@
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from contextlib import suppress
 from csv import writer
-from functools import partial
 from io import StringIO
 from typing import NamedTuple
 
@@ -26,21 +24,16 @@ from archfem.dynamics.accuracy import Accuracy
 from archfem.dynamics.collapse_state import FALLEN_STATES
 from archfem.dynamics.history import Ending, History
 from archfem.dynamics.verdict import ALL_DEFINITIONS, Verdict
-from archfem.errors import InvalidInput
 from archfem.joints.criteria import assessed_joints, envelope, first_time, longest_duration
-from archfem.limit.collapse import Collapse, Outcome, describe_crushing, describe_fill
+from archfem.limit.collapse import Collapse, Outcome, describe_fill
 from archfem.limit.fill_strength import Fill, PlasticFill, as_pressure, has_backing
-from archfem.limit.instability import explain_instability
 from archfem.limit.mechanism_count import duration_text
 from archfem.limit.rating import Rating
-from archfem.limit.thickness import minimum_thickness
 from archfem.masonry.loads import Action, Settlement, describe_massless
-from archfem.masonry.ring_thickness import Ring
 from archfem.masonry.standing import describe_carried, find_bodies
 from archfem.masonry.structure import (
     UNCHECKED_ACROSS,
     Structure,
-    describe_spans,
     join_joint_names,
     join_names,
     join_words,
@@ -276,51 +269,6 @@ def _describe_largest(joints: xr.Dataset) -> str:
     )
 
 
-def describe_supports(structure: Structure, max_names: int = 4) -> str:
-    """Describe which blocks move and which are fixed; many by their parts, in one line."""
-    groups = []
-    for word, fixed in (("move", False), ("fixed", True)):
-        own = [block for block in structure.blocks if block.fixed is fixed]
-        names = [f"'{block.name}'" for block in own]
-        if fixed:
-            names = [f"'{b.name}' ({format_mm(np.ptp(b.points[:, 0]))} broad)" for b in own]
-        if len(own) > max_names:
-            parts = Counter(block.part or "unnamed" for block in own)
-            names = [f"{count} of '{part}'" for part, count in parts.items()]
-        groups.append(f"{word}: {join_names(names)}")
-    return f"blocks that {'; '.join(groups)}"
-
-
-def describe_depths(structure: Structure) -> str:
-    """Describe depths of the assessed joints by part, and clear spans and piers, in two lines."""
-    depths = np.where(structure.judged, structure.depths, np.inf)
-    parts = np.array([joint.part for joint in structure.joints])
-    names = dict.fromkeys(parts[structure.judged].tolist())
-    medians = [
-        format_mm(float(np.median(depths[(parts == part) & structure.judged])))
-        + (f" of '{part}'" if len(names) > 1 else "")
-        for part in names
-    ]
-    return (
-        f"depth of joints: {format_mm(float(depths.min()))} at least, at "
-        f"{structure.joints[int(depths.argmin())].name}; median {join_names(medians)}\n"
-        f"{describe_spans(structure)}{_name_slivers(structure)}"
-    )
-
-
-def _name_slivers(structure: Structure, share: float = 0.25) -> str:
-    """Return a line on stones of a wall in bond that are far shorter than most; else nothing."""
-    lengths = {each.name: np.ptp(each.points[:, 0]) for each in structure.blocks if not each.fixed}
-    usual = float(np.median([*lengths.values()]))
-    slivers = [f"'{k}' ({format_mm(x)})" for k, x in lengths.items() if x < share * usual]
-    if not slivers or not structure.heads.any():
-        return ""
-    return (
-        f"\nstones shorter than {share:g} of the usual {format_mm(usual)}: {join_names(slivers)}; "
-        "put jambs of openings above one another, or further apart"
-    )
-
-
 def describe_collapse(
     structure: Structure, collapse: Collapse, limit: LimitAnalysis, parapets: float = 0.0
 ) -> str:
@@ -502,29 +450,6 @@ def peak_of_spectrum(case: Case) -> float:
     """Return the acceleration of the site's spectrum at period zero [g]; NaN without one."""
     spectrum = case.assessment.spectrum or case.target
     return float(spectrum.horizontal(0.0)) if spectrum is not None else np.nan
-
-
-def describe_thickness(case: Case, ring: Ring) -> tuple[str, float, list[str]]:
-    """Find a ring's least thickness: in words, as a factor of safety, and in lines."""
-    limit, build = case.limit, ring.with_thickness
-    find = partial(minimum_thickness, build, strength=limit.strength, tolerance=1e-5)
-    least = find(friction=limit.friction)
-    words, factor = f"{format_mm(least)} of {format_mm(ring.thickness)}", ring.thickness / least
-    lines = [
-        f"least thickness at rest: {words}, the mean depth of its joints as drawn, all stones "
-        "scaled alike about the middle line; the ring alone on fixed springings",
-        f"geometric factor of safety: {factor:.3g}; "
-        f"{describe_crushing(limit.strength, case.structure)}",
-    ]
-    if limit.friction is not None:
-        with suppress(InvalidInput):  # without sliding it may stand at any thickness
-            rough = find(friction=None)
-            moving = explain_instability(build(0.99 * least)) or "joints crush"
-            moving = moving.partition(": ")[0]
-            lines.append(f"if thinner, {moving}; without sliding {format_mm(rough)} are enough")
-        alone = describe_friction_margin(case, build(ring.thickness))
-        lines += [f"the ring alone, as drawn: {alone[0]}", *alone[1:]] if alone else []
-    return words, factor, lines
 
 
 class PushFactors(NamedTuple):

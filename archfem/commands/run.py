@@ -22,7 +22,7 @@ from archfem._files import (
     replace_results,
 )
 from archfem._optional import can_film
-from archfem.cases import answers, result_text
+from archfem.cases import answers, result_text, structure_text
 from archfem.cases import result_folder as results
 from archfem.cases.analysis_keys import name_vehicles, parse_rating, rate_case
 from archfem.cases.answers import RESULTS, state_ratings
@@ -242,7 +242,7 @@ def thickness(options: argparse.Namespace) -> int:
     case = Case.read(options.case, options.changes)
     ring = find_ring(case.structure, options.part)
     with record_doubts(case.structure) as doubts:
-        words, factor, lines = result_text.describe_thickness(case, ring)
+        words, factor, lines = structure_text.describe_thickness(case, ring)
     text = "\n".join([*lines, *result_text.mark_remarks(doubts)])
     remarks: list[result_text.Remark] = [*doubts, *(x for x in lines if x.startswith(NOTE_MARK))]
     given = words, remarks, "at rest", result_text.PushFactors(factor, factor)

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 from archfem import _numba, _optional
 from archfem._display import write_progress_line
 from archfem._files import path_inside, read_listed
-from archfem.cases import result_text
+from archfem.cases import result_text, structure_text
 from archfem.cases.case import Case, read_settings
 from archfem.cases.examples import copy_example, list_example_titles, read_example, write_new_case
 from archfem.cases.run import HISTORY_FILE, DeadLoadResult, dead_load_of_case
@@ -65,8 +65,8 @@ def _check_case(options: argparse.Namespace) -> int:
     print(case.title)
     if (survey := read_survey(case.settings, case.folder)) is not None:
         print(survey)
-    print(result_text.describe_supports(case.structure))
-    print(result_text.describe_depths(case.structure))
+    print(structure_text.describe_supports(case.structure))
+    print(structure_text.describe_depths(case.structure))
     case.limit.check(case.structure)
     if case.pushover is not None:
         case.pushover.check(case.structure)

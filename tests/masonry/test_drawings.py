@@ -14,7 +14,7 @@ import pytest
 from drawn import assert_same, draw_portal, dxf, geojson, layers_of, square
 
 import archfem as af
-from archfem.cases.result_text import describe_depths
+from archfem.cases.structure_text import describe_depths
 from archfem.masonry.survey import drawings
 from archfem.masonry.survey.drawings import read_drawing
 

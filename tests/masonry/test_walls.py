@@ -8,7 +8,7 @@ import pytest
 from bonded import bonded_wall
 
 import archfem as af
-from archfem.cases.result_text import describe_depths
+from archfem.cases.structure_text import describe_depths
 from archfem.errors import InvalidStructure
 
 CONTACT = af.Contact(1.48e9, 0.3e9, friction=0.6)

@@ -1,0 +1,85 @@
+"""Structures as text: their supports, depths of joints, spans, and least thickness of rings."""
+
+from collections import Counter
+from contextlib import suppress
+from functools import partial
+
+import numpy as np
+
+from archfem.cases.case import Case
+from archfem.cases.defaults import describe_friction_margin
+from archfem.errors import InvalidInput
+from archfem.limit.collapse import describe_crushing
+from archfem.limit.instability import explain_instability
+from archfem.limit.thickness import minimum_thickness
+from archfem.masonry.ring_thickness import Ring
+from archfem.masonry.structure import Structure, describe_spans, join_names
+from archfem.units import format_mm
+
+
+def describe_supports(structure: Structure, max_names: int = 4) -> str:
+    """Describe which blocks move and which are fixed; many by their parts, in one line."""
+    groups = []
+    for word, fixed in (("move", False), ("fixed", True)):
+        own = [block for block in structure.blocks if block.fixed is fixed]
+        names = [f"'{block.name}'" for block in own]
+        if fixed:
+            names = [f"'{b.name}' ({format_mm(np.ptp(b.points[:, 0]))} broad)" for b in own]
+        if len(own) > max_names:
+            parts = Counter(block.part or "unnamed" for block in own)
+            names = [f"{count} of '{part}'" for part, count in parts.items()]
+        groups.append(f"{word}: {join_names(names)}")
+    return f"blocks that {'; '.join(groups)}"
+
+
+def describe_depths(structure: Structure) -> str:
+    """Describe depths of the assessed joints by part, and clear spans and piers, in two lines."""
+    depths = np.where(structure.judged, structure.depths, np.inf)
+    parts = np.array([joint.part for joint in structure.joints])
+    names = dict.fromkeys(parts[structure.judged].tolist())
+    medians = [
+        format_mm(float(np.median(depths[(parts == part) & structure.judged])))
+        + (f" of '{part}'" if len(names) > 1 else "")
+        for part in names
+    ]
+    return (
+        f"depth of joints: {format_mm(float(depths.min()))} at least, at "
+        f"{structure.joints[int(depths.argmin())].name}; median {join_names(medians)}\n"
+        f"{describe_spans(structure)}{_name_slivers(structure)}"
+    )
+
+
+def _name_slivers(structure: Structure, share: float = 0.25) -> str:
+    """Return a line on stones of a wall in bond that are far shorter than most; else nothing."""
+    lengths = {each.name: np.ptp(each.points[:, 0]) for each in structure.blocks if not each.fixed}
+    usual = float(np.median([*lengths.values()]))
+    slivers = [f"'{k}' ({format_mm(x)})" for k, x in lengths.items() if x < share * usual]
+    if not slivers or not structure.heads.any():
+        return ""
+    return (
+        f"\nstones shorter than {share:g} of the usual {format_mm(usual)}: {join_names(slivers)}; "
+        "put jambs of openings above one another, or further apart"
+    )
+
+
+def describe_thickness(case: Case, ring: Ring) -> tuple[str, float, list[str]]:
+    """Find a ring's least thickness: in words, as a factor of safety, and in lines."""
+    limit, build = case.limit, ring.with_thickness
+    find = partial(minimum_thickness, build, strength=limit.strength, tolerance=1e-5)
+    least = find(friction=limit.friction)
+    words, factor = f"{format_mm(least)} of {format_mm(ring.thickness)}", ring.thickness / least
+    lines = [
+        f"least thickness at rest: {words}, the mean depth of its joints as drawn, all stones "
+        "scaled alike about the middle line; the ring alone on fixed springings",
+        f"geometric factor of safety: {factor:.3g}; "
+        f"{describe_crushing(limit.strength, case.structure)}",
+    ]
+    if limit.friction is not None:
+        with suppress(InvalidInput):  # without sliding it may stand at any thickness
+            rough = find(friction=None)
+            moving = explain_instability(build(0.99 * least)) or "joints crush"
+            moving = moving.partition(": ")[0]
+            lines.append(f"if thinner, {moving}; without sliding {format_mm(rough)} are enough")
+        alone = describe_friction_margin(case, build(ring.thickness))
+        lines += [f"the ring alone, as drawn: {alone[0]}", *alone[1:]] if alone else []
+    return words, factor, lines
