@@ -146,8 +146,7 @@ class Rating(ResultDisplay):
         names = ["factor", "without_pressure", "full_pressure"]
         if isinstance(self.fill, PlasticFill):
             names.insert(1, "by_pressure")
-        if has_backing(self.fill):
-            names += ["without_backing", "without_either"]
+        names += ["without_backing", "without_either"] * has_backing(self.fill)
         return {name: float(getattr(self, name)) for name in [*names, "geometric"]}
 
     @property
@@ -418,9 +417,8 @@ class Rating(ResultDisplay):
     @property
     def least_by_codes(self) -> tuple[float, str]:
         """Least factor by codes of a vehicle without factors, and of which; else its own, ""."""
-        own = self.factor, ""
         codes = self.by_codes if self.missing else {}
-        return min([(each.factor, by) for by, each in codes.items()] or [own])
+        return min([(each.factor, by) for by, each in codes.items()] or [(self.factor, "")])
 
     @property
     def _is_multiple(self) -> bool:
