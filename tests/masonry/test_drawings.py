@@ -133,7 +133,7 @@ def test_files_that_are_no_drawings(tmp_path):
 @pytest.mark.parametrize(
     ("draw", "says"),
     [
-        (lambda s: s.add_lwpolyline(square(2, 0)), r"at \(2, 0\) on layer '0' is not closed"),
+        (lambda s: s.add_lwpolyline(square(2, 0)), r"at \(2, 0\) m on layer '0' is not closed"),
         (lambda s: s.add_line((0, 0), (1, 1)), "layer '0' has a LINE beside its polylines"),
         (lambda s: s.add_hatch(), "layer '0' has a HATCH beside its polylines: make a closed"),
         (
@@ -573,6 +573,46 @@ def test_what_ignored_layers_hold_is_said(tmp_path):
     assert [block.name for block in survey.blocks] == [*stones]
 
 
+def test_texts_are_names_by_the_advice_of_an_ignored_layer(tmp_path):
+    """A line on their layer, and a stone with two texts, are in the way until they are moved."""
+    stones = {f"S{k}": square(0, 1000 * k, 1000) for k in range(5)}
+    path = draw_named(tmp_path / "a.dxf", stones)
+    drawing = ezdxf.readfile(path)
+    space = drawing.modelspace()
+    line = space.add_line((0, 0), (0, 9), dxfattribs={"layer": "NAMES"})
+    note = space.add_text("note", dxfattribs={"layer": "NAMES", "insert": (500, 700)})
+    drawing.saveas(path)
+    ignore = af.masonry.Layer(ignore=True)
+    layers = {"WALL": af.masonry.Layer(role="pier"), "AXES": ignore}
+    assert str(af.read_outlines(path, layers=layers | {"NAMES": ignore})).endswith(
+        "one text in each of 4 outlines: if it is the stone's name, move the texts to a layer that "
+        "is not in [structure.layers], and leave one text in 'WALL 1'"
+    )
+    for moved in (line, note):
+        with pytest.raises(af.InvalidInput, match=r"has a LINE|has the texts"):
+            af.read_outlines(path, layers=layers)
+        moved.dxf.layer = "AXES"
+        drawing.saveas(path)
+    found = af.read_outlines(path, layers=layers)
+    assert [block.name for block in found.blocks] == [*stones]
+
+
+@pytest.mark.parametrize(
+    ("unit", "point", "said"),
+    [
+        ("mm", (1002.7804, 1051.2196), "(1002780, 1051220) mm"),
+        ("cm", (1002.7804, 1051.2196), "(100278, 105122) cm"),
+        ("m", (451002.7804, 5.25), "(451002.78, 5.25) m"),
+        ("m", (0.5, 0.123456), "(0.5, 0.123456) m"),
+        ("mm", (0.00025, 0.0), "(0.25, 0) mm"),
+    ],
+)
+def test_places_are_said_to_a_millimetre(unit, point, said):
+    """The last digit is a millimetre or less, far from the origin too."""
+    frame = drawings.Frame({"mm": 1e-3, "cm": 1e-2, "m": 1.0}[unit], unit)
+    assert frame.place(point) == said
+
+
 def test_stones_drawn_twice_and_crossed_outlines_keep_their_names(tmp_path):
     """A pier around its stones overlaps them; a name is within the hull of a crossed outline."""
     stones = {f"S{k}": square(0, 1000 * k, 1000) for k in range(3)}
@@ -692,6 +732,17 @@ def test_stones_on_a_sheet_are_not_in_model_space(tmp_path):
 def test_a_misspelt_layer_is_the_one_it_is_like(tmp_path, layer):
     case = draw_portal(tmp_path, {"RING 4": layer})
     words = rf"of layer '{layer}' \(closed outlines: 1, .*\) nothing is said: did you mean 'RING'\?"
+    with pytest.raises(af.InvalidInput, match=words):
+        af.Case.read(case)
+
+
+def test_a_misspelt_layer_of_the_case_is_the_one_to_correct(tmp_path):
+    """The drawing has RING, and no stone on RNIG."""
+    case = draw_portal(tmp_path)
+    case.write_text(case.read_text().replace("RING = ", "RNIG = "))
+    words = (
+        r"of layer 'RING' .* nothing is said: for 'RNIG' of \[structure.layers\], did you mean 'R"
+    )
     with pytest.raises(af.InvalidInput, match=words):
         af.Case.read(case)
 

@@ -218,7 +218,7 @@ def test_all_faults_of_a_drawing_are_listed_in_one_pass(tmp_path):
     for words in (
         "layer 'wall' has a LINE beside its polylines",
         "layer '0' has a CIRCLE, which would be left out",
-        "a polyline at (5.994, 0) on layer 'wall' is not closed",
+        "a polyline at (5.994, 0) m on layer 'wall' is not closed",
         "the deepest of 2 overlaps",
         "the widest of 2 gaps",
         *(f"'wall {k}' and 'wall {k + 1}'" for k in (2, 3, 4, 5)),

@@ -16,7 +16,7 @@ from functools import partial
 from importlib import import_module
 from importlib.util import find_spec
 from itertools import pairwise
-from math import acos, atan, ceil, dist, isclose, radians, tau
+from math import acos, atan, ceil, dist, isclose, log10, radians, tau
 from pathlib import Path
 from typing import Any
 
@@ -55,9 +55,11 @@ class Frame:
     stated: str = ""  # another unit that the file states, and that its sizes permit
 
     def place(self, point: Sequence[float]) -> str:
-        """Return a place [m] in words, in coordinates of the drawing."""
-        x, y = np.round(np.multiply(point, [1.0, self.upwards]), 6) / self.factor + 0.0
-        return f"({x:.6g}, {y:.6g}) {self.unit}"
+        """Return a place [m] in words, in coordinates of the drawing, to a millimetre or better."""
+        decimals = max(ceil(log10(1e3 * self.factor) - 1e-9), 0)
+        drawn = np.round(np.multiply(point, [1.0, self.upwards]), 6) / self.factor + 0.0
+        x, y = (f"{v:.{min(max(len(f'{abs(v):.0f}') + decimals, 6), 15)}g}" for v in drawn)
+        return f"({x}, {y}) {self.unit}"
 
     def length(self, value: float) -> str:
         """Return a length [m] in words, in the unit of the drawing."""
@@ -399,7 +401,7 @@ def _read_polyline(
     given, layer, factor = entity.points, entity.layer, frame.factor
     if not given:
         raise InvalidInput(f"a polyline on layer '{layer}' has no vertices: take it out")
-    where = f"a polyline at ({given[0][0]:.6g}, {given[0][1]:.6g}) on layer '{layer}'"
+    where = f"a polyline at {frame.place(np.multiply(given[0][:2], factor))} on layer '{layer}'"
     if entity.is_mesh:
         raise InvalidInput(f"{where} is a mesh: draw the block as a closed polyline")
     _check_coordinates(given, where, factor)

@@ -44,8 +44,15 @@ from archfem.masonry.materials import (
     Material,
 )
 from archfem.masonry.parts import Direction, assign_roles, find_directions
-from archfem.masonry.structure import CONTACT_TOLERANCE, LARGE_STONE, Structure, suggest_name
+from archfem.masonry.structure import (
+    CONTACT_TOLERANCE,
+    LARGE_STONE,
+    Structure,
+    join_names,
+    suggest_name,
+)
 from archfem.masonry.survey.drawings import (
+    ANNOTATIONS,
     Frame,
     Outline,
     read_drawing,
@@ -169,7 +176,7 @@ def read_outlines(
             _close_or_advise(outlines, snap)
         except (InvalidInput, InvalidStructure) as error:
             faults.append(f"besides, {error}")
-        raise InvalidInput(f"{path}: {'; '.join(faults)}")
+        raise InvalidInput(f"{path}: " + ";\n  ".join(faults))
     if layers is not None:
         _check_layers(outlines, layers, path, ignored)
     try:
@@ -202,13 +209,19 @@ def _describe_ignored(
     for layer in ignored:
         own = [each for each in others if each.layer == layer]
         words[layer] = "".join(f", {n} {kind}" for kind, n in Counter(x.kind for x in own).items())
-        texts = np.array([each.points[0][:2] for each in own if each.text]).reshape(-1, 2)
+        said = Counter(each.text for each in own)  # what several stones have is the name of none
+        texts = np.array([x.points[0][:2] for x in own if x.text and said[x.text] == 1])
+        texts = texts.reshape(-1, 2)
         inside = shapely.contains_xy(stones[:, None], *texts.T).sum(axis=1)
         if (named := np.count_nonzero(inside == 1)) > 0.5 * len(stones):
+            alone = all(each.kind in (*ANNOTATIONS, "INSERT") for each in own)
+            verb = "leave the layer out of" if alone else "move the texts to a layer that is not in"
             words[layer] += (
-                f", one text in each of {named} outlines: if it is the stone's name, leave the "
-                "layer out of [structure.layers]"
+                f", one text in each of {named} outlines: if it is the stone's name, {verb} "
+                "[structure.layers]"
             )
+            if crowded := [f"'{outlines[k].name}'" for k in np.flatnonzero(inside > 1)]:
+                words[layer] += f", and leave one text in {join_names(crowded)}"
     return words
 
 
@@ -309,7 +322,12 @@ def _check_layers(
     if strange := sorted(there - set(layers)):
         stones = [outline for outline in outlines if outline.layer == strange[0]]
         about = stones[0].frame.place(stones[0].points.mean(axis=0))
-        hint = suggest_name(strange[0], layers, 0.7) or "name its part, or ignore it"
+        hints = [suggest_name(strange[0], there & set(layers), 0.7)]
+        # a key of the case that no layer of the drawing has is the misspelt one
+        for key in (x for x in layers if x not in there):
+            if hint := suggest_name(key, [strange[0]], 0.7):
+                hints.append(f"for '{key}' of [structure.layers], {hint}")
+        hint = next(filter(None, hints), "name its part, or ignore it")
         raise InvalidInput(
             f"{path}: of layer '{strange[0]}' (closed outlines: {len(stones)}, the first about "
             f"{about}) nothing is said: {hint}"
@@ -503,7 +521,7 @@ def _run_checks(*checks: Callable[[], None]) -> None:
     if errors:
         kind = NarrowGap if any(isinstance(x, NarrowGap) for x in errors) else InvalidStructure
         faults = [fault for error in errors for fault in error.faults]
-        raise kind("; besides, ".join(map(str, errors)), faults)
+        raise kind(";\n  besides, ".join(map(str, errors)), faults)
 
 
 def _check_contacts(
@@ -519,7 +537,7 @@ def _check_contacts(
         f"'{one}' and '{other}' touch along {1e3 * dist(*short[0][2]):.3g} mm only at "
         f"{frame.place(start)}{say_others('the first', found, frame.place)}, within "
         f"{frame.length(least)} = {AMBIGUOUS_GAP_RATIO:g} times snap, taken for an error of the "
-        "survey: draw its end at the corner nearby",
+        "survey: draw its end at the corner nearby, and leave out a real step",
         found,
     )
 
