@@ -388,8 +388,8 @@ def say_others(rank: str, found: Sequence[Fault], place: Callable[[Point], str])
     """Say how many faults of a drawing there are beside the first of them, and where."""
     others = [f"'{a}' and '{b}' at {place(middle)}" for _, a, b, middle in found[1:]]
     more = f" and {len(others) - 8} more" * (len(others) > 8)
-    listed = f" (also {'; '.join(others[:8])}{more})"
-    return f", {rank} of {len(found)} {found[0][0]}s{listed}" if others else ""
+    listed = ";\n    ".join(others[:8])
+    return f", {rank} of {len(found)} {found[0][0]}s (also {listed}{more})" if others else ""
 
 
 def largest_overlap(outlines: Sequence[Array], body: Numbers) -> float:

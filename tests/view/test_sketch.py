@@ -224,6 +224,8 @@ def test_all_faults_of_a_drawing_are_listed_in_one_pass(tmp_path):
         *(f"'wall {k}' and 'wall {k + 1}'" for k in (2, 3, 4, 5)),
     ):
         assert said.count(words) == 1, words
+    # the line, the circle, the open stone, the overlaps and the gaps
+    assert len(said.splitlines()) == 5
     figure = draw_outlines(path)
     assert legend(figure)[1:] == ["not closed", "overlap (2)", "gap (2)"]
     places = [2.988 + 0.003, 1.994 + 0.003]

@@ -401,7 +401,7 @@ def _read_polyline(
     given, layer, factor = entity.points, entity.layer, frame.factor
     if not given:
         raise InvalidInput(f"a polyline on layer '{layer}' has no vertices: take it out")
-    where = f"a polyline at {frame.place(np.multiply(given[0][:2], factor))} on layer '{layer}'"
+    where = f"a polyline at {frame.place([factor * x for x in given[0][:2]])} on layer '{layer}'"
     if entity.is_mesh:
         raise InvalidInput(f"{where} is a mesh: draw the block as a closed polyline")
     _check_coordinates(given, where, factor)
