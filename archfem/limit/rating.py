@@ -17,6 +17,7 @@ from archfem.limit.fill_strength import Fill, PlasticFill, as_pressure, has_back
 from archfem.limit.self_weight import check_options, is_balanced, self_weight_programme
 from archfem.limit.thickness import find_geometric_factor
 from archfem.limit.vehicles import (
+    BY_CS454,
     DRIVING_DIRECTIONS,
     VEHICLES,
     MovingLoad,
@@ -106,7 +107,7 @@ class Rating(ResultDisplay):
             strength, which the four states above have then too; else NaN.
         by_cs454: least factors of a vehicle of one's own with those of CS 454 [-], 1.9 and 1.8 on
             the worst axle: "factor", "crushing" and those of other states by their names above;
-            else none, and with a plastic fill.
+            else none, with a plastic fill, and of one axle alone, whose factors are multiples.
         fill: strength of the fill, or None.
         missing: "live" and "impact" where neither the vehicle nor its user gave them.
         parapets: weight of the parapets along the bridge, without factor [N/m].
@@ -143,10 +144,8 @@ class Rating(ResultDisplay):
     @property
     def factors(self) -> dict[str, float]:
         """Least factors by state of the fill, and the geometric one, by the names above [-]."""
-        names = ["factor", "without_pressure", "full_pressure"]
-        if isinstance(self.fill, PlasticFill):
-            names.insert(1, "by_pressure")
-        names += ["without_backing", "without_either"] * has_backing(self.fill)
+        names = ["factor", *["by_pressure"] * isinstance(self.fill, PlasticFill), *_PRESSURES]
+        names = names if has_backing(self.fill) else names[:-2]
         return {name: float(getattr(self, name)) for name in [*names, "geometric"]}
 
     @property
@@ -400,7 +399,7 @@ class Rating(ResultDisplay):
         """
         if np.isnan(self.factor):
             return {}
-        found, code = dict[str, Mapping[str, Any]](), VEHICLES["CS454-single"]
+        found = dict[str, Mapping[str, Any]]()
         # the dynamic factor is not on a distributed load, and may be on one axle alone
         products = self.vehicle.list_products(self.structure, self.live, self.missing)
         for name, product in products.items() if self._is_multiple else ():
@@ -408,22 +407,20 @@ class Rating(ResultDisplay):
             of: Any = {x: share * getattr(self, x) for x in ("factor", "by_rule", *_STATES)}
             crushing = {state: share * factor for state, factor in self.crushing.items()}
             found[name] = of | {"crushing": crushing}
-        if self.by_cs454:
-            live, impact = code.factors
-            words = f"by CS 454 ({live:g}, and {impact:g} on the worst axle, from memory)"
-            found[words] = self.by_cs454
+        found |= {BY_CS454: self.by_cs454} if self.by_cs454 else {}
         return {name: self._with_factors(of) for name, of in found.items()}
 
     @property
     def least_by_codes(self) -> tuple[float, str]:
         """Least factor by codes of a vehicle without factors, and of which; else its own, ""."""
         codes = self.by_codes if self.missing else {}
-        return min([(each.factor, by) for by, each in codes.items()] or [(self.factor, "")])
+        return min(((x.factor, by) for by, x in codes.items()), default=(self.factor, ""))
 
     @property
     def _is_multiple(self) -> bool:
         """Whether the factor with other factors on the vehicle is a multiple of this one."""
-        return not self.area_load and (self.impact == 1.0 or self.vehicle.impact_on == "all axles")
+        alike = self.impact == 1.0 or len(self.vehicle.axles) == 1
+        return not self.area_load and (alike or self.vehicle.impact_on == "all axles")
 
     def _with_factors(self, of: Mapping[str, Any]) -> "Rating":
         """Return this with the factors, in each state, of another code on the same vehicle."""
@@ -585,7 +582,7 @@ def rate(  # noqa: PLR0913  (factors of the check, and the strength of the bridg
     unknown = np.nan, np.nan
     geometric, deepest = unknown if is_plastic else find_geometric_factor(weighted, moving, options)
     more: dict[str, Any] = {"strength": strength, "deepest": deepest, "fill": fill}
-    for key, each, by, states in _further_searches(driven, rows, live, options):
+    for key, each, by, states in _further_searches(driven, rows, live, area_load, options):
         # of the whole width, as the structure is modelled
         loads = [np.column_stack([structure.width / width * row, axles[:, 1]]) for row in each]
         known = None if key or is_plastic else moving
@@ -644,12 +641,13 @@ def _places_along(structure: Structure, vehicle: Array, steps: int = 100) -> Seq
 
 
 def _further_searches(
-    driven: Vehicle, rows: Sequence[Array], live: float, options: dict[str, Any]
+    driven: Vehicle, rows: Sequence[Array], live: float, area_load: float, options: dict[str, Any]
 ) -> Iterator[tuple[str, Sequence[Array], float, dict[str, dict[str, Any]]]]:
     """Yield name, rows of weights, partial factor and states of further least factors."""
     if states := _other_states(options):
         yield "", rows, live, states
-    if driven.grade == "given" and not isinstance(options["fill"], PlasticFill):
+    is_multiple = len(driven.axles) == 1 and not area_load
+    if driven.grade == "given" and not (is_multiple or isinstance(options["fill"], PlasticFill)):
         code = VEHICLES["CS454-single"]
         other = replace(driven, impact_on=code.impact_on).factored(*code.factors)
         yield "by_cs454", other, code.factors[0], {"factor": options} | states

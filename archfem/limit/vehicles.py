@@ -3,6 +3,7 @@
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from math import prod
 from pathlib import Path
 from typing import Any
 
@@ -50,6 +51,9 @@ CODE_FACTORS: Mapping[str, tuple[float, float]] = {
     "by Eurocodes on a fair road": (1.35, 1.4),
     "alone at walking pace": (1.1, 1.0),
 }
+
+# Name of the factors of CS454-single on a lorry of one's own
+BY_CS454 = "by CS 454 (1.9, and 1.8 on the worst axle, from memory)"
 
 # Axles that stand on the structure, from left to right, or these and a distributed load
 AxleRow = tuple[PointLoad, ...]
@@ -166,7 +170,9 @@ class Vehicle:
         """
         if self.grade == "given":
             codes = CODE_FACTORS.items()
-            return {f"{k} ({a:g} × {b:g}, from memory)": a * b for k, (a, b) in codes}
+            products = {f"{k} ({a:g} × {b:g}, from memory)": a * b for k, (a, b) in codes}
+            one = len(self.axles) == 1
+            return products | ({BY_CS454: prod(VEHICLES["CS454-single"].factors)} if one else {})
         spans = [high - low for low, high in find_clear_spans(structure).values()]
         if "impact" not in missing or not spans:
             return {}

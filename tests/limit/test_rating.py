@@ -788,6 +788,31 @@ def test_factors_of_codes_are_stated_with_outcome_and_range(monkeypatch):
     assert not replace(given, vehicle=VEHICLES["LM2"], by_cs454={}).by_codes
 
 
+@pytest.mark.parametrize(("area_load", "searches"), [(0.0, 1), (9e3, 2)])
+def test_one_axle_has_multiples_of_its_factors_by_cs454(area_load, searches, monkeypatch):
+    """Without a distributed load, against a rating with 1.9 and 1.8; with one it is searched."""
+    monkeypatch.setattr(rating, "_places_along", lambda *_: (3.0, 4.0))
+    search, seen = rating._find_least_factors, []
+
+    def find_least_factors(*given):
+        seen.append(given)
+        return search(*given)
+
+    monkeypatch.setattr(rating, "_find_least_factors", find_least_factors)
+    bridge, fill = arch_bridge(voussoirs=9), replace(GRAVEL, backing=0.2)
+    axle = Vehicle("axle", (5e4,), live=1.2, impact=1.1, area_load=area_load)
+    found = af.rate(bridge, axle, fill=fill)
+    assert len(seen) == searches
+    assert (len(found.by_cs454) > 0) == (searches == 2)
+    code = af.rate(bridge, replace(axle, live=1.9, impact=1.8, grade="read"), fill=fill)
+    of_code = [x for by, x in found.by_codes.items() if by.startswith("by CS 454 (1.9, and 1.8 ")]
+    (of_code,) = of_code
+    assert of_code.factors | {"geometric": 0.0} == pytest.approx(
+        code.factors | {"geometric": 0.0}, rel=1e-3
+    )
+    assert of_code.crushing == pytest.approx(code.crushing, rel=1e-3)
+
+
 def test_the_impact_on_a_train_is_that_of_half_the_span(monkeypatch):
     """1.67 at most (EN 1991-2, 6.4.5.2): against a rating with it."""
     monkeypatch.setattr(rating, "_places_along", lambda *_: (3.0, 3.5, 4.0))
