@@ -237,6 +237,7 @@ def test_tables_state_what_is_assessed(other, ring):
         case = SimpleNamespace(structure=model.structure, suite=None, report={})
         case.limit, case.assessment, case.target = limit, assessment, None
         data = report_data.ReportData(case, {"one": run})
+        vars(data)["motions"] = {}  # a run alone does not keep its motion
         facts = conclusion.list_facts(data)
         assert (("joints", SENTENCE) in facts) == said
         grid = response._tabulate_joints(data, run)
