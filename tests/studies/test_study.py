@@ -299,11 +299,11 @@ def test_progress_is_reported_where_the_output_is_a_file(
 ):
     monkeypatch.setattr(result_store, "PROGRESS_INTERVAL", 0.02)
     find = {"name": "finders_of_tests:slowly", "seconds": 0.08}
-    over = {"structure.thickness": [0.5, 0.6, 0.7]}
+    over = {"structure.thickness": [0.5, 0.55, 0.6, 0.65, 0.7]}  # two workers end two at once
     af.Study(small_ring, over, find, title="thickness").run(workers=workers)
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) > 2
-    assert all(line.startswith("thickness: ") and "of 3 points done" in line for line in lines)
+    assert all(line.startswith("thickness: ") and "of 5 points done" in line for line in lines)
     assert any("0 failed" in line and "s remaining" in line for line in lines)
 
 
