@@ -410,6 +410,18 @@ def test_the_answer_has_displacements_the_first_fall_and_the_checks(case):
     assert "by damage, right, an upper bound: the runs do not decide, for 3 at least are" in said
 
 
+@pytest.mark.parametrize(("share", "decided"), [(0.04, True), (0.06, False)])
+def test_runs_that_lack_joints_in_strong_motion_decide_no_survival(share, decided):
+    """Strong motion ends at 95 % of the Arias intensity."""
+    case = af.Case.of({"structure": {"shape": "column", "breadth": 0.5, "heights": [1.0, 1.0]}})
+    fall = af.dynamics.CollapseState("stands", None, (), 0.0, 0.0, True, loose_share=share)
+    whole, loose = verdict_of(), verdict_of()
+    loose.fall = fall
+    verdict = dict(conclusion.list_facts(data_of(case, a=whole, b=loose)))["verdict"]
+    reason = "Not decided, as in 1 of 2 runs joints were not followed through strong motion: it "
+    assert verdict.startswith("It survives: it " if decided else reason)
+
+
 @pytest.mark.parametrize(
     ("count", "norm", "outcome", "answer", "under"),
     [

@@ -194,15 +194,15 @@ def _say_survival(
 ) -> Iterator[str]:
     """Yield whether it survives the motions, and how often with other properties.
 
-    Too few motions decide no survival; assessments that fail are in the same sentence.
+    Too few motions decide none, nor do runs without joints; failing assessments stand beside.
     """
     verdicts, (_, answer) = [run.verdict for run in data.runs.values()], _find_worst(data)
     in_doubt = " (in doubt, as below)" * (HISTORIES in doubtful)
-    survives, few = answer.startswith("survives"), _say_too_few(data)
+    survives, reason = answer.startswith("survives"), _say_why_undecided(data)
     answer = f"it {answer}{in_doubt}"
-    if survives and few:
-        answer = f"not decided{in_doubt}, as {few}"
-    answer = f", {'but' if survives and not few else 'and'} ".join([answer, *failed])
+    if survives and reason:
+        answer = f"not decided{in_doubt}, as {reason}"
+    answer = f", {'but' if survives and not reason else 'and'} ".join([answer, *failed])
     sizes = [x.displacement for x in verdicts if x.outcome in COLLAPSE_STATES[:2]]
     known = bool(sizes) and np.isfinite(sizes).all()
     moved = f", and moves by {Ends.of(sizes):mm}" if known else ""
@@ -217,13 +217,16 @@ def _say_survival(
         yield f"with other plausible properties it {found.count}{under}"
 
 
-def _say_too_few(data: ReportData) -> str:
-    """Say of which number the motions that were run are a part; "" if they are enough."""
+def _say_why_undecided(data: ReportData) -> str:
+    """Say how the runs are too few, or lack joints, to decide a survival; "" if they do not."""
     count, rule, norm = len(data.runs), find_rule(data), data.case.report.get("norm", "")
     total = count + len(data.missing)
     words = [f"{count} of {total} motions {'were' if count > 1 else 'was'} run"] * (count < total)
     if rule and count < rule.fewest:
         words.append(f"{norm} (from memory) requires {rule.fewest} motions at least")
+    falls = [run.verdict.fall for run in data.runs.values()]
+    if loose := sum(fall is not None and fall.lacks_joints for fall in falls):
+        words.append(f"in {loose} of {count} runs joints were not followed through strong motion")
     return join_words(words)
 
 
