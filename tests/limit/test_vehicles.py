@@ -234,7 +234,8 @@ def test_a_search_for_the_worst_place_solves_each_once(strength, rounds, monkeyp
     )
     worst, factors = find_worst_rows(dead, axles, (), [], np.zeros(len(rows)))
     assert len(solved) <= rounds * len(rows)
-    assert next(iter(worst)) == min(rows, key=expected.__getitem__)
+    # of a place and its mirror image either is the worst
+    assert expected[next(iter(worst))] == pytest.approx(min(expected.values()), rel=1e-5)
     reached = [k for k, row in enumerate(rows) if np.isfinite(expected[row])]
     assert 20 < len(reached) < len(rows)
     own = [expected[rows[k]] for k in reached]
