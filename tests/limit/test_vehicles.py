@@ -223,11 +223,8 @@ def test_a_search_for_the_worst_place_solves_each_once(strength, rounds, monkeyp
     options = {"friction": "coulomb", "strength": strength, "fill": GRAVEL}
     stones, dead = self_weight_programme(arch_bridge(), **options)
     rows = [(af.PointLoad(x, (0.0, -1e5)),) for x in np.linspace(0.1, 8.9, 45).tolist()]
-    axles, solved, solve = (
-        {row: stones.load(row) for row in rows},
-        [],
-        linear_programme.solve_linear,
-    )
+    axles = {row: stones.load(row) for row in rows}
+    solved, solve = [], linear_programme.solve_linear
     expected = collapse_factors(stones, dead, axles, options)
     monkeypatch.setattr(
         linear_programme, "solve_linear", lambda *given: [solved.append(1), solve(*given)][1]

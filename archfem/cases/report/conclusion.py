@@ -264,10 +264,8 @@ def _judge_check(data: ReportData, check: Ratios) -> tuple[str, str]:
         words = ", which it fails with one weight a body"
         return f"it withstands or not, by the split of weights, {of}", words
     if check.bounded:
-        bound, test = (
-            f"its ratio, {format_ratio(check.decisive)}, is an upper bound",
-            _say_test(data),
-        )
+        bound = f"its ratio, {format_ratio(check.decisive)}, is an upper bound"
+        test = _say_test(data)
         words = f"alone it is not shown to withstand {of}, as {bound}: {test}"
         return words, f", an upper bound: {test}"
     if check.moved and _say_motion(data, check.least, peak_of_spectrum(data.case)):
