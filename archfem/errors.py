@@ -14,8 +14,8 @@ logger = logging.getLogger("archfem")
 
 @contextmanager
 def filter_log(keep: Callable[[logging.LogRecord], bool]) -> Iterator[None]:
-    """Filter what is logged within a block."""
-    logger.addFilter(keep)
+    """Filter what is logged within a block, before the filters of blocks around it."""
+    logger.filters.insert(0, keep)
     try:
         yield
     finally:

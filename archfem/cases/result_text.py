@@ -1,7 +1,9 @@
 """Results as text: sentences, and tables which the command line prints and the report shows."""
 
+import logging
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from csv import writer
 from io import StringIO
 from typing import NamedTuple
@@ -24,6 +26,7 @@ from archfem.dynamics.accuracy import Accuracy
 from archfem.dynamics.collapse_state import FALLEN_STATES
 from archfem.dynamics.history import Ending, History
 from archfem.dynamics.verdict import ALL_DEFINITIONS, Verdict
+from archfem.errors import filter_log
 from archfem.joints.criteria import assessed_joints, envelope, first_time, longest_duration
 from archfem.limit.collapse import Collapse, Outcome, describe_fill
 from archfem.limit.fill_strength import Fill, PlasticFill, as_pressure, has_backing
@@ -43,12 +46,30 @@ from archfem.models.model import Doubt
 from archfem.motion.matching import Match
 from archfem.motion.motion import Motion
 from archfem.motion.response_spectra import measure_intensity
+from archfem.statics.equilibrium import structure_doubts
 from archfem.statics.pushover import Pushover
 from archfem.statics.stress import strength_use_text, utilisation_text
 from archfem.units import STANDARD_GRAVITY, Ends, format_mm, kN
 
 # A doubt, or a line with a note
 Remark = Doubt | str
+
+
+@contextmanager
+def record_doubts(structure: Structure) -> Iterator[list[Doubt]]:
+    """Yield doubts about a structure, and the warnings of a block but those of runs."""
+    doubts = structure_doubts(structure)
+
+    def record(given: logging.LogRecord) -> bool:
+        # doubts of runs are kept by the runs; interruptions and the pace are no doubts of an answer
+        of_run = hasattr(given, "of_run") or any(isinstance(x, Doubt) for x in given.args or ())
+        if given.levelno >= logging.WARNING and not of_run:
+            # the remedy of a warning is behind its last semicolon
+            doubts.append(Doubt(*given.getMessage().rsplit("; ", 1)))  # type: ignore[arg-type]
+        return True
+
+    with filter_log(record):
+        yield doubts
 
 
 def mark_remarks(remarks: Iterable[Remark]) -> list[str]:

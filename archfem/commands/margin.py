@@ -12,14 +12,13 @@ from archfem._display import DOUBT_MARK, write_progress_line
 from archfem._files import create_result_folder, intact_file_list, path_inside, read_listed
 from archfem.cases import answers
 from archfem.cases.case import Case
-from archfem.cases.result_text import mark_remarks
+from archfem.cases.result_text import mark_remarks, record_doubts
 from archfem.commands.cli import ExitCode
 from archfem.commands.run import (
     Command,
     doubt_code,
     keep_attempt,
     name_group,
-    record_doubts,
     write_results,
 )
 from archfem.dynamics.collapse_state import DISLOCATION, CollapseState, shallowest_part

@@ -2,7 +2,6 @@
 
 import argparse
 import io
-import logging
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stdout
@@ -49,7 +48,6 @@ from archfem.errors import (
     Interrupted,
     InvalidInput,
     keep_warnings,
-    logger,
 )
 from archfem.limit.collapse import Collapse, describe_fill
 from archfem.limit.rating import Rating
@@ -58,7 +56,6 @@ from archfem.masonry.structure import Structure
 from archfem.models.model import Doubt
 from archfem.motion.motion import Motion
 from archfem.motion.suite import Suite
-from archfem.statics.equilibrium import structure_doubts
 from archfem.statics.mechanism_assessment import KinematicAssessment
 from archfem.statics.modes import Modes
 from archfem.statics.pushover import Pushover
@@ -163,22 +160,6 @@ def _name_published_files(text: str, folder: Path, command: str) -> str:
     return "".join(x for x in lines if x[:6] != "wrote " or Path(x[6:].strip()).exists())
 
 
-@contextmanager
-def record_doubts(structure: Structure) -> Iterator[list[Doubt]]:
-    """Yield doubts about a structure, and the warnings of a block but those of runs."""
-    doubts, handler = structure_doubts(structure), logging.Handler(logging.WARNING)
-    # the remedy of a warning is behind its last semicolon
-    handler.emit = lambda record: doubts.append(Doubt(*record.getMessage().rsplit("; ", 1)))  # type: ignore[arg-type,method-assign]
-    # doubts of runs are kept by the runs; interruptions and the pace are no doubts of an answer
-    handler.addFilter(lambda record: not any(isinstance(x, Doubt) for x in record.args or ()))
-    handler.addFilter(lambda record: not hasattr(record, "of_run"))
-    logger.addHandler(handler)
-    try:
-        yield doubts
-    finally:
-        logger.removeHandler(handler)
-
-
 def keep_attempt(name: str) -> Callable[[Command], Command]:
     """Let a command that finds no answer leave the reason in its folder, which a report states."""
 
@@ -232,7 +213,7 @@ def limit(options: argparse.Namespace) -> int:
         files = partial(results.limit_files, case, found, text, doubts)
         write_results("limit", case, options.out, f"{case.title}\n{text}", files)
 
-    with record_doubts(case.structure) as doubts:
+    with result_text.record_doubts(case.structure) as doubts:
         show_both_senses(case, case.limit.solve_so_far(case.structure), show, doubts)
     return doubt_code(doubts)
 
@@ -241,7 +222,7 @@ def thickness(options: argparse.Namespace) -> int:
     """Find the least thickness of a ring at rest, scaled about its middle line."""
     case = Case.read(options.case, options.changes)
     ring = find_ring(case.structure, options.part)
-    with record_doubts(case.structure) as doubts:
+    with result_text.record_doubts(case.structure) as doubts:
         words, factor, lines = structure_text.describe_thickness(case, ring)
     text = "\n".join([*lines, *result_text.mark_remarks(doubts)])
     remarks: list[result_text.Remark] = [*doubts, *(x for x in lines if x.startswith(NOTE_MARK))]
@@ -258,7 +239,7 @@ def assess(options: argparse.Namespace) -> int:
     case = Case.read(options.case, options.changes)
     motion = case.ground_motion() if case.motion is not None else None
     demand = case.target if case.target is not None else motion
-    with record_doubts(case.structure) as doubts:
+    with result_text.record_doubts(case.structure) as doubts:
         try:
             found = case.assessment.solve(case.structure, demand, options.parts)
         except KeyboardInterrupt as error:
@@ -373,7 +354,7 @@ def _rate_each(
         for number, table in enumerate(tables):
             progress.show(f"vehicle {number + 1} of {count}")
             try:
-                with record_doubts(case.structure) as doubts:
+                with result_text.record_doubts(case.structure) as doubts:
                     found = rate_case(case.structure, parse_rating(table), case.limit)
             except KeyboardInterrupt:
                 if not rated:
@@ -485,7 +466,7 @@ def print_results(case: Case, found: Iterable[Result], folder: Path) -> tuple[st
     of_limit = False
     if (survey := read_survey(case.settings, case.folder)) is not None:
         print(survey)
-    with record_doubts(case.structure) as doubts:
+    with result_text.record_doubts(case.structure) as doubts:
         supports = len(doubts)
         # results are printed at the end, and those before the first run may take minutes
         write_progress_line(case.title, f"dead load of {len(case.structure.free)} blocks")

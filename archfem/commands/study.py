@@ -41,9 +41,6 @@ def study(options: argparse.Namespace) -> int:
     errors = table["error"].values.ravel().tolist()
     for error in sorted({error for error in errors if error}):
         print(f"{DOUBT_MARK}{errors.count(error)} of {len(errors)} points ended in {error}")
-    if lost := _count_bounded(table):
-        words = "without a state without dilatancy: their factors are bounded alone"
-        print(f"{DOUBT_MARK}{lost} of {len(errors)} points {words}, by factor_at_most")
     # of this very table
     inputs = hash_content(folder / RESULT_FILES[0])
     with replace_results(folder, DERIVED["study"][0], inputs) as draft:
@@ -53,14 +50,7 @@ def study(options: argparse.Namespace) -> int:
             print(f"wrote {folder / name}")
     if interruption is not None:
         raise interruption
-    return 1 if all(errors) else ExitCode.DOUBTFUL if any(errors) or doubts or lost else 0
-
-
-def _count_bounded(table: xr.Dataset) -> int:
-    """Return the number of points at which limit analysis found a bound and no state."""
-    if not {"factor", "factor_at_most"} <= set(table):
-        return 0
-    return int((table["factor"].isnull() & table["factor_at_most"].notnull()).sum())
+    return 1 if all(errors) else ExitCode.DOUBTFUL if any(errors) or doubts else 0
 
 
 def _write_results(definition: "Study", table: xr.Dataset, folder: Path) -> list[Doubt]:

@@ -2,7 +2,7 @@
 
 import hashlib
 import inspect
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from importlib import import_module
 from typing import Any
@@ -14,7 +14,7 @@ from archfem._validation import validate_arguments
 from archfem.cases.analysis_keys import rate_case
 from archfem.cases.case import Case
 from archfem.cases.provenance import hash_inputs, remove_presentation
-from archfem.cases.result_text import STATED_DOUBTS, site_acceleration
+from archfem.cases.result_text import STATED_DOUBTS, doubt_rating, record_doubts, site_acceleration
 from archfem.cases.run import DeadLoadResult, log_prefix
 from archfem.dynamics.analysis import Analysis
 from archfem.dynamics.history import (
@@ -37,7 +37,7 @@ from archfem.joints.criteria import (
 )
 from archfem.limit.mechanism_count import Mechanism
 from archfem.masonry.structure import suggest_name
-from archfem.models.model import write_doubts
+from archfem.models.model import Doubt, write_doubts
 from archfem.motion.motion import Motion
 from archfem.statics.equilibrium import Equilibrium
 from archfem.studies.cache import dead_load_of, ground_motion, ground_suite, lowest_modes
@@ -139,8 +139,12 @@ def of_history(run: History, mechanisms: Mapping[str, Mechanism | None] | None =
     assessed = describe_assessed_joints(run.joints)
     findings |= {"assessed": assessed} if assessed else {}
     drift = float(run.dataset.attrs["energy_drift"])
-    findings |= {"energy_drift": drift, "doubts": float(len(run.doubts))}
-    return findings | {STATED_DOUBTS: write_doubts(run.doubts)}
+    return findings | {"energy_drift": drift} | _state_doubts(run.doubts)
+
+
+def _state_doubts(doubts: Sequence[Doubt]) -> Findings:
+    """Return the number of doubts, and all of them as JSON."""
+    return {"doubts": float(len(doubts)), STATED_DOUBTS: write_doubts(doubts)}
 
 
 def largest_values(run: History) -> dict[str, float]:
@@ -193,7 +197,8 @@ def evaluate_limit(case: Case) -> Findings:
     An infinite factor never makes a mechanism; NaN is that of a case which does not stand, or of
     one without a state without dilatancy, which `factor_at_most` bounds.
     """
-    collapse = case.limit.solve(case.structure)
+    with record_doubts(case.structure) as doubts:
+        collapse = case.limit.solve(case.structure)
     findings: Findings = {
         "factor": float(collapse.factor),
         "hinges": len(collapse.hinges),
@@ -207,14 +212,16 @@ def evaluate_limit(case: Case) -> Findings:
         if collapse.over_fill is not None:
             findings["least_push"] = least = abs(collapse.push) * float(collapse.range[0])
         findings |= {"least_push_over_site": least / site} if site > 0.0 else {}
-    return findings
+    return findings | _state_doubts(doubts)
 
 
 def evaluate_rating(case: Case) -> Findings:
     """Return the factor of a case in each state of its fill, and the place of the vehicle."""
-    found = rate_case(case.structure, case.rating, case.limit)
+    with record_doubts(case.structure) as doubts:
+        found = rate_case(case.structure, case.rating, case.limit)
+    doubts += [each for each in doubt_rating(found, case.limit) if isinstance(each, Doubt)]
     place = {"position": found.moving.position, "hinges": len(found.moving.worst.hinges)}
-    return found.factors | place
+    return found.factors | place | _state_doubts(doubts)
 
 
 def evaluate_comparison(

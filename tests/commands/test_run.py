@@ -15,10 +15,10 @@ import xarray as xr
 from pages import read_page
 
 import archfem as af
-from archfem.cases.result_text import ResultTable
+from archfem.cases.result_text import ResultTable, record_doubts
 from archfem.cases.run import carry_out
 from archfem.commands import margin
-from archfem.commands.run import print_results, record_doubts
+from archfem.commands.run import print_results
 from archfem.dynamics import fall, motion_scaling, time_history
 from archfem.errors import logger
 from archfem.models.model import Doubt

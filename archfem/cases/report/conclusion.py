@@ -30,7 +30,7 @@ from archfem.cases.report.doubts import (
 from archfem.cases.report.motion_rules import check_motions, find_rule
 from archfem.cases.report.report_data import SHOWN_RESULTS, ReportData
 from archfem.cases.report.scales import describe_scales, find_first_failures, say_fragile
-from archfem.cases.report.study_findings import read_studies, say_what_changes
+from archfem.cases.report.study_findings import say_what_changes
 from archfem.cases.result_text import PushFactors, peak_of_spectrum, site_acceleration
 from archfem.cases.run import CASE_FILE
 from archfem.dynamics.collapse_state import (
@@ -125,7 +125,7 @@ def _say_plainly(data: ReportData, doubtful: Sequence[str]) -> Iterator[str]:
         yield from _say_survival(data, doubtful, assessed if failed else [])
         yield from _say_first_failures(data)
         yield from say_fragile(data)
-        studied = [next(say_what_changes(each), "") for each in read_studies(data)]
+        studied = [next(say_what_changes(each), "") for each in data.studies]
         if data.verdict_ranges or not any(studied):
             yield _say_what_decides(data.verdict_ranges)
         yield from filter(None, studied)
@@ -385,7 +385,7 @@ def _build_paragraphs(data: ReportData, doubtful: Sequence[str]) -> dict[str, li
         answer += [*stated[0]] if len(data.statements) == 1 and stated else [x for x, *_ in stated]
     answer += [*_describe_ends(data), *_describe_ranges(data)]
     changes = [*_say_causes(data.verdict_ranges)]
-    changes += [text for study in read_studies(data) for text in say_what_changes(study)]
+    changes += [text for study in data.studies for text in say_what_changes(study)]
     if fill := join_names(list_elastic_fill(data)):
         changes.append(f"{fill} is elastic in the runs and carries tension, which soil does not")
     changes += ["the checks of the numbers raise no doubt"] * (bool(data.runs) and not doubtful)

@@ -9,7 +9,7 @@ from archfem._files import read_sealed_json
 from archfem.cases.answers import MATCHED, RESULTS, Ratios, read_numbers
 from archfem.cases.report.motion_rules import check_motions, note_checks
 from archfem.cases.report.report_data import ReportData
-from archfem.cases.report.study_findings import list_studied, read_studies
+from archfem.cases.report.study_findings import list_studied
 from archfem.dynamics.collapse_state import COLLAPSE_STATES, FALLEN_STATES, RANGE_REMEDY
 from archfem.dynamics.history import History
 from archfem.dynamics.verdict_range import MAX_RATIO_OF_DISPLACEMENTS, VerdictRange, property_text
@@ -60,7 +60,7 @@ def list_doubts(data: ReportData) -> list[tuple[str, Doubt]]:
     for name, stated in data.statements.items():
         doubts += [(RESULTS[name], doubt) for doubt in _merge_motions(stated.doubts)]
     # with their cases as a part of the words: they are of no other result
-    listed = (doubt for study in read_studies(data) for doubt in study.doubts)
+    listed = (doubt for study in data.studies for doubt in study.doubts)
     return [*doubts, *((STUDIES, Doubt(str(replace(doubt, remedy="")))) for doubt in listed)]
 
 
@@ -207,7 +207,7 @@ def list_elastic_fill(data: ReportData) -> list[str]:
 
 def list_unvaried(data: ReportData) -> list[str]:
     """Return what was not varied, without which "no doubt" says little."""
-    studied = {each for study in read_studies(data) for each in list_studied(study)}
+    studied = {each for study in data.studies for each in list_studied(study)}
     if not data.runs:
         static = {"limit", "assessment", "pushover"} & data.statements.keys()
         return [each for each in ("lengths", "friction") if static and each not in studied]

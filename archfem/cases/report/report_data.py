@@ -13,6 +13,7 @@ from archfem._display import DOUBT_MARK
 from archfem._files import check_listed, describe_deleted, group_of, path_inside, read_file_list
 from archfem.cases.answers import RESULTS, Statement, cut_remedy
 from archfem.cases.case import Case
+from archfem.cases.report.study_findings import StudyFindings, read_studies
 from archfem.cases.run import CASE_FILE, MOTION_VARIABLE, RATING_FILE
 from archfem.cases.toml_file import Table, parse_tables
 from archfem.dynamics.history import History
@@ -44,7 +45,13 @@ class ReportData:
     runs: Mapping[str, History]  # by the names of their motions
     folder: Path | None = None
     missing: tuple[str, ...] = ()  # names of the pairs of the suite without a run
-    studies: Sequence[Path] = ()  # folders of studies; that of the results may have one
+    study_folders: Sequence[Path] = ()  # without any, that of the results, which may have one
+
+    @cached_property
+    def studies(self) -> list[StudyFindings]:
+        """Findings of the studies."""
+        own = [self.folder] if self.folder and (self.folder / "study.txt").is_file() else []
+        return read_studies(self.study_folders or own)
 
     @cached_property
     def dead(self) -> xr.Dataset | None:

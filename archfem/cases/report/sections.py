@@ -25,7 +25,7 @@ from archfem.cases.report.response import (
     build_ground_section,
     build_run_sections,
 )
-from archfem.cases.report.study_findings import StudyFindings, read_studies, tabulate_study
+from archfem.cases.report.study_findings import StudyFindings, tabulate_study
 from archfem.cases.run import DRAWING_FILE
 from archfem.dynamics.collapse_state import DISLOCATION, FALLEN_STATES, shallowest_part
 from archfem.dynamics.history import SIGN_CONVENTION
@@ -75,7 +75,7 @@ _METHODS = (
 
 def build_sections(data: ReportData) -> list[Section]:
     """Build all sections of a report; those without any result are left out."""
-    studies = [piece for each in read_studies(data) for piece in _build_study(data, each)]
+    studies = [piece for each in data.studies for piece in _build_study(data, each)]
     sections = [
         build_conclusion(data),
         build_input_section(data),

@@ -1,7 +1,7 @@
 """Findings of a study in a report: the worst point of each case, falls first, and what decides."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -12,12 +12,11 @@ import xarray as xr
 
 from archfem._files import read_listed
 from archfem._netcdf import read_dataset
-from archfem.cases.report.report_data import ReportData
 from archfem.cases.result_text import STATED_DOUBTS
 from archfem.dynamics.collapse_state import COLLAPSE_STATES, FALLEN_STATES
 from archfem.errors import InvalidInput
 from archfem.masonry.structure import join_names, join_words
-from archfem.models.model import Doubt, group_doubts, merge_doubts, read_doubts
+from archfem.models.model import Doubt, merge_doubts, read_doubts
 from archfem.units import format_mm
 from archfem.view.pages.document import Grid
 
@@ -39,6 +38,9 @@ _COUNTED = {
     "dislocated": ("is dislocated", "are dislocated"),
     "failed": ("has no outcome", "have no outcome"),
 }
+
+# Numbers, and names of joints, by which doubts of one kind differ between cases
+_OF_ONE_CASE = re.compile(r"\([^)]*\)|[\d.]+(e[-+]?\d+)?")
 
 # Coordinates that are motions of one case, and those that number points too
 _MOTIONS = ("pair", "suite.pair")
@@ -104,8 +106,10 @@ class StudyFindings:
             place = " ".join([*filter(None, [self.label(row)]), *motion])
             own = read_doubts(row.get(STATED_DOUBTS) or "[]")
             found += [replace(doubt, place=place) for doubt in own]
-        groups = ((each, dict.fromkeys(x.place for x in each)) for each in group_doubts(found))
-        return [merge_doubts(each, join_names([*places])) for each, places in groups]
+        groups = dict[tuple[str, ...], list[Doubt]]()
+        for doubt in found:
+            groups.setdefault(tuple(_OF_ONE_CASE.sub("", x) for x in doubt.kind), []).append(doubt)
+        return [_merge_cases(each) for each in groups.values()]
 
     def label(self, row: Any) -> str:
         """Return the name of the case of a row."""
@@ -114,10 +118,17 @@ class StudyFindings:
         return ", ".join(f"{key.replace('_', ' ')} = {_format(row[key])}" for key in self.keys)
 
 
-def read_studies(data: ReportData) -> list[StudyFindings]:
-    """Read the studies of a report, or that of its results, if there is one."""
-    own = [data.folder] if data.folder and (data.folder / "study.txt").is_file() else []
-    found = [_read_study(place) for place in data.studies or own]
+def _merge_cases(doubts: Sequence[Doubt]) -> Doubt:
+    """Return doubts of several cases as one: its numbers are their ends, or those of the first."""
+    places = join_names([*dict.fromkeys(doubt.place for doubt in doubts)], "; ")
+    if len({doubt.kind for doubt in doubts}) > 1:
+        return replace(doubts[0], place=f"{places}, of which the first")
+    return merge_doubts(doubts, places)
+
+
+def read_studies(folders: Sequence[Path]) -> list[StudyFindings]:
+    """Read the studies in some folders."""
+    found = [_read_study(place) for place in folders]
     names = [f"the study '{each.title}'" if len(found) > 1 else each.name for each in found]
     return [replace(each, name=name) for each, name in zip(found, names, strict=True)]
 
