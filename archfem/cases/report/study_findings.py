@@ -15,7 +15,7 @@ from archfem._netcdf import read_dataset
 from archfem.cases.result_text import STATED_DOUBTS
 from archfem.dynamics.collapse_state import COLLAPSE_STATES, FALLEN_STATES
 from archfem.errors import InvalidInput
-from archfem.masonry.structure import join_names, join_words
+from archfem.masonry.structure import join_words
 from archfem.models.model import Doubt, merge_doubts, read_doubts
 from archfem.units import format_mm
 from archfem.view.pages.document import Grid
