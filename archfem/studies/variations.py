@@ -35,7 +35,7 @@ from archfem.dynamics.rigid_body.simulation import RigidBlockSimulation
 from archfem.dynamics.schemes import Conserving, EffectiveDamping, Viscous, interpret_damping
 from archfem.dynamics.verdict_range import VerdictRange
 from archfem.errors import DidNotConverge, InvalidInput, InvalidStructure, logger
-from archfem.limit.fill_strength import PlasticFill
+from archfem.limit.fill_strength import PlasticFill, has_backing
 from archfem.limit.rating import ASSUMED_STRENGTH, Rating, rate_again
 from archfem.masonry.joint_closing import with_finish
 from archfem.masonry.structure import Structure
@@ -426,6 +426,10 @@ def vary_rating(
         known |= {"all of its passive pressure": found.full_pressure}
         none = {"limit.fill.mobilisation": 0.0, "limit.fill.active": 0.0}
         listed.append(("pressure", "no pressure of the fill", none))
+    if has_backing(found.fill):
+        known |= {"no backing": np.nan_to_num(found.without_backing)}
+        given = [f"limit.fill.{x}" for x in case.settings["limit"]["fill"] if "backing" in x]
+        listed.append(("backing", "no backing", {"remove": given}))
     if found.crushing:
         name = f"stones of {ASSUMED_STRENGTH / MPa:g} MPa that crush"
         known[name] = np.nan_to_num(found.crushing["factor"])

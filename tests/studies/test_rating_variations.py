@@ -139,6 +139,34 @@ def test_the_keys_of_a_case_are_changed_one_property_at_a_time(tmp_path, key):
         assert own == (values if name == "abutments free" else pytest.approx(values)), name
 
 
+def test_a_backing_is_left_out_alone_and_at_once_with_the_worst_of_the_others(
+    tmp_path, monkeypatch
+):
+    path = tmp_path / "case.toml"
+    text = CASE.replace('right = { span = "3 m", rise = "1 m", thickness = "0.45 m" }\n', "")
+    text = text.replace(
+        '[structure.piers]\nPIER\nheight = "1.5 m"\ncourse = "0.75 m"\npier = {}', ""
+    )
+    path.write_text(text.replace('"35 degree"', '"35 degree", backing_height = "0.6 m"'))
+    monkeypatch.setattr("archfem.limit.rating._places_along", lambda *_: (1.0, 1.5))
+    case = af.Case.read(path)
+    found = rate_case(case.structure, case.rating, case.limit)
+    cells = dict(vary_rating(case, case.settings["rating"], found)[0].rows)
+    removed = ['remove=["limit.fill.backing_height"]']
+    bare = af.Case.read(path, removed)
+    alone = rate_case(bare.structure, bare.rating, bare.limit).factor
+    assert float(cells["no backing"]) == pytest.approx(alone, rel=SEARCHED)
+    assert alone < 0.9 * found.factor
+    worst = [*removed, "structure.arches.thickness=0.36", "structure.backfill.cover=0.2"]
+    worst += ["limit.strength=2e6", "limit.fill.mobilisation=0", "limit.fill.active=0"]
+    width = min(float(x.split()[3]) for x in cells if x.startswith("a vehicle on"))
+    weight = 0.9 * case.structure.blocks[-1].material.unit_weight
+    worst += [f"rating.width={width}", f"materials.backfill.unit_weight={weight}"]
+    least = af.Case.read(path, worst)
+    whole = rate_case(least.structure, least.rating, least.limit).factor
+    assert float(cells["all unfavourable at once"]) == pytest.approx(whole, rel=SEARCHED)
+
+
 def test_variations_that_are_stopped_are_kept(tmp_path, unplotted, capsys, monkeypatch, caplog):
     """The same command computes only those that are left; another rating computes all."""
     path, out = tmp_path / "case.toml", tmp_path / "out"
