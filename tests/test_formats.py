@@ -23,7 +23,7 @@ STACK = {
     "record": {"fields_every": 4},
 }
 
-MESSAGE = r"{} was written by another version of archfem \(format '.*', not '.* 3'\): "
+MESSAGE = r"{} was written by another version of archfem \(format '.*', not '.* 4'\): "
 """Begin of the message, behind the name of the file."""
 
 READERS = {
@@ -34,7 +34,7 @@ READERS = {
 }
 """Readers of datasets, and the remedy, by the kind of file."""
 
-LAYOUTS = {3: "eed790f27cdd00b5"}
+LAYOUTS = {4: "2320687720939f68"}
 """Digests of the names in result files, by the number of their format."""
 
 

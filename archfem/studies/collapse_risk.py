@@ -66,7 +66,7 @@ from archfem.studies.result_store import evaluate_with_progress
 from archfem.studies.variations import (
     Variation,
     as_falling,
-    doubt_steps_of_sliding,
+    doubt_runs,
     draw_samples,
     prepare_runs,
 )
@@ -83,7 +83,7 @@ VARIED = ("k_n", "k_s", "friction", "damping_ratio")
 FIRST_ROUND = 8
 
 # Variables of the table that are results
-RESULTS = ("lower", "upper", "runs", "admissible_step", "error")
+RESULTS = ("lower", "upper", "runs", "admissible_step", "lacks_joints", "error")
 
 # Peak acceleration at which those begin [m/s²]
 FIRST_PEAK = 2.0
@@ -126,6 +126,7 @@ def bracket_capacity(sample: RiskSample) -> dict[str, Any]:
     """Return the largest scale that stands below the smallest that falls, that one, and runs.
 
     The admissible step is that which follows sliding in both; infinite if those of the runs do.
+    Joints lack where the one that stands has loose blocks in strong motion.
     """
     run = prepare_runs(sample.analysis, dict(sample.changes))
     smallest, largest = admissible_range(sample.between, sample.motion)
@@ -148,7 +149,9 @@ def bracket_capacity(sample: RiskSample) -> dict[str, Any]:
         else:
             scale = sqrt(stands * falls)
     bounds = [states[at].admissible_step for at in (stands, falls) if at in states]
-    return {"lower": stands, "upper": falls, "runs": runs, "admissible_step": min(bounds)}
+    lacking = stands in states and states[stands].lacks_joints
+    found = {"lower": stands, "upper": falls, "runs": runs, "admissible_step": min(bounds)}
+    return found | {"lacks_joints": lacking}
 
 
 def _search_factor(wide: float) -> float:
@@ -361,6 +364,7 @@ def _describe_samples(
     columns["admissible_step"] = ("sample", np.full(count, inf))
     columns |= {
         "runs": ("sample", np.zeros(count, int)),
+        "lacks_joints": ("sample", np.zeros(count, int)),
         "error": ("sample", np.array([""] * count, dtype=object)),
     }
     return xr.Dataset(columns, attrs={"properties": json.dumps(list(ranges))})
@@ -638,8 +642,9 @@ class CollapseRisk(ResultDisplay):
             )
             doubts.append(Doubt(cause, "give its points at longer return periods"))
         doubts += self._doubt_records()
-        steps, dt = self.dataset["admissible_step"].values.tolist(), self.dataset.attrs["dt"]
-        doubts += doubt_steps_of_sliding(steps, dt, "samples", "")
+        found, dt = self.dataset, self.dataset.attrs["dt"]
+        steps, lacking = found["admissible_step"].values, found["lacks_joints"].values
+        doubts += doubt_runs(steps.tolist(), lacking.tolist(), dt, "samples", "")
         count = len(self.dataset["sample"])
         # a twentieth of all is what the 90 % interval leaves out at each of its ends
         if count - len(self.answered) > 0.05 * count:

@@ -145,12 +145,8 @@ def verdict_range(  # noqa: PLR0913  (one call, one argument for each thing that
         doubts = [_blame_variations(each, analysis.fidelity) for each in doubts]
     doubts += doubt_soft_blocks(*structures)
     steps = [row["found"].get("admissible_step", inf) for row in rows.values()]
-    doubts += doubt_steps_of_sliding(steps, analysis.dt)
-    if lacking := sum(row["found"].get("lacks_joints", False) for row in rows.values()):
-        words = f"in {{}} of {len(rows)} runs blocks were loose, without elastic joints, before "
-        words += "strong motion was over, and none fell"
-        remedy = "`archfem run CASE.toml` says which stones met, and what to do"
-        doubts.append(Doubt(words, remedy, (lacking,)))
+    lacking = [row["found"].get("lacks_joints", False) for row in rows.values()]
+    doubts += doubt_runs(steps, lacking, analysis.dt)
     dataset.attrs["doubts"] = write_doubts(doubts)
     contacts = [joint.contact for joint in analysis.structure.joints]
     dataset.attrs["k_n"] = float(np.mean([contact.normal_stiffness for contact in contacts]))
@@ -169,25 +165,29 @@ def _blame_variations(doubt: Doubt, fidelity: object) -> Doubt:
     return replace(doubt, remedy=remedy)
 
 
-def doubt_steps_of_sliding(
-    admissible: Sequence[float], dt: float | None, runs: str = "runs", half: str = " or half of it"
-) -> list[Doubt]:
-    """Return a doubt where time steps are too long for the sliding of some runs, or samples.
+def doubt_runs(
+    admissible: Sequence[float],
+    lack_joints: Sequence[bool],
+    dt: float | None,
+    runs: str = "runs",
+    half: str = " or half of it",
+) -> Iterator[Doubt]:
+    """Yield doubts where steps are too long for sliding, or joints lack, in runs or samples.
 
     Admissible steps are infinite where those of the run follow.
     """
-    steps = [step for step in admissible if step < inf]
-    if not steps or dt is None:
-        return []
-    return [
-        Doubt(
-            f"in {{}} of {len(admissible)} {runs} the steps, {1e3 * dt:g} ms{half}, are long for "
-            "sliding",
+    of, steps = f"in {{}} of {len(admissible)} {runs}", [step for step in admissible if step < inf]
+    if steps and dt is not None:
+        yield Doubt(
+            f"{of} the steps, {1e3 * dt:g} ms{half}, are long for sliding",
             f"take {1e3 * min(steps):g} ms or less, `--set analysis.dt={min(steps):g}`"
             f"{'; without dt, a single run varies its steps, and has no such doubt' * bool(half)}",
             (len(steps),),
         )
-    ]
+    if lacking := int(sum(lack_joints)):
+        words = "blocks were loose, without elastic joints, before strong motion was over, and none"
+        remedy = "`archfem run CASE.toml` says which stones met, and what to do"
+        yield Doubt(f"{of} {words} fell", remedy, (lacking,))
 
 
 def as_falling(

@@ -37,6 +37,7 @@ def risk_of(capacity, record, alternative=None, width=0.01, spectra=2.0):
         "runs": np.full(count, 4),
         "error": np.array([""] * count),
         "admissible_step": np.full(count, np.inf),
+        "lacks_joints": np.zeros(count, int),
     }
     columns = {name: ("sample", each) for name, each in samples.items()} | unscaled
     attrs = {"hazard": json.dumps(values), "doubts": "[]", "dt": 0.005}
@@ -341,6 +342,27 @@ def test_steps_too_long_for_sliding_at_a_bound_are_in_doubt(monkeypatch):
     )
     found.dataset["admissible_step"].values[:] = np.inf
     assert "sliding" not in str(found.doubts)
+
+
+def test_samples_that_stand_without_joints_in_strong_motion_are_in_doubt(monkeypatch):
+    """Half of the samples have loose blocks, of which those that fall count for nothing."""
+
+    def loose(analysis, changes):
+        def run(motion):
+            falls = motion.pga > 2.0 + changes["k_n"]
+            share = 0.5 if changes["friction"] < 0.0 else 0.04
+            kind = "fallen" if falls else "stands"
+            return af.dynamics.CollapseState(kind, None, (), 0.0, 0.0, True, np.inf, share)
+
+        return run
+
+    monkeypatch.setattr(af.studies.collapse_risk, "prepare_runs", loose)
+    given = *tilted_block(), SITE
+    found = af.collapse_risk(*given, samples=8, precision=0.5, vary={"friction": (-0.1, 0.1)})
+    (doubt,) = (str(each) for each in found.doubts if "loose" in str(each))
+    assert doubt.startswith("in 4 of 8 samples blocks were loose, without elastic joints")
+    found.dataset["lacks_joints"].values[:] = 0
+    assert "loose" not in str(found.doubts)
 
 
 def test_samples_are_kept_and_continued(tmp_path, monkeypatch, quick_runs):
