@@ -260,6 +260,8 @@ def search_scales(
 ) -> MechanismScales:
     """Make runs until all brackets are within the precision, and below a fall no gap is wide.
 
+    Nor is the gap below the smallest dislocation, where falls are searched.
+
     The first ones are at `begin`; those that were `found` before are kept.
     """
     scales = found or MechanismScales(definitions)
@@ -280,18 +282,25 @@ def search_scales(
 
 
 def _next_below_fall(scales: MechanismScales, precision: float, smallest: float) -> float | None:
-    """Return a scale in the widest gap below the smallest fall or the last run, or None."""
+    """Return a scale in the widest gap below the smallest fall or the last run, or None.
+
+    The gap below the smallest dislocation is filled too.
+    """
     runs = scales.runs
+    moved = (run.scale for run in runs if run.fall and run.fall.kind == "dislocated")
+    dislocated = min(moved, default=0.0)
     top = min(scales[COLLAPSE_DEFINITION].upper, runs[-1].scale)
-    if runs[0].scale > max(FILLED_SHARE * top, smallest):
-        return max(runs[0].scale / sqrt(2.0), smallest)
+    first = runs[0].scale
+    if first > smallest and (first > FILLED_SHARE * top or first == dislocated):
+        return max(first / sqrt(2.0), smallest)
 
     def excess(gap: tuple[float, float]) -> float:
         ratio = NEAR_RATIO if gap[1] > NEAR_SHARE * top else FILLED_RATIO
         return gap[1] / gap[0] / max(ratio, 1.0 + precision)
 
     gaps = pairwise(run.scale for run in runs if run.scale <= top)
-    wide = [gap for gap in gaps if gap[1] > FILLED_SHARE * top and excess(gap) > 1.0]
+    filled = (gap for gap in gaps if gap[1] > FILLED_SHARE * top or gap[1] == dislocated)
+    wide = [gap for gap in filled if excess(gap) > 1.0]
     if not wide:
         return None
     lower, upper = max(wide, key=excess)

@@ -285,6 +285,23 @@ def test_gaps_below_the_largest_scale_are_filled_where_nothing_falls_there():
     assert len(found.runs) == 4
 
 
+@pytest.mark.parametrize("moves", [0.3, 0.83, 1.3])
+def test_the_smallest_dislocation_is_bracketed_below_a_distant_fall(moves):
+    """Whether the search begins below it or above."""
+    runs = shaken_down((3.9, inf), made=[])
+
+    def shaken(scale):
+        run = runs(scale)
+        moved = replace(run, fall=replace(run.fall, kind="dislocated"))
+        return moved if moves <= scale < 3.9 else run
+
+    found = search_scales(shaken, ("collapse",), 0.05, (0.1, 9))
+    stood = max(run.scale for run in found.runs if run.fall.kind == "stands")
+    dislocated = min(run.scale for run in found.runs if run.fall.kind == "dislocated")
+    assert stood < moves <= dislocated <= 1.1 * stood
+    assert len(found.runs) <= 32
+
+
 def searched_by_steps(monkeypatch, windows, made, follows=inf, *, is_given=True):
     """Search the fall of a block that falls within given windows of scales by each time step.
 
