@@ -35,6 +35,7 @@ from archfem.joints.criteria import (
     eccentricity_magnitude,
     part_roles,
 )
+from archfem.limit.collapse import Outcome
 from archfem.limit.mechanism_count import Mechanism
 from archfem.masonry.structure import suggest_name
 from archfem.models.model import Doubt, write_doubts
@@ -194,11 +195,14 @@ def scales_of(result: DeadLoadResult, motion: Motion, **options: Any) -> Finding
 def evaluate_limit(case: Case) -> Findings:
     """Return the collapse factor of a case by limit analysis, and the size of its mechanism.
 
-    An infinite factor never makes a mechanism; NaN is that of a case which does not stand, or of
-    one without a state without dilatancy, which `factor_at_most` bounds.
+    `least_push` is over both senses and the states of the fill. An infinite factor never makes a
+    mechanism; NaN is that of a case which does not stand, or of one without a state without
+    dilatancy, which `factor_at_most` bounds.
     """
     with record_doubts(case.structure) as doubts:
         collapse = case.limit.solve(case.structure)
+        other = case.limit.opposite if collapse.outcome is not Outcome.INFEASIBLE else None
+        senses = [collapse] if other is None else [collapse, other.solve(case.structure)]
     findings: Findings = {
         "factor": float(collapse.factor),
         "hinges": len(collapse.hinges),
@@ -206,11 +210,10 @@ def evaluate_limit(case: Case) -> Findings:
     }
     if collapse.solutions is not None:
         findings["factor_at_most"] = float(collapse.upper)
-    if collapse.push:
-        site = site_acceleration(case)
-        findings["push"] = least = float(collapse.factor) * abs(collapse.push)
-        if collapse.over_fill is not None:
-            findings["least_push"] = least = abs(collapse.push) * float(collapse.range[0])
+    if push := abs(collapse.push):
+        factors = [x.factor if x.over_fill is None else x.range[0] for x in senses]
+        least, site = push * float(np.min(factors)), site_acceleration(case)
+        findings |= {"push": push * float(collapse.factor), "least_push": least}
         findings |= {"least_push_over_site": least / site} if site > 0.0 else {}
     return findings | _state_doubts(doubts)
 

@@ -147,7 +147,7 @@ def test_a_study_states_each_doubt_of_its_runs_once_and_their_cases():
     drift = af.models.model.Doubt("the energy drifts")
     found = study(cases=3, doubts={1: steps[:1], 2: [drift], 4: steps[1:]})
     assert [*map(str, found.doubts)] == [
-        "'case 0' under 'second', 'case 2' under 'first': steps of 2 to 5 ms are long; halve them",
+        "'case 0' under 'second'; 'case 2' under 'first': steps of 2 to 5 ms are long; halve them",
         "'case 1' under 'first': the energy drifts",
     ]
 
@@ -245,6 +245,22 @@ def test_the_table_of_a_study_names_what_it_varies(tmp_path):
     assert table.attrs["varied"] == "contacts.stone to stone.friction; structure.breadth"
     found = study_findings.collect_findings("", "", table)
     assert study_findings.list_studied(found) == {"lengths", "friction"}
+
+
+def test_the_least_push_of_a_study_is_that_of_both_senses(tmp_path):
+    """A stone on a slope of 1 in 10 slides at (μ + s) / (1 - μ s) uphill, and less downhill."""
+    lean = 0.1
+    base, top = [[0, -1], [1, -1], [1, lean], [0, 0]], [[0, 0], [1, lean], [1, 0.5], [0, 0.4]]
+    outlines = {"ground": base, "stone": top}
+    blocks = [{"name": x, "outline": y, "fixed": y is base} for x, y in outlines.items()]
+    structure = {"shape": "blocks", "blocks": blocks}
+    friction, push = 0.3, {"horizontal": 1.0}
+    contact = {"stone to stone": {"friction": friction}}
+    case = af.Case.of({"structure": structure, "contacts": contact, "limit": push})
+    found = evaluate_limit(case)
+    down, up = ((friction + s) / (1.0 - s * friction) for s in (-lean, lean))
+    assert found["least_push"] == pytest.approx(down, rel=1e-9)
+    assert found["push"] == pytest.approx(up, rel=1e-9)
 
 
 def test_a_push_over_the_acceleration_of_the_site_is_the_least_over_the_fill():

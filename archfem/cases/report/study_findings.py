@@ -155,7 +155,11 @@ def collect_findings(title: str, text: str, table: xr.Dataset) -> StudyFindings:
     keys = [name for name in differing if name not in _NO_CASE] or differing
     numbers = [name for name, each in table.data_vars.items() if each.dtype.kind == "f"]
     shown = [name for name in (*_FACTORS, *_SIZES) if name in numbers]
-    names = [name for name in shown if name != "factor" or "push" not in shown]
+    hidden = {"factor"} if "push" in shown else set()
+    pushes = [table[name] for name in ("push", "least_push") if name in shown]
+    if len(pushes) > 1 and np.allclose(*pushes, equal_nan=True):
+        hidden.add("least_push")
+    names = [name for name in shown if name not in hidden]
     worst = _find_worst(frame, keys, names) if keys and names else frame.head(0)
     return StudyFindings(title, text, table, tuple(keys), tuple(names), worst)
 
