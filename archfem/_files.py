@@ -303,7 +303,7 @@ def lock_folder(folder: Path) -> Iterator[None]:
             lock.seek(0)
             with lock:
                 raise InvalidInput(
-                    f"another driver runs in {folder} ({lock.read().decode()}): wait for it to "
+                    f"another command runs in {folder} ({lock.read().decode()}): wait for it to "
                     "end, or name another folder"
                 ) from error
         # the previous owner may have deleted the file after it was opened here

@@ -291,7 +291,7 @@ def test_a_folder_has_one_writer(tmp_path):
     assert not _files.is_locked(tmp_path)
     with _files.lock_folder(tmp_path):
         assert _files.is_locked(tmp_path)
-        refused = rf"another driver runs in .*process {os.getpid()}"
+        refused = rf"another command runs in .*process {os.getpid()}"
         with pytest.raises(af.InvalidInput, match=refused), _files.lock_folder(tmp_path):
             pass
         assert _files.is_locked(tmp_path)

@@ -138,7 +138,7 @@ def test_locks_of_windows_exclude_and_leave_the_content_readable(monkeypatch, tm
         ((_, offset),) = held
         assert offset > len((tmp_path / ".lock").read_bytes()) > 0
         with (
-            pytest.raises(af.InvalidInput, match=f"another driver runs.*process {os.getpid()}"),
+            pytest.raises(af.InvalidInput, match=f"another command runs.*process {os.getpid()}"),
             _files.lock_folder(tmp_path),
         ):
             pass

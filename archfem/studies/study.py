@@ -193,7 +193,7 @@ class Study:
             a point, or "".
 
         Raises:
-            InvalidInput: another driver runs in the folder, `workers` is invalid, or no scheduler
+            InvalidInput: another command runs in the folder, `workers` is invalid, or no scheduler
                 answers.
             StudyStopped: the disk is full, the scheduler was lost, or no worker starts; finished
                 points are kept.

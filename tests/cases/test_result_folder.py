@@ -166,7 +166,7 @@ def test_a_second_run_in_a_folder_is_refused(two_runs, small, capsys):
     before = files_below(folder)
     with replace_run(case, folder):
         assert af.commands.main(["run", str(small), "--out", str(folder)]) == 1
-        assert "another driver runs in" in capsys.readouterr().err
+        assert "another command runs in" in capsys.readouterr().err
         assert af.cases.open_results(folder).missing == ()  # the earlier run, until the end
     assert files_below(folder) < before
 
@@ -302,7 +302,7 @@ def test_results_that_are_read_in_python_keep_their_pictures(two_runs):
 def test_in_python_too_a_folder_has_one_run_at_a_time(tmp_path):
     first = af.cases.run_case(af.Case.of(COLUMN), tmp_path)
     next(first)
-    with pytest.raises(af.InvalidInput, match="another driver runs in"):
+    with pytest.raises(af.InvalidInput, match="another command runs in"):
         run_one(tmp_path, 1.0)
     first.close()
     assert list(tmp_path.iterdir()) == []

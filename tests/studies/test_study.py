@@ -231,7 +231,7 @@ def test_a_second_driver_is_refused(study_file, tmp_path):
     folder = tmp_path / "out"
     with (
         Store(folder).lock(),
-        pytest.raises(af.InvalidInput, match=rf"another driver .*process {os.getpid()}"),
+        pytest.raises(af.InvalidInput, match=rf"another command .*process {os.getpid()}"),
     ):
         af.Study.read(study_file, own_code=True).run(folder, workers=1)
     assert (
