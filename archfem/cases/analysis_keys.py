@@ -17,7 +17,7 @@ from archfem.limit.fill_strength import Fill, PlasticFill
 from archfem.limit.rating import ASSUMED_STRENGTH, Rating, rate
 from archfem.limit.self_weight import check_options, self_weight_programme
 from archfem.limit.vehicles import VEHICLES, VEHICLES_OF_CODES, Vehicle
-from archfem.masonry.loads import Action, AttachedLoad, BodyForce, PointLoad, Settlement
+from archfem.masonry.loads import Action, AttachedLoad, BlockLoad, BodyForce, PointLoad, Settlement
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import Structure, join_names
 from archfem.motion.design_spectra import DesignSpectrum
@@ -143,20 +143,29 @@ class LimitAnalysis:
         weaker = replace(self, strength=ASSUMED_STRENGTH).solve(structure)
         return f"{words}; with {ASSUMED_STRENGTH / MPa:g} MPa, {weaker.sentence}"
 
-    def crushing_share(self, structure: Structure, direction: float) -> float:
-        """Return the share of a horizontal push that is left where stones crush [-].
+    def crushing_share(
+        self, structure: Structure, direction: float, loads: Sequence[AttachedLoad] = ()
+    ) -> float:
+        """Return the least share of a push that is left where stones crush, over the fill [-].
 
         Args:
             structure: structure of the case.
             direction: sense of the push along x, 1 or -1.
+            loads: masses and forces attached to blocks; ties bear nothing.
         """
-        given: dict[str, Any] = {"live": BodyForce(direction), "fill": self.fill}
+        live, dead = list[Action]([BodyForce(direction)]), list[Action]()
+        for load in loads:
+            (x, y), force = load.point, (0.0, 0.0) if load.passive else load.force
+            name = structure.blocks[structure.block_number(load.block)].name
+            live.append(BlockLoad(x, (direction * load.weight, 0.0), y, name))
+            dead.append(BlockLoad(x, (force[0], force[1] - load.weight), y, name))
+        given: dict[str, Any] = {"live": live, "dead": dead, "fill": self.fill}
         given["friction"] = self.friction and "coulomb"  # as assessments slide by default
         crushing, without = (
-            collapse_factor(structure, strength=strength, **given).factor
+            collapse_factor(structure, strength=strength, **given).range
             for strength in (self.strength, np.inf)
         )
-        return crushing / without
+        return min(1.0 if x == y else x / y for x, y in zip(crushing, without, strict=True))
 
     @property
     def opposite(self) -> "LimitAnalysis | None":

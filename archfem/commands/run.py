@@ -276,12 +276,17 @@ def _compare_crushing(case: Case, found: Iterable[KinematicAssessment]) -> list[
     if case.limit.strength in (None, np.inf):
         return []
     least = min(found, key=lambda result: result.checks[-1].least)
-    share = case.limit.crushing_share(case.structure, least.direction)
+    loads = case.assessment.options.get("loads", ())
+    share = case.limit.crushing_share(case.structure, least.direction, loads)
+    margin = share * min(
+        each.decisive for result in found for _, each in answers.list_ratios(result)
+    )
     text = (
         f"joints hinge about their edges: crushing at {case.limit.strength / MPa:.3g} MPa lowers "
-        f"the push at which the whole begins to move by {100.0 * (1.0 - share):.2g} %"
+        f"the push at which the whole begins to move by {100.0 * (1.0 - share):.2g} %, and margins "
+        f"by as much: the least one to {margin:.3g}"
     )
-    return [f"{NOTE_MARK}{text}" if share > 0.98 else Doubt(text, "reduce margins by as much")]
+    return [f"{NOTE_MARK}{text}" if share > 0.98 else Doubt(text)]
 
 
 @keep_attempt("rating")

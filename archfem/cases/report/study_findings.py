@@ -156,8 +156,7 @@ def collect_findings(title: str, text: str, table: xr.Dataset) -> StudyFindings:
     numbers = [name for name, each in table.data_vars.items() if each.dtype.kind == "f"]
     shown = [name for name in (*_FACTORS, *_SIZES) if name in numbers]
     hidden = {"factor"} if "push" in shown else set()
-    pushes = [table[name] for name in ("push", "least_push") if name in shown]
-    if len(pushes) > 1 and np.allclose(*pushes, equal_nan=True):
+    if "least_push" in shown and np.allclose(table["push"], table["least_push"], equal_nan=True):
         hidden.add("least_push")
     names = [name for name in shown if name not in hidden]
     worst = _find_worst(frame, keys, names) if keys and names else frame.head(0)
