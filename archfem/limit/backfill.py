@@ -434,7 +434,7 @@ class BlocksWithFill:
             raise InvalidInput(
                 f"fill, backing {level:.4g} m holds {'all' if level > lowest else 'none'} of the "
                 f"stones, whose faces below the fill are {lowest:.4g} to {highest:.4g} m high: "
-                "give a level between"
+                "give a level between, or leave it out"
             )
         return float(level)
 

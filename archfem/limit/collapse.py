@@ -51,6 +51,7 @@ from archfem.masonry.loads import (
     list_loads,
 )
 from archfem.masonry.materials import STONE
+from archfem.masonry.standing import find_bodies
 from archfem.masonry.structure import (
     HasStructure,
     Structure,
@@ -676,6 +677,8 @@ def describe_fill(fill: Fill | PlasticFill | None, structure: Structure) -> str:
     else:
         share = f"{say_part(fill.active)} of the active and at most {say_part(fill.mobilisation)}"
         text = f"fill: weight, and {share} of the passive pressure, {strength}"
+        if find_bodies(structure):
+            text += "; bodies on it press straight down, without dispersal"
         holds = f"it holds faces horizontally, by up to {fill.backing_strength / MPa:g} MPa"
     if fill.backing is None:
         return text

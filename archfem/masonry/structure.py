@@ -509,7 +509,7 @@ class Structure(ResultDisplay):
             arm = np.average(heights[above], weights=weights[above]) - level
             up = level - ground
             size = format_mm(up) if up < 1.0 else f"{up:.3g} m"
-            words = f"all above {size}" if up else "all of it"
+            words = f"all above {size} from the base" if up else "all of it"
             pushes[words] = 0.5 * self.width / float(arm)
         if self.heads.any():
             pushes["a strip from bottom to top"] = self.width / float(np.ptp(ends[:, :, 1]))

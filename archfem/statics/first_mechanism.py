@@ -41,9 +41,9 @@ def take_fill_as_loads(
     columns = FillProfile(structure, stones).columns(lever)
     if columns.lean.any():
         raise InvalidInput(
-            "an assessment takes no axles on an elastic fill, on which a vehicle leans: give its "
-            "weight and length without axles, cut the fill into pieces, or push it by `archfem "
-            "limit`"
+            "an assessment takes no axles on an elastic fill, on which a vehicle leans: give each "
+            "axle to the stone below it as a weight of `loads`, times the width of the structure "
+            "over that of the vehicle, cut the fill into pieces, or push it by `archfem limit`"
         )
     loads = []
     for number in np.unique(columns.stone):

@@ -567,7 +567,9 @@ def draw_loads(
         axes.update_datalim([start, tip])
         sizes.append(size)
     if sizes:
-        label = " ".join(["live load:", *filter(None, [factor]), ", ".join(dict.fromkeys(sizes))])
+        named = ", ".join(dict.fromkeys(sizes))
+        named = f"({named})" if factor and "," in named else named
+        label = " ".join(["live load:", *filter(None, [factor]), named])
         axes.plot([], [], color=Colour.LOAD, lw=2.2, marker=">", ms=5, label=label)
     axes.autoscale_view()
 

@@ -218,7 +218,7 @@ def test_a_push_across_the_plane_overturns_all_from_the_ground_on():
     assert stand(2).transverse_push == (pytest.approx(0.25 / middle), "all of it")
     # on low and heavy columns the wall overturns alone
     heavy = stand(0.2, unit_weight=1e6, stands_for="ballast")
-    assert heavy.transverse_push == (pytest.approx(0.25 / 0.5), "all above 200 mm")
+    assert heavy.transverse_push == (pytest.approx(0.25 / 0.5), "all above 200 mm from the base")
     assert "begins to overturn at 0.5 g or less, by the width" in heavy.transverse_remark
     # of a strip of a wall in bond the height counts, of a single stack nothing is known
     column = af.column(breadth=0.5, heights=[2.0, 1.0])

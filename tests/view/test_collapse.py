@@ -366,7 +366,7 @@ def test_a_thrust_line_at_collapse_runs_through_stones_alone(structure, count):
 
 
 @pytest.mark.parametrize(
-    ("forces", "sizes"), [((1e3, 1e3), "1 kN"), ((1e3, 2e3, 3e3), "1 kN, 2 kN, 3 kN")]
+    ("forces", "sizes"), [((1e3, 1e3), "1 kN"), ((1e3, 2e3, 3e3), "(1 kN, 2 kN, 3 kN)")]
 )
 def test_the_legend_has_the_sizes_of_loads(ring, forces, sizes):
     places = np.linspace(-0.26, 0.26, len(forces))

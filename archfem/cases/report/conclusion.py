@@ -395,7 +395,8 @@ def _build_paragraphs(data: ReportData, doubtful: Sequence[str]) -> dict[str, li
     changes += [f"by its finish {name} is {wider}" for name, *_, wider in ranges if wider]
     if single := list_unvaried(data):
         none = ", and displacements have no range" * (bool(data.runs) and not data.verdict_ranges)
-        changes.append(f"{join_words(single)} were not varied{none}")
+        verb = "were" if len(single) > 1 or single[0].endswith("s") else "was"
+        changes.append(f"{join_words(single)} {verb} not varied{none}")
     given = [key for key in ("suite", "motion") if data.case.settings.get(key)]
     if given and not data.runs and not {"scale", "risk"} & data.statements.keys():
         changes.append(f"no motion was run, though [{given[0]}] is in the case")
