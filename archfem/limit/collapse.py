@@ -661,7 +661,7 @@ def describe_crushing(strength: float | None, structure: Structure) -> str:
 
 # by the table of load tests in docs/theory/fill.md
 PLASTIC_EVIDENCE = (
-    "too strong for 4 of 7 bridges under load tests: state the range to law 'pressure'"
+    "too strong for 5 of 8 bridges under load tests: state the range to law 'pressure'"
 )
 
 

@@ -109,7 +109,7 @@ def test_limit_analysis_in_words(ring):
     plastic = {"law": "plastic", "friction_angle": 30, "cohesion": "5 kPa"}
     plastic = parse_limit({"fill": plastic}).fill
     assert describe_fill(plastic, ring).startswith(
-        "fill: a plastic body, friction angle 30°, cohesion 5 kPa, too strong for 4 of 7 bridges"
+        "fill: a plastic body, friction angle 30°, cohesion 5 kPa, too strong for 5 of 8 bridges"
     )
     # the clear springing of a ring is below the ends of its centre line
     clear = min(joint.intrados[1] for joint in ring.joints)
