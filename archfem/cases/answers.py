@@ -20,7 +20,7 @@ from archfem.motion.matching import DEFAULT_BAND
 from archfem.motion.motion import Motion
 from archfem.statics.assessment_checks import AssessmentCheck
 from archfem.statics.mechanism_assessment import KinematicAssessment
-from archfem.units import STANDARD_GRAVITY, Ends, format_ratio
+from archfem.units import STANDARD_GRAVITY, Ends, MPa, format_ratio
 
 # Results by the names of their files
 RESULTS = {
@@ -285,6 +285,11 @@ def list_ratios(found: KinematicAssessment) -> list[tuple[AssessmentCheck, Ratio
     return listed
 
 
+def find_margin(found: Iterable[KinematicAssessment]) -> float:
+    """Return the least ratio of all checks, over what is assumed of a fill too [-]."""
+    return min(ratios.decisive for result in found for _, ratios in list_ratios(result))
+
+
 def describe_margin(found: Iterable[KinematicAssessment]) -> str:
     """Describe the least ratio of all checks, and its range over what is assumed of a fill."""
     listed = [(*each, result.direction) for result in found for each in list_ratios(result)]
@@ -301,6 +306,22 @@ def describe_margin(found: Iterable[KinematicAssessment]) -> str:
     side = f", pushed to the {'right' if sense > 0.0 else 'left'}"
     differs = any(way != sense and x.ratio > 1.001 * check.ratio for x, way in alike)
     return f"least margin {ratios}, by {check.name}{side * differs}: {check.words}"
+
+
+def compare_crushing(case: Case, found: Iterable[KinematicAssessment]) -> list[Remark]:
+    """Return a remark on stones that crush, which an assessment leaves out: a doubt from 2 % on."""
+    if case.limit.strength in (None, np.inf):
+        return []
+    least = min(found, key=lambda result: result.checks[-1].least)
+    loads = case.assessment.options.get("loads", ())
+    share = case.limit.crushing_share(case.structure, least.direction, loads)
+    margin = share * find_margin(found)
+    text = (
+        f"joints hinge about their edges: crushing at {case.limit.strength / MPa:.3g} MPa lowers "
+        f"the push at which the whole begins to move by {100.0 * (1.0 - share):.2g} %, and margins "
+        f"by as much: the least one to {margin:.3g}"
+    )
+    return [f"{NOTE_MARK}{text}" if share > 0.98 else Doubt(text)]
 
 
 def note_band(case: Case, found: Iterable[KinematicAssessment]) -> list[str]:

@@ -240,6 +240,13 @@ class Case:
         """Target spectrum of the suite, or None."""
         return motion_keys.build_target_spectrum(self.suite or {})
 
+    @property
+    def demand(self) -> DesignSpectrum | Motion | None:
+        """Target spectrum of the suite, or else the motion, that an assessment is for, or None."""
+        if self.target is None and self.motion is not None:
+            return self.ground_motion()
+        return self.target
+
     def alone(self, *pairs: str) -> "Case":
         """Return the case with some pairs of its suite alone.
 

@@ -56,10 +56,8 @@ from archfem.masonry.structure import Structure
 from archfem.models.model import Doubt
 from archfem.motion.motion import Motion
 from archfem.motion.suite import Suite
-from archfem.statics.mechanism_assessment import KinematicAssessment
 from archfem.statics.modes import Modes
 from archfem.statics.pushover import Pushover
-from archfem.units import MPa
 from archfem.view.collapse import draw_ratings, draw_worst_places
 from archfem.view.motions import draw_suite
 from archfem.view.style import Files, write_files
@@ -237,18 +235,16 @@ def thickness(options: argparse.Namespace) -> int:
 def assess(options: argparse.Namespace) -> int:
     """Assess the collapse mechanisms of a case against a design spectrum, in both directions."""
     case = Case.read(options.case, options.changes)
-    motion = case.ground_motion() if case.motion is not None else None
-    demand = case.target if case.target is not None else motion
     with result_text.record_doubts(case.structure) as doubts:
         try:
-            found = case.assessment.solve(case.structure, demand, options.parts)
+            found = case.assessment.solve(case.structure, case.demand, options.parts)
         except KeyboardInterrupt as error:
             bound = f"{error.last.sentence}; " if isinstance(error, Interrupted) else ""
             write_progress_line("assessment", f"{bound}nothing is kept")
             raise
     # warnings of the comparison are those of the assessment, or of a sliding that it leaves out
     with keep_warnings():
-        remarks = [*doubts, *_compare_crushing(case, found.values())]
+        remarks = [*doubts, *answers.compare_crushing(case, found.values())]
     remarks += answers.note_band(case, found.values())
     remarks += result_text.note_masses(case.structure, parapets=case.parapets)
     every = [*remarks, *(doubt for result in found.values() for doubt in result.doubts)]
@@ -269,24 +265,6 @@ def assess(options: argparse.Namespace) -> int:
 
     write_results("assess", case, options.out, f"{case.title}\n{text}", draw)
     return doubt_code(every)
-
-
-def _compare_crushing(case: Case, found: Iterable[KinematicAssessment]) -> list[result_text.Remark]:
-    """Return a remark on stones that crush, which an assessment leaves out: a doubt from 2 % on."""
-    if case.limit.strength in (None, np.inf):
-        return []
-    least = min(found, key=lambda result: result.checks[-1].least)
-    loads = case.assessment.options.get("loads", ())
-    share = case.limit.crushing_share(case.structure, least.direction, loads)
-    margin = share * min(
-        each.decisive for result in found for _, each in answers.list_ratios(result)
-    )
-    text = (
-        f"joints hinge about their edges: crushing at {case.limit.strength / MPa:.3g} MPa lowers "
-        f"the push at which the whole begins to move by {100.0 * (1.0 - share):.2g} %, and margins "
-        f"by as much: the least one to {margin:.3g}"
-    )
-    return [f"{NOTE_MARK}{text}" if share > 0.98 else Doubt(text)]
 
 
 @keep_attempt("rating")

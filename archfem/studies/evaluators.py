@@ -12,6 +12,7 @@ import xarray as xr
 
 from archfem._validation import validate_arguments
 from archfem.cases.analysis_keys import rate_case
+from archfem.cases.answers import compare_crushing, find_margin
 from archfem.cases.case import Case
 from archfem.cases.provenance import hash_inputs, remove_presentation
 from archfem.cases.result_text import STATED_DOUBTS, doubt_rating, record_doubts, site_acceleration
@@ -28,7 +29,7 @@ from archfem.dynamics.motion_scaling import mechanism_scales
 from archfem.dynamics.schemes import EffectiveDamping, Viscous
 from archfem.dynamics.time_history import time_history
 from archfem.dynamics.verdict import ALL_DEFINITIONS, MECHANISM_DEFINITIONS
-from archfem.errors import DidNotConverge, InvalidInput
+from archfem.errors import DidNotConverge, InvalidInput, keep_warnings
 from archfem.joints.criteria import (
     assessed_joints,
     describe_assessed_joints,
@@ -218,6 +219,20 @@ def evaluate_limit(case: Case) -> Findings:
     return findings | _state_doubts(doubts)
 
 
+def evaluate_assessment(case: Case) -> Findings:
+    """Return the least margin of a kinematic assessment and its least α₀, over both senses.
+
+    It is over the states of the fill too, and below 1 where the demand is not withstood.
+    """
+    with record_doubts(case.structure) as doubts:
+        found = case.assessment.solve(case.structure, case.demand).values()
+    with keep_warnings():  # which are those of the assessment
+        doubts += [each for each in compare_crushing(case, found) if isinstance(each, Doubt)]
+    doubts += [doubt for each in found for doubt in each.doubts]
+    least = min(float(each.alpha_0) for each in found)
+    return {"least_margin": find_margin(found), "alpha_0": least} | _state_doubts(doubts)
+
+
 def evaluate_rating(case: Case) -> Findings:
     """Return the factor of a case in each state of its fill, and the place of the vehicle."""
     with record_doubts(case.structure) as doubts:
@@ -291,6 +306,7 @@ NAMED_EVALUATORS: Mapping[str, Callable[..., Findings]] = {
     "scales": evaluate_scales,
     "dead load": evaluate_dead_load,
     "limit": evaluate_limit,
+    "assessment": evaluate_assessment,
     "rating": evaluate_rating,
     "comparison": evaluate_comparison,
 }

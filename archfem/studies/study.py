@@ -66,9 +66,9 @@ class Study:
             distribution of SciPy; or a list of such tables, one for each point. A path is that of a
             key in a case file, "motion.scale"; a keyword of `archfem.Analysis` stands for itself,
             "dt" for "analysis.dt". "suite.pair" varies the pair of the suite.
-        compute: "history", "scales", "dead load", "limit" or "rating"; a function of a case that
-            returns a flat table of numbers and texts; or a table of `name` and options. By default
-            "history", or "dead load" without a motion.
+        compute: "history", "scales", "dead load", "limit", "assessment" or "rating"; a function of
+            a case that returns a flat table of numbers and texts; or a table of `name` and options.
+            By default "history", or "dead load" without a motion.
         motion: motion of an analysis, or in place of that of a case.
         samples: settings of the sampling, { "count": 64, "method": "sobol", "seed": 1 }.
         title: title; by default that of the case.
@@ -428,7 +428,7 @@ def _parse_evaluator(settings: Mapping[str, Any], own_code: bool) -> Evaluator:
             "scales is the search of a comparison: take it out, or compute = { name = 'scales', "
             "precision = 0.1, between = [0.2, 2.0] }"
         )
-    if "pairs" in settings and asked.name in ("dead load", "limit", "rating"):
+    if "pairs" in settings and asked.name in ("dead load", "limit", "assessment", "rating"):
         raise InvalidInput(f"pairs are motions, and compute = {find!r} needs none: take pairs out")
     return asked
 

@@ -573,7 +573,8 @@ def test_limit_analysis_needs_no_pairs(small, tmp_path):
     text = (
         'case = "small.toml"\nset = ["limit.horizontal=1.0"]\nvary.structure.breadth = [1.0, 2.0]\n'
     )
-    for compute, points in (("limit", 2), ("rating", 2), ("dead load", 2), ("history", 4)):
+    alone = ("limit", "rating", "assessment", "dead load")
+    for compute, points in (*((each, 2) for each in alone), ("history", 4)):
         path.write_text(f'{text}compute = "{compute}"\n')
         assert len(af.Study.read(path).points) == points
 
@@ -585,6 +586,33 @@ def test_a_study_of_ratings_has_the_factors_of_rate(small):
     for dead, factor in zip((1.0, 2.0), table["factor"].values, strict=True):
         vehicle = af.limit.Vehicle("axle", (10e3,), live=1.5, impact=1.2)
         assert factor == af.rate(case.structure, vehicle, dead=dead).factor
+
+
+def test_a_study_of_assessments_has_the_least_margin_of_assess(tmp_path, capsys):
+    """What a tie gains is a study; a stone that crushes is in doubt, as by the command."""
+    column = '[structure]\nshape = "column"\nbreadth = 0.6\nheights = [2.0, 1.0]\nwidth = 1.0\n'
+    code = '{ code = "NTC-2018", ag = 0.2, f0 = 2.4, tc_star = 0.3, site = "B" }'
+    text = f'{column}[assessment]\nspectrum = {code}\n[materials.stone]\nstrength = "1 MPa"\n'
+    (tmp_path / "column.toml").write_text(text)
+    tie = '{ block = 1, point = [0.0, 1.9], force = ["10 kN", "0 kN"], passive = true }'
+    given = {"bare": [], "tied": [f"assessment.loads=[{tie}]"]}
+    cases = "\n".join(f"{name} = {{ set = {changes} }}" for name, changes in given.items())
+    (tmp_path / "study.toml").write_text(
+        f'case = "column.toml"\ncompute = "assessment"\n[cases]\n{cases}\n'
+    )
+    table = af.Study.read(tmp_path / "study.toml").run(workers=1)
+    for name, changes in given.items():
+        file = str(tmp_path / "column.toml")
+        sets = [word for each in changes for word in ("--set", each)]
+        assert af.commands.main(["assess", file, *sets]) == 3
+        said = capsys.readouterr().out
+        margin = float(re.search(r"least margin ([\d.]+)", said)[1])
+        found = table.sel(case=name)
+        assert found["least_margin"].item() == pytest.approx(margin, rel=5e-3)
+        assert found["doubts"].item() == said.count("in doubt: ")
+    bare, tied = table["alpha_0"].values
+    assert bare == pytest.approx(0.6 / 3.0, rel=1e-9)  # breadth over height
+    assert tied == pytest.approx(bare)  # the tie pulls to the right, and holds one sense alone
 
 
 def test_a_study_of_ratings_states_those_without_backing(monkeypatch):

@@ -24,7 +24,7 @@ from archfem.view.pages.document import Grid
 # those of a push are shown in g
 OVER_SITE = "over the site's acceleration"
 _FACTORS = (
-    *("least_push", "push", OVER_SITE),
+    *("least_margin", "least_push", "push", OVER_SITE),
     *("factor", "without_pressure", "without_backing", "without_either"),
 )
 _SIZES = ("largest_displacement", "residual_displacement")
