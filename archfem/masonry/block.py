@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from math import hypot
+from math import hypot, sqrt
 from typing import Any
 
 import numpy as np
@@ -86,17 +86,17 @@ def intersect_edges(points: Array, x: float, arcs: Sequence[int] = ()) -> list[f
 
 def intersect_arc(ends: Array, centre: Array, x: float) -> list[float]:
     """Return the heights where a vertical line intersects an arc below half a circle."""
-    start, end = ends - centre
-    square = float(start @ start)
-    sense = np.sign(start[0] * end[1] - start[1] * end[0])
-    rise = np.sqrt(max(square - (x - centre[0]) ** 2, 0.0))
+    (c_x, c_y), ((s_x, s_y), (e_x, e_y)) = centre.tolist(), (ends - centre).tolist()
+    square, arm = s_x * s_x + s_y * s_y, x - c_x  # floats, as for edges
     near = 1e-12 * square
+    if arm**2 > square + near:
+        return []
+    turn = s_x * e_y - s_y * e_x
+    sense, rise = (turn > 0.0) - (turn < 0.0), sqrt(max(square - arm**2, 0.0))
     heights = []
     for y in (rise, -rise):
-        after = sense * (start[0] * y - start[1] * (x - centre[0]))
-        before = sense * ((x - centre[0]) * end[1] - y * end[0])
-        if min(after, before) >= -near and (x - centre[0]) ** 2 <= square + near:
-            heights.append(float(centre[1] + y))
+        if min(sense * (s_x * y - s_y * arm), sense * (arm * e_y - y * e_x)) >= -near:
+            heights.append(c_y + y)
     return heights
 
 
