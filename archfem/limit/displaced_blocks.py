@@ -345,7 +345,10 @@ class Bodies:
                 fill.forces, turned + blocks.centroids[fill.block], strict=True
             )
         )
-        return least, sparse.vstack([fill.shared.T @ further, self.tie_forces], format="csr")
+        further = (fill.shared.T @ further).tocsr()
+        if blocks.ties:  # a stack of matrices takes longer than all before
+            further = sparse.vstack([further, self.tie_forces], format="csr")
+        return least, further
 
     def dead_forces(self, velocity: Array | None = None) -> Array:
         """Return the generalised forces that do not grow (3 n_bodies,).

@@ -515,17 +515,18 @@ class PathFollower:
         step = 1e-3 * size
         while self.travel <= size:
             trial = state.advanced(velocity, step)
-            ahead = None if trial is None else trial[0].balance(trial[1], self.friction)[0]
+            forces = None if trial is None else trial[0].balance(trial[1], self.friction)
+            ahead = None if forces is None else forces[0]
             # a factor that changes by less than 4 % a step keeps the curve smooth
             if ahead is None or abs(ahead - factor) > 0.04 * max(abs(self.factors[0]), 1e-3):
                 step *= 0.5
                 if step > 1e-9 * size:
                     continue
-            if trial is None or ahead is None:
+            if trial is None or forces is None:
                 raise _Stop(PathEnd.LOCKS)
-            if self._event(*trial, step):
+            if self._event(*trial, step, forces):
                 return self._finish(state, velocity, step)
-            (state, velocity), factor = trial, ahead
+            (state, velocity), factor = trial, forces[0]
             self.travel += step
             self._record(state.blocks, factor)
             step = min(1.5 * step, 0.01 * size)
@@ -554,9 +555,15 @@ class PathFollower:
             raise _Stop(event)
         return blocks
 
-    def _event(self, state: LinkageState, velocity: Array, step: float) -> str:
+    def _event(
+        self,
+        state: LinkageState,
+        velocity: Array,
+        step: float,
+        balance: tuple[float, Array] | None = None,
+    ) -> str:
         """Return the event that has happened at a state, or an empty text."""
-        factor, normal_forces = state.balance(velocity, self.friction)
+        factor, normal_forces = balance or state.balance(velocity, self.friction)
         if factor <= 0.0:
             return PathEnd.FALLS
         blocks, near = state.blocks, TOUCHING * self.blocks.structure.size
