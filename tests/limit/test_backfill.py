@@ -1,6 +1,7 @@
 """Fill in limit analysis: strength, columns and fans of load, self-weight programme."""
 
 from dataclasses import replace
+from itertools import product
 from types import SimpleNamespace
 
 import numpy as np
@@ -17,6 +18,7 @@ from backfilled import (
     slender_bridge,
     two_walls,
 )
+from repeats import each_once
 from scipy.integrate import quad
 from scipy.optimize import linprog
 from shapely import LineString, Point, Polygon
@@ -398,11 +400,15 @@ def push_by_levels(structure, fill, sense=1.0):
     return -linprog(cost, A_eq=matrix, b_eq=-dead, bounds=[*bounds, (0.0, None)]).fun
 
 
-def test_backing_holds_faces_up_to_its_level_as_in_an_independent_programme():
+@pytest.mark.parametrize(
+    "levels",
+    [np.arange(0.7, 0.78, 0.02), pytest.param(np.arange(0.5, 1.0, 0.02), marks=pytest.mark.slow)],
+    ids=["few", "all"],
+)
+def test_backing_holds_faces_up_to_its_level_as_in_an_independent_programme(levels):
     """It holds less than fixed stones would, and no small step of the level adds much."""
     structure, load = arch_bridge(), af.BodyForce(1.0, 0.0)
     fill = Fill(friction_angle=35.0, mobilisation=0.0, active=0.0)
-    levels = [*np.arange(0.5, 1.0, 0.02)]
     found = [
         af.collapse_factor(
             structure, live=load, friction=None, fill=replace(fill, backing=level)
@@ -416,16 +422,25 @@ def test_backing_holds_faces_up_to_its_level_as_in_an_independent_programme():
         assert push_by_levels(structure, backed) == pytest.approx(factor, rel=5e-3)
 
 
-@pytest.mark.parametrize("sense", [1.0, -1.0])
-@pytest.mark.parametrize("backing", [None, 0.7])
 @pytest.mark.parametrize(
-    "rings",
+    ("rings", "backing", "sense"),
     [
-        {"left": (8.4, 2.1), "right": (8.4, 2.2)},
-        {"left": (8.4, 2.1), "right": (6.0, 1.2)},
-        {"left": (8.4, 2.1), "low": (5.0, 1.0), "right": (8.4, 2.3)},
+        *each_once(
+            [
+                {"left": (8.4, 2.1), "right": (8.4, 2.2)},
+                {"left": (8.4, 2.1), "right": (6.0, 1.2)},
+            ],
+            [0.7, None],
+            [1.0, -1.0],
+        ),
+        *(
+            pytest.param(
+                *({"left": (8.4, 2.1), "low": (5.0, 1.0), "right": (8.4, 2.3)}, backing, sense),
+                marks=pytest.mark.slow,
+            )
+            for backing, sense in product((0.7, None), (1.0, -1.0))
+        ),
     ],
-    ids=len,
 )
 def test_fill_between_rings_as_in_an_independent_programme(rings, sense, backing):
     """Also where one ring is higher, and two are above the crown of the one between.

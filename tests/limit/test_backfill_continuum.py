@@ -71,6 +71,7 @@ def test_a_wedge_of_triangles_resists_a_wall_as_rankine_has_it():
     assert af.collapse_factor(wall, live=PUSH, fill=fill).factor == pytest.approx(bound, rel=EXACT)
 
 
+@pytest.mark.slow
 def test_an_arch_under_a_footing_is_below_the_upper_bound():
     """The bound has all passive pressure, shear in the fill, and a footing to spread the load."""
     structure, layers, x = arch_bridge(), 3, 3.25

@@ -209,6 +209,7 @@ def test_a_corner_of_a_bonded_wall_turns_away_from_the_stones_it_slides_on():
     assert path.end is PathEnd.FALLS
 
 
+@pytest.mark.slow
 def test_a_mechanism_with_three_hinges_on_a_line_locks_below_the_bound():
     """Three bodies with hinges A, B and C on a line turn by unequal angles only to first order.
 
@@ -413,6 +414,7 @@ def test_the_work_of_a_point_load_is_the_rise_of_the_weights():
     assert len(work) > 10
 
 
+@pytest.mark.slow
 def test_the_curve_of_a_dry_granite_wall_under_a_press(verified):
     """Wall WS.100 of Vasconcelos and Lourenço, pushed to a drift of 3 % of 1.325 m.
 

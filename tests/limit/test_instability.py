@@ -203,7 +203,12 @@ def bridge_with_ends(above, arch, cover):
 
 
 @pytest.mark.parametrize(
-    ("above", "named"), [((0.1, 0.1), True), ((0.9, 0.1), True), ((0.9, 0.9), False)]
+    ("above", "named"),
+    [
+        pytest.param((0.1, 0.1), True, marks=pytest.mark.slow),
+        ((0.9, 0.1), True),
+        ((0.9, 0.9), False),
+    ],
 )
 def test_fill_that_falls_out_of_a_free_end_is_held_by_higher_walls(above, named):
     """The end that is named is one with a low wall, and the remedy is one."""
@@ -218,7 +223,9 @@ def test_fill_that_falls_out_of_a_free_end_is_held_by_higher_walls(above, named)
     assert "thickness" not in text
 
 
-@pytest.mark.parametrize("above", [(0.1, 1.3), (1.3, 0.1), (1.3, 1.3)])
+@pytest.mark.parametrize(
+    "above", [(0.1, 1.3), pytest.param((1.3, 0.1), marks=pytest.mark.slow), (1.3, 1.3)]
+)
 def test_fill_that_opens_and_falls_out_of_a_free_end_is_named_by_the_dead_load(above):
     """Rigid, it stands by cohesion that joints lose as they open; higher walls let it rest."""
     arch = af.shapes.Arch(span=4.0, rise=1.2, thickness=0.35, voussoirs=9)

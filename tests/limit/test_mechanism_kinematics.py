@@ -219,7 +219,8 @@ def bonded_wall():
         (piers(chords=1), 40, 0.04),
         (filled(), 50, 0.04),
         pytest.param(beside("side wall"), 40, 0.04, marks=pytest.mark.slow),
-        (bonded_wall(), 60, 0.34),  # its stones seldom move where none of their joints comes apart
+        # its stones seldom move where none of their joints comes apart
+        pytest.param(bonded_wall(), 60, 0.34, marks=pytest.mark.slow),
     ],
     ids=["piers", "fill", "side wall", "bonded wall"],
 )

@@ -227,6 +227,7 @@ def least_toe_wedge(structure, height=HEIGHT):
 ROUGH_WALL = [FOUR, FOUR_CUT] * 4
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("few_starts")
 @pytest.mark.parametrize(
     "friction", [1.0, *(pytest.param(mu, marks=pytest.mark.slow) for mu in (0.8, 1.2))]
@@ -245,6 +246,7 @@ def test_a_rough_wall_fails_by_a_wedge_above_a_stepped_crack(friction):
     assert f"at ≤ {found.factor:.4g} g, pushed to the right (least found)" in found.sentence
 
 
+@pytest.mark.slow
 def test_a_wedge_that_is_lost_is_doubted(monkeypatch, caplog):
     """Without starts from its neighbour the search finds sliding of the whole, at μ."""
     monkeypatch.setattr(nonassociated, "MAX_START_COUNT", 1)
@@ -260,9 +262,10 @@ def test_a_wedge_that_is_lost_is_doubted(monkeypatch, caplog):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("courses", "found_from", "times"),
-    [(6, 40, 2.6), pytest.param(16, 25, 4, marks=pytest.mark.slow)],
+    [(6, 40, 2.6), (16, 25, 4)],
 )
 def test_strength_that_hardly_matters_takes_few_programmes_more(
     courses, found_from, times, monkeypatch, capfd
@@ -313,6 +316,7 @@ DOOR_WALL = [*[DOOR, DOOR_CUT] * 3, [0.5, 0.5, 2.5, 0.5, 0.5], [0.75, 1.0, 1.0, 
 """Bond of a symmetric wall with a door and a lintel."""
 
 
+@pytest.mark.slow
 def test_a_symmetric_wall_is_as_strong_to_both_sides():
     """The other sense is the mirror image: forces of mirrored joints are the same."""
     structure = wall(DOOR_WALL, 0.7)
@@ -352,6 +356,7 @@ def test_a_symmetric_structure_is_searched_once_for_both_senses(monkeypatch):
             check(structure, live, found)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("few_starts")
 def test_from_the_weakest_of_the_starts_the_search_goes_down(monkeypatch, caplog):
     """A wedge of this wall that does not slide is found from no start with much friction.
@@ -587,7 +592,8 @@ def optimum_with_shear(structure, found):
 GATEWAY = Path(__file__).parent / "gateway.geojson"
 
 
-@pytest.mark.parametrize("push", [1.0, pytest.param(-1.0, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("push", [1.0, -1.0])
 def test_states_of_a_surveyed_gateway_are_found(push):
     """A preference for weak states held gaps of 1e-7 open, behind which a state is."""
     structure = af.masonry.surveyed(GATEWAY, snap=6e-3, width=0.6)
@@ -601,7 +607,7 @@ def test_states_of_a_surveyed_gateway_are_found(push):
 
 
 @pytest.mark.usefixtures("few_starts")
-@pytest.mark.parametrize("solved", [0, 3, None])
+@pytest.mark.parametrize("solved", [pytest.param(0, marks=pytest.mark.slow), 3, None])
 def test_an_interrupted_search_leaves_the_least_factor_so_far(monkeypatch, caplog, solved):
     """Each solution is an upper bound; without any it is the factor with dilatancy."""
     structure, find, made = wall(HALVES, 0.5), nonassociated.find_solution, []

@@ -43,7 +43,7 @@ def footing():
     ("angle", "exact", "gap"),
     [
         (0.0, 2.0 + np.pi, 0.25),
-        (30.0, 30.1396, 0.45),
+        pytest.param(30.0, 30.1396, 0.45, marks=pytest.mark.slow),
         pytest.param(30.0, 30.1396, 0.2, marks=pytest.mark.slow),
     ],
 )
@@ -81,6 +81,7 @@ def test_a_smooth_wall_has_the_passive_pressure_of_rankine(cohesion):
 FILL = PlasticFill(friction_angle=30.0, cohesion=5e3, gap=0.08)
 
 
+@pytest.mark.slow
 def test_the_mirror_image_of_a_load_has_bounds_that_agree():
     """Meshes are no mirror images, so that each bound bounds the other load too."""
     found = [
@@ -177,6 +178,7 @@ def test_an_interrupted_search_leaves_bounds_once_each_load_has_some(caplog):
         bound_least_factor({"load": interrupted(coarse), "other": interrupted()})
 
 
+@pytest.mark.slow
 def test_a_stronger_fill_carries_more():
     """The lower bound of the stronger one is above the upper one of the weaker."""
     load = af.PointLoad(x=3.3, force=(0.0, -1e3))

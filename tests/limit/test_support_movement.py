@@ -253,7 +253,11 @@ def centroid_along(start, end):
 
 
 @pytest.mark.parametrize(
-    ("friction", "slides"), [(0.05, ("left base to left", "right base to right")), (0.1, None)]
+    ("friction", "slides"),
+    [
+        (0.05, ("left base to left", "right base to right")),
+        pytest.param(0.1, None, marks=pytest.mark.slow),
+    ],
 )
 def test_leaning_stones_that_part_slide_where_their_thrust_is_beyond_friction(
     friction, slides, caplog

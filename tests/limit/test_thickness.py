@@ -71,7 +71,7 @@ def test_the_greatest_that_can_be_built_may_be_the_only_one_that_stands():
     assert minimum_thickness(bounded, tolerance=1e-4) == pytest.approx(free, rel=2e-4)
 
 
-@pytest.mark.parametrize("share", [0.5, 1.0, 1.4])
+@pytest.mark.parametrize("share", [0.5, pytest.param(1.0, marks=pytest.mark.slow), 1.4])
 def test_a_thickness_too_thin_to_build_does_not_stand(share):
     """The least that can be built stands where it is thicker than the least that stands."""
     free = minimum_thickness(lambda t: ring(thickness=t), tolerance=1e-4)
@@ -98,7 +98,10 @@ def test_a_least_thickness_far_below_the_greatest_that_can_be_built_is_found():
     assert not af.stands(build(0.99 * least), friction=None)
 
 
-@pytest.mark.parametrize(("voussoirs", "expected"), [(8, 5.2052e-4), (16, 1.38943e-4)])
+@pytest.mark.parametrize(
+    ("voussoirs", "expected"),
+    [(8, 5.2052e-4), pytest.param(16, 1.38943e-4, marks=pytest.mark.slow)],
+)
 def test_the_least_thickness_of_a_catenary_is_found(voussoirs, expected):
     """A half span of 3 m and a rise of 4 m: the thrust line leaves it by the stones' size alone."""
     parameter = brentq(lambda a: a * (np.cosh(3.0 / a) - 1.0) - 4.0, 0.1, 100.0)
