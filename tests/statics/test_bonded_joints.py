@@ -53,7 +53,7 @@ def test_a_bond_carries_pure_tension_up_to_its_strength(fidelity, rule):
         under(model, 0.0, 1.001 * most)
 
 
-@pytest.mark.parametrize("rule", ["lobatto", "exact"])
+@pytest.mark.parametrize("rule", ["lobatto", pytest.param("exact", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("fidelity", ["rigid", pytest.param("faces", marks=pytest.mark.slow)])
 def test_a_bonded_bed_breaks_where_its_edge_reaches_the_strength(fidelity, rule):
     """Weight and a push at mid-height: -W / A + 6 M / (w b²) = f_t, with M = H h / 2.

@@ -196,9 +196,9 @@ def test_stages_that_build_nothing_are_refused(column, stages, words):
         af.dead_load(model, stages=stages)
 
 
-def test_a_stage_that_cannot_stand_is_named(bridge):
+def test_a_stage_that_cannot_stand_is_named():
     """Fill without its walls' weight, placed as one ring without centring, falls at once."""
-    ring = af.circular_arch(radius=1.0, thickness=0.08, embrace=180.0, voussoirs=5, chords=1)
+    ring = af.circular_arch(radius=1.0, thickness=0.08, embrace=180.0, voussoirs=4, chords=1)
     with pytest.raises(af.DidNotConverge, match="'centring struck'"):
         af.dead_load(af.build(ring, fidelity="rigid"), stages=usual_stages(ring))
 

@@ -298,14 +298,39 @@ def test_a_fixed_course_on_one_that_moves_is_a_doubt(tmp_path, capsys):
     ("moved", "name", "why"),
     [
         ({"WEST 1": "SLAB"}, "SLAB 1", "mm broad) is fixed, as is 'SLAB 2' beside it, and carries"),
-        ({"WEST 1": "SLAB", "WEST 2": "SLAB"}, "SLAB 2", "as is 'SLAB 1' beside it, and carries"),
-        (dict.fromkeys(["WEST 1", "WEST 2", "WEST 3"], "SLAB"), "SLAB 3", "carries 'arch': by its"),
+        pytest.param(
+            {"WEST 1": "SLAB", "WEST 2": "SLAB"},
+            "SLAB 2",
+            "as is 'SLAB 1' beside it, and carries",
+            marks=pytest.mark.slow,
+        ),
+        pytest.param(
+            dict.fromkeys(["WEST 1", "WEST 2", "WEST 3"], "SLAB"),
+            "SLAB 3",
+            "carries 'arch': by its",
+            marks=pytest.mark.slow,
+        ),
         ({"WEST 1": "RING"}, "RING 1", "of 'arch', apart from most others of it: it may be one of"),
-        ({"WEST 2": "RING"}, "RING 1", "from most others of it: it may be one of 'west pier'"),
+        pytest.param(
+            {"WEST 2": "RING"},
+            "RING 1",
+            "from most others of it: it may be one of 'west pier'",
+            marks=pytest.mark.slow,
+        ),
         ({"WEST 3": "RING"}, "RING 1", "mm broad as 'WEST 2' below, where its joints are 299 mm"),
-        ({"WEST 2": "EAST"}, "EAST 1", "of 'east pier', apart from most others of it: it may be o"),
+        pytest.param(
+            {"WEST 2": "EAST"},
+            "EAST 1",
+            "of 'east pier', apart from most others of it: it may be o",
+            marks=pytest.mark.slow,
+        ),
         ({"RING 4": "EAST"}, "EAST 1", "apart from most others of it: it may be one of 'arch'"),
-        ({"RING 11": "WEST"}, "WEST 4", "of it: it may be one of 'arch' or 'east pier'"),
+        pytest.param(
+            {"RING 11": "WEST"},
+            "WEST 4",
+            "of it: it may be one of 'arch' or 'east pier'",
+            marks=pytest.mark.slow,
+        ),
     ],
 )
 def test_a_stone_on_a_wrong_layer_of_a_drawing_is_a_doubt(tmp_path, moved, name, why, capsys):
@@ -350,13 +375,37 @@ def draw_on_footings(folder, moved=()):
     [
         ({}, []),
         ({"WEST 1": "SLAB"}, ["'SLAB 1' .* cannot move, but lies on 'FOOT 1'"]),
-        ({"WEST 1": "SLAB", "EAST 3": "SLAB"}, ["'SLAB 1' .* on 'FOOT 1'", "'SLAB 2' .*'FOOT 2'"]),
+        pytest.param(
+            {"WEST 1": "SLAB", "EAST 3": "SLAB"},
+            ["'SLAB 1' .* on 'FOOT 1'", "'SLAB 2' .*'FOOT 2'"],
+            marks=pytest.mark.slow,
+        ),
         ({"WEST 1": "FOOT"}, ["'FOOT 1' .* as broad as 'west pier' on it, where others of it pro"]),
-        ({"EAST 3": "FOOT"}, ["'FOOT 1' .* as broad as 'east pier' on it, .* of 'east pier'"]),
-        ({"RING 1": "WEST"}, ["'WEST 4' .* joint is as deep as those of 'arch': .* of 'arch'"]),
-        ({"RING 1": "WEST", "RING 2": "WEST"}, ["'WEST 4' .*: .* of 'arch'", "'WEST 5' .* 'arch'"]),
-        ({"RING 11": "FOOT"}, ["'FOOT 1' .* between 'arch' and 'east pier' by joints as deep as"]),
-        ({"RING 5": "FOOT"}, ["'FOOT 1' .* between 'arch' by joints as deep as those of 'arch'"]),
+        pytest.param(
+            {"EAST 3": "FOOT"},
+            ["'FOOT 1' .* as broad as 'east pier' on it, .* of 'east pier'"],
+            marks=pytest.mark.slow,
+        ),
+        pytest.param(
+            {"RING 1": "WEST"},
+            ["'WEST 4' .* joint is as deep as those of 'arch': .* of 'arch'"],
+            marks=pytest.mark.slow,
+        ),
+        pytest.param(
+            {"RING 1": "WEST", "RING 2": "WEST"},
+            ["'WEST 4' .*: .* of 'arch'", "'WEST 5' .* 'arch'"],
+            marks=pytest.mark.slow,
+        ),
+        pytest.param(
+            {"RING 11": "FOOT"},
+            ["'FOOT 1' .* between 'arch' and 'east pier' by joints as deep as"],
+            marks=pytest.mark.slow,
+        ),
+        pytest.param(
+            {"RING 5": "FOOT"},
+            ["'FOOT 1' .* between 'arch' by joints as deep as those of 'arch'"],
+            marks=pytest.mark.slow,
+        ),
     ],
 )
 def test_a_stone_on_a_wrong_layer_above_footings_that_move_is_a_doubt(tmp_path, moved, whys):
@@ -475,8 +524,16 @@ CASES = [*ROOT.glob("meshes/*.toml"), *ROOT.glob("archfem/cases/new/*.toml")]
 
 @pytest.mark.parametrize(
     "path",
-    [path for path in CASES if not re.search(r"^\[?case", path.read_text(), re.MULTILINE)],
-    ids=lambda path: path.stem,
+    [
+        # these differ from "prusias" in piers, fill or motion
+        pytest.param(
+            *(path,),
+            marks=pytest.mark.slow if path.stem.startswith("prusias_") else (),
+            id=path.stem,
+        )
+        for path in CASES
+        if not re.search(r"^\[?case", path.read_text(), re.MULTILINE)
+    ],
 )
 def test_supports_of_shipped_cases_are_none(path):
     assert structure_doubts(af.Case.read(path).structure) == []
@@ -523,7 +580,8 @@ def test_the_check_command_prints_doubts(embrace, code, tmp_path, capsys):
     assert ("toml: ready" in said) != bool(code)
 
 
-def test_commands_name_fixed_blocks_and_doubt_those_within_a_ring(tmp_path, capsys):
+def test_commands_name_fixed_blocks_and_doubt_those_within_a_ring(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("archfem.limit.rating._places_along", lambda *_: (1.4,))
     path, ring = tmp_path / "ring.toml", with_fixed(resting().model.structure, 5)
     af.Analysis(ring, fidelity="rigid").write(path)
     assert af.commands.main(["check", str(path)]) == 3
@@ -595,6 +653,7 @@ def test_pieces_as_large_as_the_fill_is_deep_lock_the_ring_and_words_say_by_how_
     assert structure_doubts(coarse) == []
 
 
+@pytest.mark.slow
 def test_every_answer_of_a_bridge_has_the_doubt_of_its_fill(tmp_path, capsys):
     """Check, limit analysis, a run, and the range of its verdict; and no answer with sidewalls."""
     path = tmp_path / "bridge.toml"
@@ -624,6 +683,7 @@ def thin_ring(stiffness, unit_weight=20e3):
     return af.build(ring, fidelity="rigid", displacements="large")
 
 
+@pytest.mark.slow
 def test_an_error_of_large_displacements_states_the_stiffness_that_is_needed(verified):
     """By a path along which the weight grows past its peak, whose steps resolve it to 0.05 %."""
     light = 0.02  # of the weight that is there at the start of the path

@@ -66,6 +66,7 @@ def flat(structure):
     return af.collapse_factor(structure, live=SIDEWAYS, friction="nonassociated").factor
 
 
+@pytest.mark.slow
 def test_dry_fill_reaches_the_limit_of_joints_that_slide_flat(verified):
     """With dilatancy no factor is too large: pieces that wedge between fixed walls lock."""
     fill = boxed(2.0, 1.5)
@@ -343,7 +344,8 @@ def test_a_step_after_a_relaxed_one_is_relaxed_first(monkeypatch):
     assert ways[:4] == ["step", "creep", "creep", "creep"]
 
 
-@pytest.mark.parametrize("friction", [pytest.param(0.3, marks=pytest.mark.slow), 0.4])
+@pytest.mark.slow
+@pytest.mark.parametrize("friction", [0.3, 0.4])
 def test_a_wall_that_slides_ends_at_what_limit_analysis_proves(friction):
     """All of its beds slide at μ: no equilibrium is above."""
     wall = bonded_wall(courses=6, friction=friction)

@@ -118,6 +118,7 @@ def test_a_wedge_slides_out_of_its_groove(friction, control):
     assert limit.factor == pytest.approx(expected, rel=1e-7)
 
 
+@pytest.mark.slow
 def test_limit_analysis_may_pinch_a_wedge_that_has_never_been_pressed():
     """Narrower above than below, its faces at 10°, it falls, unless it had been driven in before.
 
