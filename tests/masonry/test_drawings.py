@@ -231,7 +231,7 @@ ARCH = {
 }
 
 
-@pytest.mark.parametrize("mirrored", [False, True])
+@pytest.mark.parametrize("mirrored", [pytest.param(False, marks=pytest.mark.slow), True])
 def test_arcs_of_polylines_are_read_to_half_of_snap(tmp_path, mirrored, verified):
     """A ring drawn with bulges bears as the ring of exact arcs does, and weighs the same."""
     path = bulged_arch(tmp_path / "arcs.dxf", mirrored=mirrored)
@@ -501,7 +501,7 @@ def test_the_unit_of_a_drawing_is_judged_before_its_open_ends(tmp_path):
     ]
 
 
-@pytest.mark.parametrize("kind", ["dxf", "geojson"])
+@pytest.mark.parametrize("kind", [pytest.param("dxf", marks=pytest.mark.slow), "geojson"])
 def test_check_says_how_a_drawing_was_read(tmp_path, capsys, kind):
     """Unit, the corner that snap moved by 3 mm, one outline that is ignored, least depth."""
     stones = {"ROCK": square(0, -1000, 1000), "WALL": square(0, 3, 1000), "NOTE": square(0, 9, 800)}

@@ -204,6 +204,7 @@ def test_of_a_vehicle_on_given_fill_no_pieces_lock_whether_it_is_cut_or_not(capl
     bridge = arch_bridge()
     pieces = jointed_fill(bridge, 1.0, friction_angle=30.0, cohesion=5e3)
     given = {"fill": af.limit.Fill(friction_angle=30.0), "strength": 5e6}
+    given["positions"] = [-0.7, 2.5, 3.5, 4.5]
     factors = [
         af.limit.moving_load(each, [50e3, 50e3], spacings=[1.5], **given).factors["factor"].values
         for each in (bridge, pieces)

@@ -42,6 +42,7 @@ def read(path, **options):
     return af.masonry.surveyed(path, layers=layers, **options)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("depth", [0.2, 0.3])
 def test_a_drawn_semicircle_needs_what_milankovitch_found(tmp_path, depth):
     drawn = read(draw_semicircle(tmp_path / "arch.dxf", depth=depth))

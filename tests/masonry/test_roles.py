@@ -102,6 +102,7 @@ def test_the_verdict_does_not_depend_on_names(names, warnings):
     assert warnings() == []
 
 
+@pytest.mark.slow
 def test_a_run_meets_the_same_mechanism_whatever_its_parts_are_called(warnings):
     """A run without known vaults meets another one, with warnings."""
     motion = af.Motion(5.0 * np.sin(4.0 * np.pi * np.arange(0.0, 0.8, 0.005)), 0.005)

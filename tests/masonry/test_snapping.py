@@ -178,9 +178,9 @@ def draw_ring(path, gap, off):
     ("gap", "off", "problem"),
     [
         (5e-3, 0.0, "apart"),
-        (20e-3, 0.0, "apart"),
+        pytest.param(20e-3, 0.0, "apart", marks=pytest.mark.slow),
         (-3e-3, 0.0, "overlap"),
-        (-10e-3, 0.0, "overlap"),
+        pytest.param(-10e-3, 0.0, "overlap", marks=pytest.mark.slow),
         (0.0, 4e-3, "overlap"),
         (0.0, 2e-3, "would move"),
     ],

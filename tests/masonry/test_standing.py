@@ -69,6 +69,7 @@ def test_a_vehicle_presses_with_its_axles_and_tips_over_the_last_one_at_its_cent
         assert found.factor == pytest.approx(sense * (tip - middle) / 1.3)
 
 
+@pytest.mark.slow
 def test_a_vehicle_on_pieces_of_fill_comes_to_rest_on_all_its_wheels():
     """Two spans; the joints below its wheels bear its weight, below its centre of gravity."""
     arches = [
@@ -253,8 +254,8 @@ SHORT = {"x": 6.6, "axles": (60e3, 115e3), "spacings": (4.0,), "centre_of_gravit
     ("lorry", "lever", "right", "left"),
     [
         (LONG, 0.0, 0.5482, 0.8152),
-        (LONG, 1.0, 0.3918, 0.5537),
-        (SHORT, 0.0, 0.6568, 0.6065),
+        pytest.param(LONG, 1.0, 0.3918, 0.5537, marks=pytest.mark.slow),
+        pytest.param(SHORT, 0.0, 0.6568, 0.6065, marks=pytest.mark.slow),
         (SHORT, 1.0, 0.4357, 0.3924),
     ],
 )

@@ -146,6 +146,7 @@ def test_soil_meets_stone_as_the_preset_says(tmp_path):
         ]
 
 
+@pytest.mark.slow
 def test_check_command(capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)  # which has the picture of the failed check
     changes = ["--set", "model.fidelity=rigid"]
