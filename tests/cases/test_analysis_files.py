@@ -24,6 +24,7 @@ CASES = sorted(
 ALIKE = (
     *("prusias", "prusias_paving", "prusias_piers", "prusias_records", "prusias_restored"),
     *("prusias_paper", "prusias_paper_records", "prusias_paper_restored", "prusias_wall"),
+    "prusias_paper_records_restored",
 )
 """Bridges with keys of "prusias_fill": other lengths of piers, walls and fill, other motions."""
 
@@ -175,8 +176,13 @@ def random_analysis(seed):
     )
 
 
-def test_random_structures_are_read_as_they_were_written(tmp_path):
-    for seed in range(35):  # a multiple of 5 and of 7, as the settings of `random_analysis` recur
+@pytest.mark.parametrize(
+    "count",
+    # a multiple of 5 and of 7, as the settings of `random_analysis` recur
+    [12, pytest.param(35, marks=pytest.mark.slow)],
+)
+def test_random_structures_are_read_as_they_were_written(count, tmp_path):
+    for seed in range(count):
         analysis = random_analysis(seed)
         again = read_again(analysis, tmp_path)
         assert again == analysis, seed
@@ -188,7 +194,9 @@ def test_random_structures_are_read_as_they_were_written(tmp_path):
         ]
 
 
-@pytest.mark.parametrize("seed", [1, 4, 9])
+@pytest.mark.parametrize(
+    "seed", [pytest.param(1, marks=pytest.mark.slow), pytest.param(4, marks=pytest.mark.slow), 9]
+)
 def test_the_value_and_its_file_have_histories_of_the_same_bits(seed, tmp_path):
     analysis = replace(random_analysis(seed), dt=0.002, stages=None, until=None)
     analysis = replace(analysis, structure=strengthened(analysis.structure))

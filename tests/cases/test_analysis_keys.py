@@ -157,8 +157,9 @@ def test_crushing_is_compared_at_each_end_of_what_a_fill_may_do():
     assert abs(low - high) > 0.01
 
 
-def test_results_state_the_strength_with_which_joints_crush(tmp_path, capsys):
+def test_results_state_the_strength_with_which_joints_crush(tmp_path, capsys, monkeypatch):
     """A column under its weight and an axle: its factor, and that without a given strength."""
+    monkeypatch.setattr("archfem.limit.rating._places_along", lambda *_: (0.2,))
     column = {"shape": "column", "breadth": 0.6, "heights": [1.0, 1.0]}
     tables = {"structure": column, "limit": {"horizontal": 1.0}}
     spectrum = {"code": "NTC-2018", "ag": 0.2, "f0": 2.4, "tc_star": 0.3, "site": "B"}

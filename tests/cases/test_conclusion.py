@@ -839,7 +839,14 @@ def test_a_report_of_a_wall_has_its_falls_across_the_plane_as_one_rigid_body(mon
     assert column.across == ({}, "")
 
 
-@pytest.mark.parametrize(("share", "falls"), [(0.8, True), (1.25, False), (2.5, None)])
+@pytest.mark.parametrize(
+    ("share", "falls"),
+    [
+        (0.8, True),
+        pytest.param(1.25, False, marks=pytest.mark.slow),
+        pytest.param(2.5, None, marks=pytest.mark.slow),
+    ],
+)
 def test_a_run_of_a_wall_says_at_which_scale_it_falls_across_its_plane(
     share, falls, tmp_path, capsys, unplotted
 ):

@@ -46,7 +46,7 @@ def test_ground_rests_behind_a_matched_motion_as_it_was_matched():
     target = {"code": "EC8", "ag": 0.25, "ground": "B"}
     suites = []
     for rest in (0.0, 2.0):
-        one = {"synthetic": {"seed": 1, "duration": 5.0}, "rest": rest}
+        one = {"synthetic": {"seed": 1, "duration": 4.5}, "rest": rest}
         settings = {"matched": True, "target": target, "pairs": {"one": one}}
         suites.append(build_suite(parse_suite(settings)))
     bare, rested = (suite.pairs[0] for suite in suites)

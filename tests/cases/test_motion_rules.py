@@ -2,6 +2,7 @@
 
 import functools
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,9 +15,9 @@ MODES = "frequency [Hz],period [s],mass x,mass y\n9,0.111,0.01,0.02\n10,0.1,0.73
 
 
 @functools.cache
-def matched_motion(seed, duration):
+def matched_motion(duration):
     """Return a motion as a suite matches it to the target, which takes a second."""
-    pairs = {f"pair {seed}": {"synthetic": {"seed": seed, "duration": duration}}}
+    pairs = {"pair": {"synthetic": {"seed": 0, "duration": duration}}}
     suite = {"target": TARGET, "pairs": pairs, "matched": True}
     structure = {"shape": "column", "heights": [1.0], "breadth": 0.5}
     return af.Case.of({"structure": structure, "suite": suite}).ground_suite().motions[0]
@@ -33,7 +34,7 @@ def data_of(norm="EN 1998-1", pairs=3, duration=30.0, modes=MODES, factor=1.0, *
     data = report_data.ReportData(af.Case.of(tables), dict.fromkeys(made))
     factor /= suite.get("reduction", 1.0)
     vars(data)["motions"] = {
-        name: matched_motion(seed, duration).scaled(factor) for seed, name in enumerate(made)
+        name: replace(matched_motion(duration).scaled(factor), name=name) for name in made
     }
     object.__setattr__(data, "read_text", lambda name: modes if name == "modes.csv" else None)
     return data

@@ -6,7 +6,6 @@ import re
 import shutil
 import tomllib
 from dataclasses import replace
-from functools import partial
 from hashlib import sha256
 from pathlib import Path
 from types import SimpleNamespace
@@ -38,6 +37,7 @@ from archfem.cases.result_text import ResultTable
 from archfem.cases.run import carry_out, replace_run
 from archfem.cases.structure_keys import write_structure
 from archfem.limit import rating
+from archfem.limit.vehicles import cut_road
 from archfem.models.model import Doubt
 from archfem.statics.assessment_checks import UPPER_BOUND, AssessmentCheck
 from archfem.studies.fragility import Rate
@@ -440,7 +440,7 @@ def test_results_are_read_though_a_file_was_deleted(kept):
     assert set(af.cases.open_results(kept).runs) == {"first", "second"}
 
 
-@pytest.mark.parametrize("name", ["rubble", "own"])
+@pytest.mark.parametrize("name", ["rubble", pytest.param("own", marks=pytest.mark.slow)])
 def test_results_need_no_drawing_beside_them(name, unplotted, undoubted, tmp_path, capsys):
     """A pier of a drawing is run, and reported and filmed from a folder that was moved alone."""
     drawing, place = tmp_path / "drawn" / "pier.geojson", tmp_path / "elsewhere"
@@ -825,8 +825,8 @@ pier = { breadth = "1.2 m", height = "2 m", course = "1 m" }
 def test_a_result_without_a_time_history_has_a_report(
     command, given, found, tmp_path, capsys, undrawn, monkeypatch
 ):
-    places = partial(rating._places_along, steps=10)
-    monkeypatch.setattr(rating, "_places_along", places)
+    monkeypatch.setattr(rating, "_places_along", lambda *_: (3.0, 4.0))
+    monkeypatch.setattr(cut_road, "__defaults__", (8,))
     path, folder = tmp_path / "case.toml", tmp_path / "out"
     path.write_text(f'{BRIDGE}[rating]\nvehicle = "LM2"\nlive = 1.2\n', encoding="utf-8")
     assert af.commands.main([command, str(path), "--out", str(folder), *given]) == 3
@@ -906,6 +906,7 @@ def test_a_kinematic_assessment_alone_has_a_report(unplotted, tmp_path, capsys):
     assert "player" not in words  # of a run that there is not
 
 
+@pytest.mark.slow
 def test_an_assessment_takes_the_fill_of_the_limit_analysis(undrawn, tmp_path, capsys):
     path, folder = tmp_path / "case.toml", tmp_path / "out"
     path.write_text(BRIDGE, encoding="utf-8")
@@ -1124,7 +1125,7 @@ def test_motions_are_measured_by_themselves_without_their_files(tmp_path, unplot
 def test_a_motion_is_measured_to_its_end_where_the_structure_falls_before(tmp_path, unplotted):
     """A pulse that overturns a stone, and a stronger one after the fall."""
     step, path = 0.005, tmp_path / "pulse.csv"
-    samples = np.zeros(4000)
+    samples = np.zeros(1600)
     samples[20:140] = 4.0
     samples[-40:-20] = 6.0
     np.savetxt(path, samples)
@@ -1136,7 +1137,7 @@ def test_a_motion_is_measured_to_its_end_where_the_structure_falls_before(tmp_pa
     case = af.Case.of(tables)
     (run,) = (each for each in af.cases.run_case(case) if isinstance(each, af.cases.Run))
     assert run.history.verdict.outcome == "fallen"
-    assert run.history.time[-1] < step * 3900
+    assert run.history.time[-1] < step * 1500
     data = report_data.ReportData(case, {"pulse": run.history})
     grid, *_ = build_ground_section(data).pieces
     row = dict(zip(grid.head, grid.rows[0], strict=True))

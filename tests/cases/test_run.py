@@ -112,7 +112,7 @@ def test_pairs_are_run_again_where_their_files_have_changed(small, tmp_path, at2
     assert load_finished_run(path, case, motion) is None  # before the motions are compared
 
 
-@pytest.mark.parametrize("what", ["drawing", "program"])
+@pytest.mark.parametrize("what", ["drawing", pytest.param("program", marks=pytest.mark.slow)])
 def test_nothing_is_kept_of_another_drawing_or_by_another_program(
     what, undoubted, tmp_path, monkeypatch
 ):
@@ -271,7 +271,9 @@ def test_modules_of_a_case_are_among_its_files(tmp_path):
     assert found == [tmp_path / "stones.dxf", tmp_path / "laws.py"]
 
 
-@pytest.mark.parametrize(("thickness", "count"), [(0.05, 1), (0.6, 0)])
+@pytest.mark.parametrize(
+    ("thickness", "count"), [(0.05, 1), pytest.param(0.6, 0, marks=pytest.mark.slow)]
+)
 def test_a_ring_that_only_its_elastic_fill_holds_up_is_a_doubt(thickness, count):
     """By limit analysis with the fill of [limit], of which a run without a push makes no use."""
     sides = {"state": "fixed", "length": 2.0, "height": 1.0, "above": 1.5}

@@ -172,7 +172,9 @@ STANDING = {
 }
 
 
-@pytest.mark.parametrize("fill", [{}, FILL], ids=["elastic", "in pieces"])
+@pytest.mark.parametrize(
+    "fill", [{}, pytest.param(FILL, marks=pytest.mark.slow)], ids=["elastic", "in pieces"]
+)
 def test_a_file_keeps_bodies_and_fill_as_they_are_given(fill, tmp_path):
     structure = BRIDGE["structure"] | {"standing": STANDING} | ({"fill": fill} if fill else {})
     read = af.Case.of({**BRIDGE, "structure": structure})

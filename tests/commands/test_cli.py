@@ -258,7 +258,10 @@ def column(tmp_path):
     return path
 
 
-@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+@pytest.mark.parametrize(
+    ("number", "code"),
+    [pytest.param(signal.SIGINT, 130, marks=pytest.mark.slow), (signal.SIGTERM, 143)],
+)
 def test_a_signal_ends_a_motion_and_keeps_its_steps(
     column, tmp_path, unplotted, monkeypatch, capsys, number, code
 ):
@@ -326,6 +329,7 @@ def test_sigterm_in_a_fall_keeps_dead_load_and_history(tmp_path, unplotted, monk
     assert "outcome: interrupted at 0.896 s, in a fall" in (out / "summary.txt").read_text()
 
 
+@pytest.mark.slow
 def test_sigterm_interrupts_where_gmsh_is_loaded():
     """gmsh sets the system's handler, upon which the signal would end the process at once."""
     pytest.importorskip("gmsh")

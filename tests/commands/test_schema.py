@@ -52,7 +52,10 @@ def misspelt(table):
             yield from ({**table, key: inner} for inner in misspelt(value))
 
 
-@pytest.mark.parametrize("name", ["ring", "ring_suite", "prusias", "survey", "new wall"])
+@pytest.mark.parametrize(
+    "name",
+    ["ring", "ring_suite", pytest.param("prusias", marks=pytest.mark.slow), "survey", "new wall"],
+)
 def test_a_misspelt_key_is_refused_where_the_reader_refuses_it(name, validator):
     settings, folder, refused = read(FILES[name]), FILES[name].parent, 0
     base = settings.pop("base", None)

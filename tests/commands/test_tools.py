@@ -138,6 +138,7 @@ def test_damaged_code_is_reported(monkeypatch, tmp_path):
     assert "archfem compile" in diagnosis.remedy
 
 
+@pytest.mark.slow
 def test_the_least_thickness_of_a_ring_is_printed(tmp_path, capsys):
     path = tmp_path / "arch.toml"
     shape = '[structure]\nshape = "circular_arch"\nradius = 1.0\nthickness = 0.2\n'
@@ -161,7 +162,9 @@ fidelity = "rigid"
 """
 
 
-@pytest.mark.parametrize(("friction", "least"), [(None, "0.442"), (0.45, "0.441")])
+@pytest.mark.parametrize(
+    ("friction", "least"), [(None, "0.442"), pytest.param(0.45, "0.441", marks=pytest.mark.slow)]
+)
 def test_the_friction_from_which_it_stands_is_said(friction, least, tmp_path, capsys):
     """By checks, thicknesses and reports, with a note where the case leaves it open."""
     given = "" if friction is None else f'[contacts."stone to stone"]\nfriction = {friction}\n'
@@ -187,15 +190,17 @@ def test_the_friction_from_which_it_stands_is_said(friction, least, tmp_path, ca
         assert words in page
 
 
-def test_a_thickness_names_a_stone_on_a_wrong_layer(tmp_path, capsys):
+@pytest.mark.parametrize(
+    ("moved", "code"), [("WEST 1", 1), pytest.param("WEST 3", 3, marks=pytest.mark.slow)]
+)
+def test_a_thickness_names_a_stone_on_a_wrong_layer(moved, code, tmp_path, capsys):
     """A course that prolongs the ring is in doubt, and one apart from it is an error."""
-    for moved, code in (("WEST 3", 3), ("WEST 1", 1)):
-        path = draw_portal(tmp_path, {moved: "RING"})
-        assert af.commands.main(["thickness", str(path)]) == code
-        said = "".join(capsys.readouterr())
-        assert "'RING 1' at (-1.600, " in said
-        assert "may be one of 'west pier'" in said
-        assert ("least thickness" in said) == (code == 3)
+    path = draw_portal(tmp_path, {moved: "RING"})
+    assert af.commands.main(["thickness", str(path)]) == code
+    said = "".join(capsys.readouterr())
+    assert "'RING 1' at (-1.600, " in said
+    assert "may be one of 'west pier'" in said
+    assert ("least thickness" in said) == (code == 3)
 
 
 def test_a_strength_in_another_unit_is_refused_by_a_check(tmp_path, capsys):
