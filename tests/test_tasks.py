@@ -23,8 +23,8 @@ FILES = dict(
 
 BLOCK = re.compile(r"```(python|sh)\n(.*?)```(?:\n\n```text\n(.*?)```)?", re.DOTALL)
 
-QUICK = ("Two measures compared", "A lorry stands on it in an earthquake")
-"""Tasks by limit analysis alone; the others compute and draw histories."""
+QUICK = ("Two measures compared",)
+"""Tasks by limit analysis alone; the others compute and draw histories, or assess."""
 
 
 def run_commands(lines, codes):

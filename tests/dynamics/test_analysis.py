@@ -84,6 +84,7 @@ def test_functions_of_models_and_structures_take_it():
     )
 
 
+@pytest.mark.slow
 def test_its_searches_are_those_of_the_functions():
     found = ROCKING.scale(MOTION, precision=1.0)
     model = af.build(COLUMN, fidelity="rigid", displacements="large")

@@ -204,7 +204,11 @@ def test_a_fall_that_is_interrupted_keeps_what_was_computed(
 
 @pytest.mark.parametrize(
     ("end", "friction", "outcome", "doubted"),
-    [(1.0, 0.15, "fallen", True), (10.0, 0.15, "dislocated", False), (0.6, 0.9, "fallen", False)],
+    [
+        (1.0, 0.15, "fallen", True),
+        pytest.param(10.0, 0.15, "dislocated", False, marks=pytest.mark.slow),
+        (0.6, 0.9, "fallen", False),
+    ],
 )
 def test_stones_that_slide_off_the_drawn_ground_are_a_doubt(end, friction, outcome, doubted):
     """After 1 s of 3 m/s² of 1.53 m/s, they stop after v² (1 / 1.53 + 1 / 1.47) / 2 = 1.56 m."""

@@ -204,7 +204,7 @@ def ida_cells(analysis, monkeypatch, motion):
     return {name: model[name] for name in ("cells", "cell")}
 
 
-@pytest.mark.parametrize("rule", ["exact", "rigid"])
+@pytest.mark.parametrize("rule", ["exact", pytest.param("rigid", marks=pytest.mark.slow)])
 def test_a_bridge_with_fill_in_one_piece_falls_by_elastic_and_rigid_joints(footbridge, rule):
     """Fill as one rigid body overlapped with stones, or held them: no run had an answer."""
     analysis = af.Analysis(

@@ -539,7 +539,7 @@ def test_a_margin_rests_on_finished_steps():
     assert "search unfinished, falls at no scale" in str(CollapseScale({0.005: none}))
 
 
-@pytest.mark.parametrize("large", ["large", "small"])
+@pytest.mark.parametrize("large", [pytest.param("large", marks=pytest.mark.slow), "small"])
 def test_a_search_continues_from_its_runs(monkeypatch, large):
     """It makes the runs that are left, and finds what one without a break does."""
     model = af.build(af.column(breadth=0.25, heights=[1.0]), fidelity="rigid", displacements=large)

@@ -211,6 +211,7 @@ def test_courses_on_soft_joints_rock_without_a_hinge(stiffness):
     assert all(f"|e| up to {largest:.3g}, though a corner moved by" in each for each in doubts)
 
 
+@pytest.mark.slow
 def test_a_scale_of_a_stack_states_that_of_one_body():
     """Of the half sine above; courses on stiff joints fall at the same scale to a tenth."""
     stiff = af.Contact(1e11, 4e10, 5.0)

@@ -171,6 +171,7 @@ def rings_side_by_side(gap):
     return af.masonry.assembled(blocks, built.joints[0].contact)
 
 
+@pytest.mark.slow
 def test_springers_that_meet_leave_the_rest_of_the_motion_to_rigid_blocks():
     """With a gap that they do not close, joints are followed to the end: they move farther."""
     motion = af.Motion.synthetic(seed=1, duration=6.0, pga=3.0)

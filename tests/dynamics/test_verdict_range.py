@@ -404,6 +404,7 @@ def test_a_property_is_named_if_chance_names_it_less_than_once_in_twenty(falls, 
     assert (CHANCE in sentence) == chance
 
 
+@pytest.mark.slow
 def test_runs_without_a_rule_rarely_get_one():
     """Of ranges whose falls are drawn by chance one in twenty may name properties."""
     random = np.random.default_rng(5)

@@ -69,6 +69,7 @@ def test_a_client_gives_the_rows_that_processes_give(study_file, tmp_path, clien
     assert equal_tables(tmp_path / "out", tmp_path / "serial")
 
 
+@pytest.mark.slow
 def test_an_analysis_of_blocks_is_varied_on_a_cluster_and_on_processes(tmp_path, client):
     """A structure of Python, whose joints are not those of any preset, travels whole."""
     wall = af.column(breadth=0.6, heights=[1.0, 1.0], contact=af.Contact(3e9, 1e9, friction=0.4))

@@ -145,6 +145,7 @@ def test_the_interval_holds_the_rate_as_often_as_it_says():
     assert np.mean(widths) == pytest.approx(expected, rel=0.1)
 
 
+@pytest.mark.slow
 def test_few_records_widen_the_interval():
     """Of seven records quantiles of the bootstrap would contain the rate in 74 of these cases."""
     random, inside = np.random.default_rng(3), 0
@@ -157,6 +158,7 @@ def test_few_records_widen_the_interval():
     assert 78 <= inside <= 96
 
 
+@pytest.mark.slow
 def test_alternatives_far_apart_add_their_rates():
     """Their capacities together are far from lognormal: one fit gives half of the rate."""
     quantiles = 0.3 * norm.ppf((np.arange(200) + 0.5) / 200)
@@ -255,6 +257,7 @@ def test_dispersion_is_split_into_its_parts():
     assert rates["sawn"].rate > rates["hewn"].rate
 
 
+@pytest.mark.slow
 def test_widths_of_brackets_are_no_dispersion():
     """Of brackets as wide as a run makes them, about capacities without any dispersion but 0.1."""
     random, width = np.random.default_rng(4), np.log(1.25)

@@ -40,7 +40,7 @@ def of(structure, displacements, dt=0.005):
     ("displacements", "closure", "scales"),
     [
         ("small", None, (0.1, 0.8)),
-        ("large", None, SCALES),
+        pytest.param("large", None, SCALES, marks=pytest.mark.slow),
         ("large", 2e-4, SCALES),
     ],
 )

@@ -139,6 +139,7 @@ def test_the_keys_of_a_case_are_changed_one_property_at_a_time(tmp_path, key):
         assert own == (values if name == "abutments free" else pytest.approx(values)), name
 
 
+@pytest.mark.slow
 def test_a_backing_is_left_out_alone_and_at_once_with_the_worst_of_the_others(
     tmp_path, monkeypatch
 ):
@@ -167,6 +168,34 @@ def test_a_backing_is_left_out_alone_and_at_once_with_the_worst_of_the_others(
     assert float(cells["all unfavourable at once"]) == pytest.approx(whole, rel=SEARCHED)
 
 
+def test_variations_before_a_stop_are_computed_once(tmp_path, unplotted, monkeypatch):
+    """Their factors are here the mean depths of the joints."""
+    path, out = tmp_path / "case.toml", tmp_path / "out"
+    text = CASE.replace('right = { span = "3 m", rise = "1 m", thickness = "0.45 m" }\n', "")
+    head, _, rest = text.partition("[structure.piers]")
+    path.write_text(head + rest[rest.index("[structure.backfill]") :])
+    monkeypatch.setattr("archfem.limit.rating._places_along", lambda *_: (1.5,))
+    seen, stop = [], [3]
+
+    def rate_again(found, structure, *_, **options):
+        seen.append(structure)
+        if len(seen) == stop[0]:
+            raise KeyboardInterrupt
+        return float(structure.depths.mean())
+
+    monkeypatch.setattr(variations, "rate_again", rate_again)
+    command = ["rate", str(path), "--vary", "--vehicle", "CS454-single", "--out", str(out)]
+    assert af.commands.main(command) == 130
+    late = pd.read_csv(out / "rating_variations.csv")["factor"] == "not computed"
+    assert 2 < late.sum() < len(late)
+    assert f"; {late.sum()} variations were not computed" in (out / "rating.txt").read_text()
+    stop[0] = 0
+    assert af.commands.main(command) in (0, 3)
+    assert "not computed" not in set(pd.read_csv(out / "rating_variations.csv")["factor"])
+    assert len(seen) == 2 + 1 + late.sum()  # of two that are kept, and an interrupted one
+
+
+@pytest.mark.slow
 def test_variations_that_are_stopped_are_kept(tmp_path, unplotted, capsys, monkeypatch, caplog):
     """The same command computes only those that are left; another rating computes all."""
     path, out = tmp_path / "case.toml", tmp_path / "out"

@@ -307,7 +307,7 @@ def test_progress_is_reported_where_the_output_is_a_file(
     assert any("0 failed" in line and "s remaining" in line for line in lines)
 
 
-@pytest.mark.parametrize("workers", [1, 2])
+@pytest.mark.parametrize("workers", [pytest.param(1, marks=pytest.mark.slow), 2])
 def test_progress_of_a_range_is_reported_where_the_output_is_a_file(monkeypatch, capsys, workers):
     monkeypatch.setattr(result_store, "PROGRESS_INTERVAL", 0.02)
     column = af.column(breadth=0.5, heights=[1.0])
@@ -579,7 +579,8 @@ def test_limit_analysis_needs_no_pairs(small, tmp_path):
         assert len(af.Study.read(path).points) == points
 
 
-def test_a_study_of_ratings_has_the_factors_of_rate(small):
+def test_a_study_of_ratings_has_the_factors_of_rate(small, monkeypatch):
+    monkeypatch.setattr(af.limit.rating, "_places_along", lambda *_: (0.2, 0.6))
     axle = '{ name = "axle", axles = ["10 kN"], live = 1.5, impact = 1.2 }'
     case = af.Case.read(small, [f"rating.vehicle={axle}"])
     table = af.Study(case, {"rating.dead": [1.0, 2.0]}, "rating").run(workers=1)
@@ -615,6 +616,7 @@ def test_a_study_of_assessments_has_the_least_margin_of_assess(tmp_path, capsys)
     assert tied == pytest.approx(bare)  # the tie pulls to the right, and holds one sense alone
 
 
+@pytest.mark.slow
 def test_a_study_of_ratings_states_those_without_backing(monkeypatch):
     """The factor without the backing is that of a case that has none, here far below."""
     monkeypatch.setattr(af.limit.rating, "_places_along", lambda *_: (3.5, 4.5))

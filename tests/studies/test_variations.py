@@ -213,7 +213,16 @@ def test_damping_that_is_given_is_varied(column, motion, monkeypatch, given, kin
     assert used[1] == given
 
 
-@pytest.mark.parametrize("kind", ["run", "scale", "verdict_range", "ensemble", "ida"])
+@pytest.mark.parametrize(
+    "kind",
+    [
+        "run",
+        pytest.param("scale", marks=pytest.mark.slow),
+        "verdict_range",
+        "ensemble",
+        pytest.param("ida", marks=pytest.mark.slow),
+    ],
+)
 def test_falls_of_soft_blocks_in_one_piece_are_doubted(kind):
     """A slender block that overturns, of soil and of stone."""
     block = af.column(breadth=0.25, heights=[1.5], contact=af.Contact(1e9, 5e8, 0.7))

@@ -86,7 +86,7 @@ def test_moment_approaches_its_limit_only_as_rotation_grows():
 @pytest.mark.parametrize(
     ("fidelity", "rule"),
     [
-        ("rigid", None),
+        pytest.param("rigid", None, marks=pytest.mark.slow),
         ("rigid", "lobatto"),
         pytest.param("full", None, marks=pytest.mark.slow),  # the search that fails takes 15 s
     ],

@@ -82,6 +82,7 @@ def test_static_peak_is_that_of_the_independent_code(row, verified):
     verified(label, row["static"], source, found)
 
 
+@pytest.mark.slow
 def test_pulse_that_fells_the_arch_is_that_of_the_independent_code():
     row = ROWS[STIFF]
     built = model(row)

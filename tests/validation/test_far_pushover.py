@@ -30,7 +30,7 @@ def curve(load, rule, control, stiff=1.0):
 @pytest.mark.parametrize(
     ("load", "rule", "peak"),
     [
-        (POINT, "nodal", 53.53),
+        pytest.param(POINT, "nodal", 53.53, marks=pytest.mark.slow),
         pytest.param(SIDEWAYS, "nodal", 0.4427, marks=pytest.mark.slow),
         (POINT, "exact", 44.93),
         pytest.param(SIDEWAYS, "exact", 0.3818, marks=pytest.mark.slow),

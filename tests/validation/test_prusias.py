@@ -44,6 +44,7 @@ def test_no_criterion_is_exceeded_under_dead_load(dead):
     assert float(joints["N"].min()) > 1e5
 
 
+@pytest.mark.slow
 def test_compression_nears_that_of_the_paper_under_two_metres_of_fill(dead, verified):
     """The paper does not give its cover; a trial by other means found 0.32 MPa, and 2 m for 0.6."""
     deep = case("prusias", "structure.backfill.cover=2 m", "structure.backfill.erosion=0 m")

@@ -43,7 +43,7 @@ def filled():
 @pytest.mark.parametrize(
     ("joints", "scheme"),
     [
-        ("closed", CONSERVING),
+        pytest.param("closed", CONSERVING, marks=pytest.mark.slow),
         ("closed", NEWMARK),
         ("initial", af.HHT(-0.1)),
         pytest.param("none", CONSERVING, marks=pytest.mark.slow),

@@ -95,7 +95,7 @@ def at_the_limit(away):
 known = cache(lambda answers: answers(np.zeros(2)))
 
 
-@pytest.mark.parametrize("answers", [at_rest, at_the_limit])
+@pytest.mark.parametrize("answers", [at_rest, pytest.param(at_the_limit, marks=pytest.mark.slow)])
 def test_answers_do_not_depend_on_the_origin(answers):
     for name, value in answers(AWAY).items():
         expected = np.asarray(known(answers)[name], float)

@@ -14,6 +14,7 @@ from portals import DRY, box, portal
 
 import archfem as af
 from archfem.limit import rating
+from archfem.limit.vehicles import cut_road
 from archfem.view import (
     draw_capacity,
     draw_collapse,
@@ -118,8 +119,8 @@ def test_the_load_is_drawn_and_named(ring):
 
 @pytest.fixture
 def few_places(monkeypatch):
-    """Places of vehicles are a twentieth of a bridge apart, not a hundredth."""
-    monkeypatch.setattr(rating, "_places_along", partial(rating._places_along, steps=20))
+    """Places of vehicles are an eighth of a bridge apart, not a hundredth."""
+    monkeypatch.setattr(rating, "_places_along", partial(rating._places_along, steps=8))
 
 
 @pytest.fixture(scope="module")
@@ -169,6 +170,7 @@ def test_an_assessment_shows_moved_blocks_curve_and_demand(coarse_ring):
         draw_kinematic_assessment(locked)
 
 
+@pytest.mark.slow
 def test_an_assessment_without_a_finite_motion_shows_the_mechanism_as_it_begins():
     wall = bonded_wall(7, half=1.0)
     found = af.kinematic_assessment(wall, af.Eurocode8(ag=0.3, ground="B"))
@@ -238,8 +240,9 @@ def test_a_rating_marks_where_the_distributed_load_stands(coarse_ring, few_place
     assert 0 < len(strips) < 40
 
 
-def test_several_vehicles_are_drawn_each_at_its_worst_place(coarse_ring, few_places):
+def test_several_vehicles_are_drawn_each_at_its_worst_place(coarse_ring, few_places, monkeypatch):
     """Of seven the first six: a line each, and a panel with its own axles."""
+    monkeypatch.setattr(cut_road, "__defaults__", (8,))
     lorries = [
         af.limit.Vehicle(f"lorry {k}", (5e3 + 1e3 * k, 5e3), (1.0,), area_load=2e3 * (k > 1))
         for k in range(3)

@@ -73,6 +73,7 @@ def test_the_map_of_one_sine_is_that_of_housner():
             assert falls(ratio, peak, 2) == overturns(ratio, peak, 2), (ratio, peak)
 
 
+@pytest.mark.slow
 def test_dominoes_all_fall_at_one_speed():
     """Each takes as long as the one before; the speed does not depend on the step."""
     boxes = [(0.6 * k, 0.0, 0.6 * k + 0.2, 1.0) for k in range(20)]
@@ -365,6 +366,7 @@ def test_impulses_that_are_cut_short_add_no_energy(seed, monkeypatch):
     assert end.energy.gained < time_stepping.MAX_ENERGY_GAIN * end.energy.lost
 
 
+@pytest.mark.slow
 def test_a_ring_near_its_mechanism_moves_as_far_at_any_step():
     """The shipped ring under its motion, whose peak has jumped to a seventh at single steps."""
     ring = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17)

@@ -18,7 +18,12 @@ def cut_short(count):
 
 
 @pytest.mark.parametrize(
-    ("count", "suffix"), [*each_once((0, 1), (".mp4", ".gif")), (5, ".mp4"), (5, ".gif")]
+    ("count", "suffix"),
+    [
+        *each_once((0, 1), (".mp4", ".gif")),
+        (5, ".mp4"),
+        pytest.param(5, ".gif", marks=pytest.mark.slow),
+    ],
 )
 def test_a_killed_film_leaves_the_old_one(tmp_path, count, suffix):
     """Also once the encoder has ended, which may begin its file late."""

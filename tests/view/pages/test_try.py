@@ -158,7 +158,10 @@ def bridge_of_the_page():
 
 @pytest.mark.parametrize(
     ("build", "stones", "drawn"),
-    [(bridge_of_the_page, 56, False), (lambda: build_wall(9, 6), 57, True)],
+    [
+        (bridge_of_the_page, 56, False),
+        pytest.param(lambda: build_wall(9, 6), 57, True, marks=pytest.mark.slow),
+    ],
     ids=["bridge", "wall"],
 )
 def test_large_structures_fall_where_limit_analysis_says(
