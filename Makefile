@@ -50,7 +50,7 @@ demo: .venv/ready  ## run the shipped ring on a strong earthquake: results in ou
 test: .venv/compiled  ## the default tests, on all cores
 	$(PYTHON) -m pytest $(SPREAD)
 
-test-slow: .venv/compiled  ## the tests that take minutes
+test-slow: .venv/compiled  ## the tests marked slow: longer ones, and further cases
 	$(PYTHON) -m pytest $(SPREAD) -m slow
 
 test-debian13:  ## the default tests in a fresh Debian 13 (root, debootstrap, 4 GB in DEBIAN13)
