@@ -1172,6 +1172,7 @@ def test_a_study_stands_in_a_report(kept, unplotted, tmp_path, capsys):
     assert "has no study.txt: its study is not finished" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_studies_have_names_and_their_doubts_stand_in_a_report(kept, unplotted, tmp_path, capsys):
     """Long steps are a doubt of a stone that slides, and none of one that cannot."""
     large = CASE.replace("[record]", '[contacts."stone to stone"]\nfriction = 0.2\n[record]')

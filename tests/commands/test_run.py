@@ -87,6 +87,7 @@ def test_modes_are_tabulated_and_the_first_two_filmed(count, tmp_path, unplotted
     assert len(re.findall(r"^\d+ +[\d.]+ Hz", table, re.MULTILINE)) == count
 
 
+@pytest.mark.slow
 def test_criteria_of_a_case_are_obeyed(tmp_path, unplotted, capsys):
     """Four joints reach |e| = 0.38 at once, and never 0.46."""
     changes = ["model.fidelity=rigid", "motion.end=3.5", "analysis.until=counted mechanism"]
@@ -168,6 +169,7 @@ def test_one_command_runs_all_and_again_keeps_finished_runs(small, undrawn, requ
     assert re.search(r"^first .* 1\.00 m/s² +0\.67 m/s² ", table, re.MULTILINE)
 
 
+@pytest.mark.slow
 def test_pairs_that_workers_have_run_were_not_finished_before(
     small, undrawn, unplotted, undoubted, monkeypatch, capsys
 ):
@@ -214,6 +216,7 @@ def test_a_range_in_doubt_has_the_exit_code_of_doubts(small, unplotted, monkeypa
     )
 
 
+@pytest.mark.slow
 def test_a_range_is_that_of_the_case_and_marked_as_given(small, unplotted):
     """Ranges of a survey in [verdict]; 1 is the run as given, and a single value is held."""
     out, ranges = small.parent / "out", '[verdict.vary]\nk_n = [0.1, 20]\nsign = "as given"\n'

@@ -119,6 +119,7 @@ def test_studies_take_it(tmp_path):
     assert at_rest["N"].values == pytest.approx(14.4e3, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_its_sensitivity_to_mesh_and_step():
     elastic = af.Analysis(COLUMN, fidelity="condensed", damping="effective")
     found = elastic.mesh_sensitivity(
@@ -131,6 +132,7 @@ def test_its_sensitivity_to_mesh_and_step():
     assert resting.of("N").mesh.limit == pytest.approx(14.4e3, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_the_range_of_its_verdict_is_of_large_displacements():
     small, motion = replace(ROCKING, displacements="small"), MOTION.cut(0.0, 0.3)
     found = small.verdict_range(motion, samples=1, vary={"joint_rule": ["exact"]})

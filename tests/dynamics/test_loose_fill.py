@@ -252,6 +252,7 @@ def test_pictures_of_a_fall_have_the_grains_in_place_of_the_fill(footbridge):
     assert FallingBlocks.of(footbridge, History(stones, footbridge)).grain_outlines(1.5) == []
 
 
+@pytest.mark.slow
 def test_film_and_player_show_grains_from_the_fall_on(footbridge):
     """The fill becomes a point in a grain then; before, grains are points below the stones."""
     analysis = as_falling(

@@ -174,6 +174,7 @@ def test_a_column_that_still_topples_as_its_motion_ends_is_followed_to_the_groun
     assert run.fall.time > push.duration
 
 
+@pytest.mark.slow
 def test_a_symmetric_wall_at_rest_stays_there():
     """Courses from five stones to one, on joints of which parts are open all the time."""
     blocks = [box(-9.0, -1.0, 9.0, 0.0, "ground", fixed=True, part="ground", role="other")]

@@ -267,6 +267,7 @@ def test_a_case_that_is_run_states_it_everywhere(tmp_path, capsys):
     assert page.count(SENTENCE[1:]) >= 3  # principal results, table of joints, player
 
 
+@pytest.mark.slow
 def test_pictures_state_what_is_assessed(other, ring):
     for (model, run), said in ((other, True), (ring, False)):
         dead, instant = af.dead_load(model), run.joints.isel(time=90)

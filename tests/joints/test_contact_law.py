@@ -120,6 +120,7 @@ def test_numpy_and_compiled_means_of_a_step_are_equal(lag):
     assert np.any(~slides & (limit > 0.0) & (limit < NO_LIMIT))
 
 
+@pytest.mark.slow
 def test_ufl_and_numpy_means_of_a_step_are_equal():
     """UFL evaluates its own expressions of the same definition, and differentiates them."""
     ufl, lag = pytest.importorskip("ufl"), 0.3

@@ -83,6 +83,7 @@ def test_a_wall_pulled_from_its_fill_is_pushed_by_it(friction):
     assert found.factor == pytest.approx(min(slide, tilt), rel=EXACT)
 
 
+@pytest.mark.slow
 def test_a_wall_stands_from_the_breadth_at_which_the_fill_does_not_tip_it():
     """W b/2 = K_a γ h²/2 h/3 with W = γ_s b h: b² = K_a γ h² / (3 γ_s)."""
     height, fill = 2.0, af.limit.Fill(friction_angle=30.0)

@@ -333,6 +333,7 @@ def test_a_symmetric_wall_is_as_strong_to_both_sides():
         check(structure, push[sense], each)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("few_starts")
 def test_a_symmetric_structure_is_searched_once_for_both_senses(monkeypatch):
     """With another friction or strength, or of another shape, it is searched anew."""

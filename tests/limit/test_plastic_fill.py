@@ -266,6 +266,7 @@ def test_a_mesh_covers_its_fill_and_stays_conforming(chosen):
     assert np.abs(mesh.gradients.sum(axis=1)).max() < 1e-9
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("live", "half"),
     [

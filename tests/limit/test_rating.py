@@ -636,6 +636,7 @@ def test_a_bridge_that_the_fill_holds_has_no_factor_without_it(monkeypatch):
     assert "place: none, as the bridge does not stand, without it" in str(found)
 
 
+@pytest.mark.slow
 def test_places_of_axles_are_of_the_span_that_is_loaded(monkeypatch):
     """Of many axles the first and the last, and only those that stand on the structure."""
     arches = [
@@ -920,6 +921,7 @@ def test_pictures_and_tables_name_the_factors_that_are_missing(lorry_rating):
         assert figure.axes[0].get_legend().get_texts()[0].get_text() == f"{name}{words}"
 
 
+@pytest.mark.slow
 def test_an_axle_that_loads_no_ring_does_not_count(monkeypatch):
     """One behind the springing stands on the fill over the abutment alone, and changes nothing."""
     monkeypatch.setattr(rating, "_places_along", lambda *_: (3.5, 4.5))

@@ -169,6 +169,7 @@ def test_a_ring_falls_where_no_three_hinges_hold_the_thrust_line(thickness, sett
     )
 
 
+@pytest.mark.slow
 def test_a_ring_leaps_where_only_far_hinges_would_hold():
     ring = semicircle(0.2, 10)
     found = largest_movement(ring, SINK, friction=None)

@@ -59,6 +59,7 @@ def test_families_without_a_least_thickness_are_refused(call, message):
         call()
 
 
+@pytest.mark.slow
 def test_the_greatest_that_can_be_built_may_be_the_only_one_that_stands():
     """Doubling passes over it."""
     free = minimum_thickness(lambda t: ring(thickness=t), tolerance=1e-4)
@@ -85,6 +86,7 @@ def test_a_thickness_too_thin_to_build_does_not_stand(share):
     assert found == pytest.approx(max(1.0, share) * free, rel=2e-4)
 
 
+@pytest.mark.slow
 def test_a_least_thickness_far_below_the_greatest_that_can_be_built_is_found():
     """A ring along its intrados may be 100 m thick, and this one stands from 14 mm on."""
     x = np.linspace(-2.0, 2.0, 2001)

@@ -217,7 +217,9 @@ def test_a_distributed_load_stands_on_the_worst_of_all_sets_of_strips(fill, monk
     assert 0.0 < float(found["loaded"].min()) <= float(found["loaded"].max()) < np.ptp(corners)
 
 
-@pytest.mark.parametrize(("strength", "rounds"), [(np.inf, 1.0), (5e6, 2.5)])
+@pytest.mark.parametrize(
+    ("strength", "rounds"), [(np.inf, 1.0), pytest.param(5e6, 2.5, marks=pytest.mark.slow)]
+)
 def test_a_search_for_the_worst_place_solves_each_once(strength, rounds, monkeypatch):
     """With the factors of places on their own, and few rounds of cuts where stones crush.
 

@@ -23,6 +23,7 @@ def test_round_trip_through_geojson(viaduct, drawing):
     ]
 
 
+@pytest.mark.slow
 def test_shipped_survey_bears_as_the_viaduct_does(viaduct, verified):
     """The survey is off by up to 1.2 mm, so a line of thrust by as much of 450 mm: 0.003 h."""
     case = af.Case.read(SHIPPED)

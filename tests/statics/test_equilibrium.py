@@ -374,7 +374,11 @@ def draw_on_footings(folder, moved=()):
     ("moved", "whys"),
     [
         ({}, []),
-        ({"WEST 1": "SLAB"}, ["'SLAB 1' .* cannot move, but lies on 'FOOT 1'"]),
+        pytest.param(
+            {"WEST 1": "SLAB"},
+            ["'SLAB 1' .* cannot move, but lies on 'FOOT 1'"],
+            marks=pytest.mark.slow,
+        ),
         pytest.param(
             {"WEST 1": "SLAB", "EAST 3": "SLAB"},
             ["'SLAB 1' .* on 'FOOT 1'", "'SLAB 2' .*'FOOT 2'"],
@@ -580,6 +584,7 @@ def test_the_check_command_prints_doubts(embrace, code, tmp_path, capsys):
     assert ("toml: ready" in said) != bool(code)
 
 
+@pytest.mark.slow
 def test_commands_name_fixed_blocks_and_doubt_those_within_a_ring(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr("archfem.limit.rating._places_along", lambda *_: (1.4,))
     path, ring = tmp_path / "ring.toml", with_fixed(resting().model.structure, 5)
@@ -631,6 +636,7 @@ def test_fill_in_pieces_answers_itself():
     assert fill_doubts(pieces) == ()
 
 
+@pytest.mark.slow
 def test_pieces_as_large_as_the_fill_is_deep_lock_the_ring_and_words_say_by_how_much():
     """A plastic fill of this strength bounds the push on the ring: no fill beside it bears more."""
     walls = WALLS | {"length": 4.0}

@@ -138,6 +138,7 @@ def test_a_wall_with_a_tie(storeys, verified):
     assert found.alpha_0 > 1.5 * storeys.alpha_0
 
 
+@pytest.mark.slow
 def test_a_passive_tie_resists_in_one_sense_and_pushes_in_none():
     """A strip of 0.5 × 4 m and 40 kN, with 2 kN at 3 m: α = (W b / 2 ± T 3) / (W h / 2)."""
     strip, tie = af.column(breadth=0.5, heights=[2.0, 2.0]), ("block 2", (0.0, 3.0))
@@ -384,6 +385,7 @@ def test_sliding_with_and_without_dilatancy():
     assert both[None].alpha_0 > both["coulomb"].alpha_0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "friction", ["coulomb", pytest.param("nonassociated", marks=pytest.mark.slow)]
 )
@@ -525,7 +527,9 @@ def test_a_body_on_the_fill_is_weight_and_mass_and_no_load_is_attached_to_fill(l
     assert any("constant forces have no mass" in note for note in noted.notes)
 
 
-@pytest.mark.parametrize(("direction", "part"), [(-1.0, 1.0), (1.0, 0.4)])
+@pytest.mark.parametrize(
+    ("direction", "part"), [(-1.0, 1.0), pytest.param(1.0, 0.4, marks=pytest.mark.slow)]
+)
 def test_a_wall_turns_from_the_fill_behind_it_or_into_it(direction, part, verified):
     """Active or passive thrust at a third of its height about the toe, at rest and turned."""
     fill = af.limit.Fill(friction_angle=30.0, mobilisation=0.4)
@@ -791,7 +795,7 @@ def test_courses_that_move_as_one_raise_both_ratios(verified):
 @pytest.mark.parametrize(
     ("scale", "count"),
     [
-        (0.5, 0),
+        pytest.param(0.5, 0, marks=pytest.mark.slow),
         (1.0, 1),
         pytest.param(2.0, 1, marks=pytest.mark.slow),
         pytest.param(4.0, 0, marks=pytest.mark.slow),

@@ -396,6 +396,7 @@ def test_samples_are_kept_and_continued(tmp_path, monkeypatch, quick_runs):
         af.collapse_risk(analysis, motions, SITE, **options | {"seed": 1})
 
 
+@pytest.mark.slow
 def test_samples_are_added_to_those_of_a_file(tmp_path, quick_runs):
     analysis, motions = tilted_block()
     options = {"out": tmp_path / "risk.nc", "precision": 0.02}

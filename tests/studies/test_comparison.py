@@ -136,6 +136,7 @@ def never(*_, **__):
     raise AssertionError("a case was run again")
 
 
+@pytest.mark.slow
 def test_a_study_continues_where_it_was_ended(study, undrawn, tmp_path, monkeypatch):
     unscaled(study)
     folder = tmp_path / "out"

@@ -285,6 +285,7 @@ def test_ranges_without_a_search_are_refused(small_ring, options):
         ida(small_ring, motion, **options)
 
 
+@pytest.mark.slow
 def test_collapse_is_that_of_whole_falls(small_ida):
     small, _, _ = small_ida
     analysis = replace(small.analysis, displacements="large")

@@ -91,6 +91,7 @@ def answers(folder):
     return {words: [published, *found] for words, _, published, *found in cells}
 
 
+@pytest.mark.slow
 def test_a_circle_through_the_joints_has_the_rise_of_the_ring(answers):
     rise = 2.0 * (1.0 - cos(radians(70.0)))
     assert answers["rises"] == ["so", f"{rise:.2f} m", f"{rise:.2f} m"]

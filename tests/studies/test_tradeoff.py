@@ -52,6 +52,7 @@ def compared(case, tmp_path_factory):
     return case_accuracy(case, folder), folder
 
 
+@pytest.mark.slow
 def test_a_case_is_compared_as_its_structure_is(case, compared):
     """The case's own fidelity, rule and step do not matter; its damping does."""
     found, _ = compared

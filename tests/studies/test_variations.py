@@ -283,6 +283,7 @@ def test_the_run_as_given_comes_first_then_each_change_alone(column, motion, cal
     assert found.dataset.attrs["k_n"] == pytest.approx(contact.normal_stiffness)
 
 
+@pytest.mark.slow
 def test_the_sample_is_a_latin_hypercube(column, motion, calls):
     """Each of as many equal parts of a range as there are samples has one sample."""
     found = af.verdict_range(column, motion, samples=6, seed=3, vary={"scale": (0.5, 0.9)})

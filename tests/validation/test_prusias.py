@@ -37,6 +37,7 @@ def dead():
     return af.cases.dead_load_of_case(case("prusias"))
 
 
+@pytest.mark.slow
 def test_no_criterion_is_exceeded_under_dead_load(dead):
     joints = af.joints.assessed_joints(dead.joints)
     assert float(abs(joints["eccentricity"]).max()) < 0.25

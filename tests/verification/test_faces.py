@@ -54,6 +54,7 @@ def test_the_basis_holds_rigid_motions(models):
     assert np.abs(cells.shape_functions @ q - wanted).max() < 1e-10 * np.abs(wanted).max()
 
 
+@pytest.mark.slow
 def test_dead_load_and_shaking_against_all_joint_nodes(arch, models):
     """Bounds are twice the errors in e that were found, 0.0007 and 0.0011, where e reaches 0.47."""
     motion = af.Motion.synthetic(duration=4.0, pga=3.0, seed=5).cut(0.5, 2.0)

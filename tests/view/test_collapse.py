@@ -229,6 +229,7 @@ def test_a_rating_shows_its_worst_place_and_the_axles_as_given(ring, few_places)
     np.testing.assert_allclose(sizes, 12e3 * 1.8 * 2.0)
 
 
+@pytest.mark.slow
 def test_a_rating_marks_where_the_distributed_load_stands(coarse_ring, few_places):
     found = af.rate(coarse_ring, af.limit.Vehicle("lorry", (5e3,), area_load=2e3), friction=None)
     marked = lines_of(draw_rating(found).axes[1])["distributed load"]
