@@ -196,23 +196,32 @@ def _find_voussoirs(
     """Find stones of piers, or of neither, with joints as deep as those of a ring beside them."""
     sides = np.array(["" if b.fixed else b.part for b in blocks])[pairs]
     of = np.array([owner.part for owner in owners])
-    found = {}
+    found = dict[int, tuple[str, str]]()
     for ring in dict.fromkeys(owner.part for owner in owners if owner.role == "ring"):
         inner = (sides == ring).all(axis=1)
         usual = float(np.median(depths[inner])) if inner.any() else np.inf
         # faces of stones of neither: the part beside them, and away from the stone
         faces: dict[int, list[tuple[str, Array]]] = {}
+        beds, links = dict[int, Array](), list[tuple[int, int, Array]]()
         for number in np.flatnonzero((np.abs(depths / usual - 1.0) < 0.05) & ~inner):
             pair, normal = pairs[number].tolist(), normals[number]
             for (a, b), away in ((pair, normal), (pair[::-1], -normal)):
                 stone, near = blocks[a], blocks[b]
                 if stone.fixed or near.fixed or near.role == "other":
                     continue
+                links.append((a, b, away))
                 broad = bool(np.median(depths[of == near.part].tolist() or [0.0]) > 1.3 * usual)
                 if stone.role == "other" and (of[number] == ring or broad):
                     faces.setdefault(a, []).append((near.part, away))
                 elif stone.part == near.part and stone.role == "pier" and broad and away[1] < 0.0:
-                    found[a] = f"whose joint is as deep as those of '{ring}'", f"'{ring}'"
+                    beds[a] = away
+        # a loose stone beside the springing touches the back of the ring at most
+        up = {(a, b) for a, b, away in links if a in beds and beds[a] @ away < -0.7}
+        own = {*pairs[inner].ravel().tolist()}
+        while more := {a for a, b in up if b in own} - own:
+            own |= more
+            why = f"whose joint is as deep as those of '{ring}'"
+            found |= dict.fromkeys(more, (why, f"'{ring}'"))
         for a, touched in faces.items():
             towards = np.array([away for _, away in touched])
             if ring in dict(touched) and (towards @ towards.T).min() < -0.7:

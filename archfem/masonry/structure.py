@@ -656,11 +656,11 @@ def find_clear_spans(structure: Structure) -> dict[str, tuple[float, float]]:
 
 
 def _list_springer_beds(structure: Structure, springing: Joint) -> list[tuple[float, float]]:
-    """Return both ends of the beds of a pier below the springer at a joint [m]."""
-    foot = min(springing.intrados[1], springing.extrados[1])
-    foot -= CONTACT_TOLERANCE * structure.size
-    beds = (x for x in structure.joints if x.role == "pier" and {*x.blocks} & {*springing.blocks})
-    below = (bed for bed in beds if max(bed.intrados[1], bed.extrados[1]) < foot)
+    """Return both ends of the beds of a pier on which the springer at a joint stands [m]."""
+    centres = dict(zip(springing.blocks, structure.centroids[[*springing.blocks], 1], strict=True))
+    beds = (each for each in structure.joints if each.role == "pier")
+    # a loose stone beside the ring stands on the springer
+    below = (x for x in beds if any(centres.get(k, -np.inf) > x.middle[1] for k in x.blocks))
     ends = (sorted((bed.intrados[0], bed.extrados[0])) for bed in below)
     return [(low, high) for low, high in ends]
 
@@ -677,18 +677,25 @@ def describe_spans(structure: Structure) -> str:
 
 
 def describe_piers(structure: Structure) -> dict[str, str]:
-    """Describe breadth and clear height of each pier."""
+    """Describe breadth and clear height of each pier, below the ring that it bears."""
     piers = dict[str, str]()
     # the beds of a wall in bond are parts of its breadth
     walls = {structure.joints[number].part for number in np.flatnonzero(structure.heads)}
     beds = [j for j in structure.joints if j.role == "pier" and j.part not in walls]
+    rings = [joint for joint in structure.joints if joint.role == "ring"]
+    springers = {k for joint in rings for k in joint.blocks}.intersection(structure.free)
     for part in dict.fromkeys(joint.part for joint in beds):
         own = [joint for joint in beds if joint.part == part]
+        # what is on a springer stands beside the ring
+        on = [structure.centroids[k, 1] for bed in own for k in springers & {*bed.blocks}]
+        own = [bed for bed in own if bed.middle[1] < max(on, default=np.inf)]
+        if not own:
+            continue
         base, parts = min(joint.intrados[1] for joint in own), structure.blocks
         clear = [
             joint.intrados[1] - base
-            for joint in structure.joints
-            if joint.role == "ring" and part in {parts[number].part for number in joint.blocks}
+            for joint in rings
+            if part in {parts[number].part for number in joint.blocks}
         ]
         tops = [block.points[:, 1].max() for block in parts if block.part == part]
         broad, tall = min(joint.depth for joint in own), max(tops, default=np.inf) - base

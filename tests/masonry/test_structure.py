@@ -382,6 +382,47 @@ def test_a_clear_span_ends_at_the_piers_below_springers():
     assert find_clear_spans(arch) == {"arch": (0.5, 3.5)}
 
 
+@pytest.mark.parametrize("flush", [False, True])
+@pytest.mark.parametrize("loose", ["pier", "corner"])
+def test_loose_stones_beside_a_springing_are_no_part_of_breadth_and_clear_span(loose, flush):
+    """Two on each pier, as broad as the ring is deep, below its foot since the top slopes.
+
+    Flush, the lower one lies on the back of the first voussoir, which is as long as deep.
+    """
+    top = {x: -0.01 * (x - 1.0) for x in (1.0, 1.4, 1.6, 1.8, 2.0)}  # by x from the middle [m]
+    outlines = {
+        "pier 1": [(1.0, -2.0), (2.0, -2.0), (2.0, -1.0), (1.0, -1.0)],
+        "pier 2": [(1.0, -1.0), (2.0, -1.0), (2.0, top[2.0]), (1.0, 0.0)],
+        f"{loose} 3": [(1.6, top[1.6]), (2.0, top[2.0]), (2.0, 0.3), (1.6, 0.3)],
+        f"{loose} 4": [(1.6, 0.3), (2.0, 0.3), (2.0, 0.6), (1.6, 0.6)],
+    }
+    inner, outer = (
+        [(r * np.cos(a), r * np.sin(a)) for a in np.linspace(np.pi, 0.0, 12)] for r in (1.0, 1.4)
+    )
+    outer[0], outer[-1] = (-1.4, top[1.4]), (1.4, top[1.4])
+    if flush:
+        (x, y), level = outer[-2], {1.4: top[1.4], 1.8: top[1.8]}
+        outlines[f"{loose} 3"] = [*level.items(), (1.8, y), (x, y)]
+        outlines[f"{loose} 4"] = [(x, y), (1.8, y), (1.8, 0.8), (x, 0.8)]
+    stones = [[inner[k], inner[k + 1], outer[k + 1], outer[k]] for k in range(11)]
+    blocks = [af.Block(tuple(own), af.STONE, f"{k}", part="arch") for k, own in enumerate(stones)]
+    for side, sign in (("west", -1), ("east", 1)):
+        for name, points in outlines.items():
+            corners = tuple((sign * x, y) for x, y in points[::sign])
+            part = f"{side} {name[:-2]}"
+            blocks.append(af.Block(corners, af.STONE, f"{side} {name}", part=part, role="pier"))
+    post = ((3.0, -2.0), (3.5, -2.0), (3.5, 0.0), (3.0, 0.0))
+    blocks.append(af.Block(post, af.STONE, "post", part="post"))
+    rock = ((-2.0, -3.0), (4.0, -3.0), (4.0, -2.0), (-2.0, -2.0))
+    blocks.append(af.Block(rock, af.STONE, "rock", fixed=True, part="rock"))
+    made = af.masonry.assembled(blocks, af.masonry.STONE_TO_STONE)
+    assert describe_spans(made) == (
+        "clear span from -1.00 to 1.00 m; 'west pier' 1 m broad and 2 m high to the ring; "
+        "'east pier' 1 m broad and 2 m high to the ring; 'post' 0.5 m broad"
+    )
+    assert not made.misplaced
+
+
 @pytest.mark.parametrize(("gable", "joints"), [("pier", 6), ("ring", 8)])
 def test_the_clear_span_below_a_gable_is_that_of_the_intrados(gable, joints):
     """Two joints of the extrados begin at the springing too, where the gable is a ring."""
