@@ -410,9 +410,12 @@ class Structure(ResultDisplay):
                 away = f", {1e3 * gaps[nearest]:.3g} mm from '{nearest}', "
                 away += "which a larger snap of a drawing joins"
             names = join_names([f"'{block.name}'" for block in loose])
+            remedy = "join each, through others, to"
+            if not held:
+                remedy = "no block is fixed; add the ground, a closed outline and no line, as"
             raise InvalidStructure(
-                f"{before}blocks {names} rest on nothing: join each, through others, to a fixed "
-                "block, which has fixed = true, in a drawing by its layer; "
+                f"{before}blocks {names} rest on nothing: {remedy} a fixed block, which has fixed "
+                "= true, in a drawing by its layer; "
                 f"'{loose[0].name}' is at {say_place(as_point(loose[0].centroid))}{away}{after}"
             )
 

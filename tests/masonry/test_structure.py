@@ -48,6 +48,16 @@ def test_a_loose_block_is_named(stack):
         replace(stack, joints=stack.joints[:1])
 
 
+@pytest.mark.parametrize("fixed", [True, False])
+def test_where_nothing_is_fixed_the_ground_must_be_drawn(stack, fixed):
+    """As of a drawing whose ground is a line, which has been ignored."""
+    blocks = [replace(block, fixed=block.fixed and fixed) for block in stack.blocks]
+    with pytest.raises(af.errors.InvalidStructure) as refused:
+        replace(stack, blocks=tuple(blocks), joints=stack.joints[:1])
+    drawn = "no block is fixed; add the ground, a closed outline and no line, as a fixed block, "
+    assert (f"rest on nothing: {drawn}which has fixed = true" in str(refused.value)) != fixed
+
+
 def test_millimetres_are_refused():
     with pytest.raises(af.errors.InvalidStructure, match="smallest stone is 300 m large"):
         af.column(breadth=200.0, heights=[300.0, 400.0])
