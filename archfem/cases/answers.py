@@ -118,6 +118,7 @@ class Scales(NamedTuple):
     as_one: float | None = None  # at which a stack falls as one rigid body
     moves_in_all: bool = False  # whether it moves as a mechanism at all that were run
     again: Sequence[float] = ()  # beyond a fall, at which it stands
+    dislocated_stones: str = ""  # names of the first, in brackets
 
 
 Numbers = TypeVar("Numbers")
@@ -190,6 +191,7 @@ def state_scale(
         reached = [scale if scale < np.inf else None for scale in ends]
         scales = scales._replace(all_steps=reached[0], as_one=reached[1], again=found.above)
         scales = scales._replace(moves_in_all=found.moves_in_all)
+        scales = scales._replace(dislocated_stones=found.dislocated_stones)
     else:
         words += "; a fall was not computed"
     one = scales.as_one or np.inf  # at which it falls

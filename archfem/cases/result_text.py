@@ -147,7 +147,8 @@ def tabulate_runs(runs: Mapping[str, History]) -> ResultTable:
         apart = joints["open"].any("time")
         largest = size.max("time").where(~apart, 0.5)  # |e| is undefined while a joint is open
         horizontal, vertical = run.dataset["ground"].attrs["peaks"]
-        row = [name, verdict.outcome, str(len(verdict.doubts) or "none")]
+        stones = verdict.fall.dislocated_stones if verdict.fall else ""
+        row = [name, f"{verdict.outcome}{stones}", str(len(verdict.doubts) or "none")]
         row += [f"{horizontal:.2f} m/s²", f"{vertical:.2f} m/s²"]
         row.append(f"{format_ratio(float(size.max()))}{verdict.until}")
         row.append(str(joints["name"].values[int(largest.values.argmax())]))

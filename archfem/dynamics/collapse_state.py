@@ -60,7 +60,8 @@ class CollapseState:
     Attributes:
         kind: "stands", "dislocated", "partly fallen" or "fallen".
         time: time of the first frame with a lost block, None without [s].
-        blocks: names of the lost blocks, in the order of the structure.
+        blocks: names of the lost blocks, in the order of the structure; of a dislocated one those
+            of the stones displaced beyond the limit, the farthest first.
         displacement: largest displacement of any corner of a free stone, see `Verdict` [m].
         residual: the same at the end [m].
         resting: whether all blocks were at rest at the end, or vibrated too weakly to overturn; if
@@ -85,12 +86,23 @@ class CollapseState:
         return self.kind not in FALLEN_STATES and self.loose_share > MAX_LOOSE_SHARE
 
     @property
+    def dislocated_stones(self) -> str:
+        """Names of the stones that are dislocated, in brackets behind a space; "" for none."""
+        return name_stones(self.blocks) if self.kind == COLLAPSE_STATES[1] else ""
+
+    @property
     def text(self) -> str:
-        """Kind of collapse, with the time and the lost blocks."""
+        """Kind of collapse, with the stones that are dislocated, or the time and those lost."""
         still = "" if self.resting else ", while blocks still move"
         if self.time is None:
-            return f"{self.kind}{still}"
+            return f"{self.kind}{self.dislocated_stones}{still}"
         return f"{self.kind}, first at {self.time:.2f} s; lost: {join_names(self.blocks)}{still}"
+
+
+def name_stones(names: Sequence[str], most: int = 3) -> str:
+    """Return names of stones in brackets behind a space, many shortened; "" for none."""
+    more = f" and {len(names) - most} more" * (len(names) > most)
+    return f" ({', '.join(names[:most])}{more})" * bool(names)
 
 
 @validate_arguments
@@ -111,13 +123,13 @@ def classify_collapse(
     """
     free = list_stones(structure)
     start = np.zeros((len(structure.blocks), 3)) if start is None else start
-    corners = _place_corners(structure, list_own_stones(structure))
-    origin, farthest, residual = corners(start), 0.0, 0.0
+    owner, corners = _place_corners(structure, list_own_stones(structure))
+    origin, farthest, moved = corners(start), 0.0, np.zeros(len(owner))
     find_lost = mark_lost(structure)
     lost, time, last = np.zeros(len(free), dtype=bool), None, None
     for last in frames:
-        residual = float(np.linalg.norm(corners(last.poses) - origin, axis=1).max())
-        farthest = max(farthest, residual)
+        moved = np.linalg.norm(corners(last.poses) - origin, axis=1)
+        farthest = max(farthest, float(moved.max()))
         lost |= find_lost(last.poses)
         if time is None and lost.any():
             time = last.time
@@ -126,12 +138,17 @@ def classify_collapse(
             "a run of no frames says nothing: give those of RigidBlockSimulation.frames"
         )
     numbers = [number for number, gone in zip(free, lost, strict=True) if gone]
+    kind = _fallen_kind(structure, numbers)
+    if not numbers:
+        order, limit = np.argsort(-moved), DISLOCATION * shallowest_part(structure)[0]
+        numbers = [*dict.fromkeys(owner[order][moved[order] > limit].tolist())]
+        kind = COLLAPSE_STATES[len(numbers) > 0]
     return CollapseState(
-        _collapse_kind(structure, numbers, residual),
+        kind,
         time,
         tuple(structure.blocks[number].name for number in numbers),
         farthest,
-        residual,
+        float(moved.max()),
         bool(getattr(last, "resting", False)),
     )
 
@@ -145,10 +162,8 @@ def mark_lost(structure: Structure) -> Callable[[Array], Flags]:
     )
 
 
-def _collapse_kind(structure: Structure, lost: list[int], residual: float) -> str:
-    """Return the kind of collapse."""
-    if not lost:
-        return COLLAPSE_STATES[int(residual > DISLOCATION * shallowest_part(structure)[0])]
+def _fallen_kind(structure: Structure, lost: list[int]) -> str:
+    """Return the kind of collapse with lost blocks."""
     blocks = structure.blocks
     roles = {blocks[number].role for number in structure.free}
     role = next((role for role in ("ring", "pier") if role in roles), None)
@@ -234,8 +249,10 @@ def doubt_soft_blocks(*structures: Structure) -> tuple[Doubt, ...]:
     return tuple(Doubt(cause, remedy) for cause, names in causes.items() if names)
 
 
-def _place_corners(structure: Structure, blocks: Sequence[int]) -> Callable[[Array], Array]:
-    """Return a function from poses to corners of blocks, relative to centroids as built [m]."""
+def _place_corners(
+    structure: Structure, blocks: Sequence[int]
+) -> tuple[Array, Callable[[Array], Array]]:
+    """Return blocks of corners, and a function from poses to these, from centroids as built [m]."""
     corners = [np.asarray(structure.blocks[k].points) - structure.centroids[k] for k in blocks]
     owner, arms = np.repeat(blocks, [len(each) for each in corners]), np.concatenate(corners)
-    return lambda poses: poses[owner, :2] + rotate(arms, poses[owner, 2])
+    return owner, lambda poses: poses[owner, :2] + rotate(arms, poses[owner, 2])

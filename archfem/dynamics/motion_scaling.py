@@ -11,7 +11,7 @@ from archfem._display import call_late_bound
 from archfem._files import align_columns
 from archfem._validation import validate_arguments, validate_methods
 from archfem.dynamics.analysis import Analysis, takes_analysis, takes_falling_analysis
-from archfem.dynamics.collapse_state import doubt_soft_blocks
+from archfem.dynamics.collapse_state import doubt_soft_blocks, name_stones
 from archfem.dynamics.events import EveryMechanism, applicable_definitions
 from archfem.dynamics.fall import state_rigid_falls
 from archfem.dynamics.history import Ending, History, first_mechanisms, partial_history
@@ -169,7 +169,7 @@ class CollapseScale:
         if self.above:
             met = f"{met}, and {say_again(self.above)}"
         if self.dislocated < inf:
-            met = f"dislocated at {self.dislocated:#.3g} ×, {met}"
+            met = f"dislocated at {self.dislocated:#.3g} ×{self.dislocated_stones}, {met}"
         if self.moves <= max(self._stood):
             met = f"a mechanism at {self.moves:#.3g} ×{' or less' * self.moves_in_all}, {met}"
         said, first = say_bracket("stands", self, met), self.as_one
@@ -299,6 +299,12 @@ class CollapseScale:
         return min((at for at, kind in self._list_held() if kind == "dislocated"), default=inf)
 
     @property
+    def dislocated_stones(self) -> str:
+        """Names of the stones that were dislocated at that scale, in brackets; "" for none."""
+        falls = (run.fall for run in self._runs if run.scale == self.dislocated)
+        return name_stones([*dict.fromkeys(x for fall in falls if fall for x in fall.blocks)])
+
+    @property
     def held(self) -> float:
         """Largest scale at which it stood below any at which it did not [-]; 0 for none.
 
@@ -356,7 +362,7 @@ class CollapseScale:
                 f"{1e3 * dt:g} ms",
                 f"{run.scale:.3g}",
                 "as given",
-                fall.kind if fall else "no answer",
+                f"{fall.kind}{fall.dislocated_stones}" if fall else "no answer",
                 f"{fall.time:.2f} s" if fall and fall.time is not None else "-",
                 f"{fall.residual:.3g} m" if fall else "-",
             ]

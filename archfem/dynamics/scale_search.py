@@ -264,18 +264,21 @@ def search_scales(
 
     The first ones are at `begin`; those that were `found` before are kept.
     """
-    scales = found or MechanismScales(definitions)
+    scales, made = found or MechanismScales(definitions), ""
     try:
         with ProgressReport(f"scale of {name or 'the motion'}", None) as progress:
             while (scale := _next_scale(scales, precision, between, begin)) is not None:
                 began = perf_counter()
+                progress.show("; ".join(filter(None, [made, f"now {scale:#.3g} ×"])))
                 run = run_scaled(scale)
                 seconds = perf_counter() - began
                 if run.ending is Ending.INTERRUPTED:  # says nothing about the scale
                     raise KeyboardInterrupt
                 scales = scales.with_run(run)
-                result = run.fall.kind if run.fall else run.outcome
-                progress.show(f"{scale:#.3g} × the motion: {result}, in {seconds:.2g} s", 1)
+                fall = run.fall
+                result = f"{fall.kind}{fall.dislocated_stones}" if fall else run.outcome
+                made = f"{scale:#.3g} × the motion: {result}, in {seconds:.2g} s"
+                progress.show(made, 1)
     except KeyboardInterrupt:
         scales = replace(scales, interrupted=True)
     return scales

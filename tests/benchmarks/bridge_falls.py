@@ -74,7 +74,7 @@ def row(fill: str, scale: float, run: af.History, stones: np.ndarray, cost: floa
         f"{scale:.3g}",
         fall.kind if fall else "-",
         f"{fall.time:.2f}" if fall and fall.time is not None else "-",
-        str(len(fall.blocks)) if fall else "-",
+        str(len(fall.blocks) * (fall.time is not None)) if fall else "-",  # those lost
         f"{opening / mm:.1f}",
         f"{slip / mm:.1f}",
         f"{fall.residual / mm:.1f}" if fall else "-",

@@ -281,6 +281,25 @@ def test_what_fails_under_a_motion_that_was_not_scaled_has_a_margin_below_one(ca
     assert said in plain
 
 
+def test_the_stones_that_are_dislocated_stand_beside_each_scale_and_run(case):
+    """Under a motion that was scaled, and one that was not."""
+    every = {"a": verdict_of(), "b": verdict_of("dislocated")}
+    every["b"].fall = af.dynamics.CollapseState("dislocated", None, ("WC",), 0.1, 0.1, True)
+    data = data_of(case, **every)
+    vars(data)["pairs"] = tuple("ab")
+    scaled = scales("a", 1.4, dislocated=1.5, falls=2.0, dislocated_stones=" (EC, WC)")
+    said = say_margin(data, scale=state("scale", scaled))
+    assert said[2].endswith(" first is dislocated (EC, WC) at 1.50 × and falls at 2.00 ×")
+    vars(data)["statements"] = {
+        "scale": state("scale", scaled._replace(held=0.9, states={"dislocated": 0.95}))
+    }
+    plain = dict(conclusion.list_facts(data))["verdict"]
+    assert "it is dislocated (WC) but stands under 1 of 2 motions of PGA 0.20 g: b; it" in plain
+    assert "It is first dislocated (EC, WC) at 0.19 g under 'a' (" in plain  # 0.95 × 0.2 g
+    assert "Under 'a' it stands at 1.00 ×, but is dislocated (EC, WC) at 0.950 ×: not" in plain
+    assert "loses" not in conclusion.build_conclusion(data).pieces[0].text
+
+
 def test_the_box_has_the_push_and_no_scale_of_a_fill_in_tension_at_all(case):
     data = data_of(case, a=verdict_of())
     push = PushFactors(0.737, 1.65, "the demand of 0.15 g")

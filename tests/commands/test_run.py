@@ -280,7 +280,8 @@ def test_a_range_is_of_each_motion_of_a_suite_and_replaces_none_of_another(
         pytest.param(
             "large",
             "step",
-            r"tap: stands at \S+ g \(.*\), a mechanism at 0.976 ×, dislocated at \S+ ×, falls",
+            r"tap: stands at \S+ g \(.*\), a mechanism at 0.976 ×, dislocated at "
+            r"\S+ × \(block 1\), falls",
             marks=pytest.mark.slow,
         ),
         ("small", "mechanism", r"tap: no mechanism at \S+ g \(.*, first mechanism at .*, by "),

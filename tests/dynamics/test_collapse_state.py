@@ -44,6 +44,27 @@ def test_a_block_that_has_slid_is_dislocated():
     assert found.residual == pytest.approx(slid, rel=5e-3)  # the pulse ends 0.5 ms later
 
 
+@pytest.mark.parametrize(
+    ("moved", "said"),
+    [
+        ([0.0, 0.05, 0.049, 0.0, 0.0], ""),
+        ([0.0, 0.051, 0.049, 0.0, 0.0], " (block 2)"),
+        ([0.06, 0.05, 0.08, 0.04, 0.07], " (block 3, block 5, block 1)"),
+        ([0.06, 0.051, 0.08, 0.09, 0.07], " (block 4, block 3, block 5 and 2 more)"),
+    ],
+)
+def test_the_stones_that_are_dislocated_are_named_the_farthest_first(moved, said):
+    """Of drums 0.5 m broad, so beyond 50 mm; as far in earlier frames says nothing."""
+    column = af.column(breadth=0.5, heights=[0.5] * 5)
+    frames = [LooseBlocks.as_built(column, time) for time in (1.0, 2.0)]
+    free = list(column.free)
+    frames[0].poses[free, 0], frames[1].poses[free, 0] = 0.1, moved
+    found = classify_collapse(column, frames)
+    kind = "dislocated" if said else "stands"
+    assert (found.kind, found.dislocated_stones) == (kind, said)
+    assert found.text == f"{kind}{said}, while blocks still move"
+
+
 def test_a_toppled_column_has_fallen():
     column = af.column(breadth=0.6, heights=[2.4])
     found = shaken(column, pulse(0.4, 1.0))

@@ -1,5 +1,6 @@
 """Scale factors at first mechanism: closed form, whole runs, the search on made-up runs."""
 
+import re
 from dataclasses import replace
 from functools import partial
 from itertools import pairwise
@@ -11,6 +12,7 @@ import pytest
 from glued import glued
 
 import archfem as af
+from archfem._display import ProgressReport
 from archfem.cases import answers
 from archfem.dynamics import CollapseScale, mechanism_scales, motion_scaling
 from archfem.dynamics.collapse_state import CollapseState
@@ -101,6 +103,27 @@ def test_lines_of_a_search_name_its_motion(monkeypatch, capsys):
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) > 3
     assert all(line.startswith("scale of first: ") for line in lines)
+
+
+def test_lines_within_a_run_name_its_scale_behind_what_the_last_one_found(monkeypatch, capsys):
+    monkeypatch.setattr("archfem._display.PROGRESS_INTERVAL", 0.0)
+
+    def shaken(scale):
+        with ProgressReport("loose blocks", None) as progress:
+            progress.show(f"at {scale:#.3g}")
+        kind, stones = ("dislocated", ("WC",)) if scale > 1.2 else ("stands", ())
+        fall = CollapseState(kind, None, stones, 0.1, 0.1, True)
+        return ScaledRun(scale, {}, Ending.FINISHED, "", fall)
+
+    search_scales(shaken, ("collapse",), 0.5, (1.0, 1.5), name="first")
+    lines = capsys.readouterr().err.splitlines()
+    within = [re.sub(r"in \S+ s", "in t s", x) for x in lines if "loose blocks" in x]
+    assert within[:3] == [
+        "scale of first: now 1.00 ×; loose blocks: at 1.00",
+        "scale of first: 1.00 × the motion: stands, in t s; now 1.41 ×; loose blocks: at 1.41",
+        "scale of first: 1.41 × the motion: dislocated (WC), in t s; now 1.50 ×; loose blocks: "
+        "at 1.50",
+    ]
 
 
 def searched(fails, *, ended=lambda scale: Ending.FINISHED, precision=0.05, between=(0.05, 5.0)):
@@ -492,6 +515,18 @@ def test_smaller_scales_at_which_it_is_dislocated_are_said():
     rocks = Doubt(ROCKS_SOFTLY, "", (0.44, 0.1))
     soft = [replace(run, doubts=(rocks,) * (k > 1)) for k, run in enumerate(found.runs)]
     assert str(CollapseScale({0.005: replace(found, runs=tuple(soft))})).startswith(said[:56])
+    parted = [  # by 1.1 × the first names, at larger scales others
+        replace(run, fall=replace(run.fall, blocks=tuple("abcdefg"[k:] if k else "")))
+        for k, run in enumerate(runs[:3])
+    ]
+    named = CollapseScale({0.005: replace(found, runs=(*parted, *runs[3:]))})
+    assert ", dislocated at 1.10 × (b, c, d and 3 more), falls at 1.40 ×" in str(named)
+    cells = [row[3] for row in named.rows()[1]]
+    assert cells[:3] == [
+        "stands",
+        "dislocated (b, c, d and 3 more)",
+        "dislocated (c, d, e and 2 more)",
+    ]
     bound = CollapseScale({0.005: replace(found, runs=(*runs[:1], runs[1], found.runs[-1]))})
     assert "; stands at every smaller scale that was run" in str(bound)
 

@@ -38,6 +38,7 @@ from archfem.dynamics.collapse_state import (
     FALLEN_STATES,
     RANGE_REMEDY,
     CollapseState,
+    name_stones,
 )
 from archfem.dynamics.history import History
 from archfem.dynamics.rigid_body.rocking_body import describe_first_fall, say_scale
@@ -55,7 +56,7 @@ _VERBS = {
     "partly fallen": ("falls in part", "does not survive"),
     "unknown": ("has no known outcome", "may or may not survive"),
     "mechanism": ("becomes a mechanism", "may or may not survive"),
-    "dislocated": ("is dislocated but stands", "survives with damage"),
+    "dislocated": ("is dislocated{} but stands", "survives with damage"),
     "stands": ("stands", "survives"),
     "no mechanism": ("forms no mechanism", "survives"),
 }
@@ -572,9 +573,11 @@ def _describe_outcomes(data: ReportData) -> Iterator[str]:
     """Yield each outcome with the motions that lead to it, and the largest displacement."""
     total = len(data.runs) + len(data.missing)
     for outcome, (verb, _) in _VERBS.items():
-        names = [name for name, run in data.runs.items() if run.verdict.outcome == outcome]
-        if not names:
+        own = {k: run.verdict for k, run in data.runs.items() if run.verdict.outcome == outcome}
+        if not own:
             continue
+        names, falls = [*own], [x.fall for x in own.values() if x.fall]
+        verb = verb.format(name_stones([*dict.fromkeys(x for fall in falls for x in fall.blocks)]))
         of = f"of {_describe_peaks(data.runs[name] for name in names)}"
         under = f"{len(names)} of {total} motions {of}: {', '.join(names)}"
         if len(names) == total:
@@ -590,7 +593,7 @@ def _describe_ends(data: ReportData) -> Iterator[str]:
     for name, run in data.runs.items():
         if run.verdict.incomplete:
             yield f"the run under '{name}' {run.verdict.incomplete}"
-    if lost := {f"'{name}'": fall for name, fall in falls.items() if fall and fall.blocks}:
+    if lost := {f"'{k}'": fall for k, fall in falls.items() if fall and fall.time is not None}:
         which = describe_lost(data.case.structure, [*lost.values()])
         yield f"under {join_words([*lost])} it loses {which}"
     if moving := [f"'{name}'" for name, fall in falls.items() if fall and not fall.resting]:

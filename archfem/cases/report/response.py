@@ -190,7 +190,7 @@ def _build_mechanism(data: ReportData, run: History) -> list[Any]:
     lines = [f"Outcome: {summarise_outcome(data, run)}"]
     if len(data.runs) == 1:  # of several there are tables
         lines += [f"In doubt: {doubt.cause}" for doubt in verdict.doubts]
-        if fall is not None and fall.blocks:
+        if fall is not None and fall.time is not None:
             lines.append(f"lost: {describe_lost(data.case.structure, [fall])}")
     lines.append(f"Mechanism: {describe_mechanism(verdict)}")
     # the assumptions name the law of closing, and whether it was varied
@@ -213,7 +213,7 @@ def _build_suite_response(data: ReportData) -> list[Any]:
     lost = [
         (name, f"{len(fall.blocks)}", f"{fall.time:.2f} s", list_lost(structure, fall.blocks))
         for name, fall in falls.items()
-        if fall is not None and fall.blocks
+        if fall is not None and fall.time is not None
     ]
     if lost:
         tables.append(Grid(("run", "lost", "the first at", "blocks"), lost, "Lost blocks", "words"))

@@ -45,12 +45,18 @@ def _list_unscaled(data: ReportData) -> dict[str, tuple[str, float]]:
     return {name: (_FAILURES[x.verdict.outcome], peak_of_ground(x)) for name, x in failed.items()}
 
 
+def _say_state(state: str, stones: str, first: bool = False) -> str:
+    """Return a state in words, with the stones that are dislocated."""
+    return f"{_STATES[state][first]}{stones * (state == COLLAPSE_STATES[1])}"
+
+
 def find_first_failures(data: ReportData) -> Iterator[tuple[str, str]]:
     """Yield each first failure over all motions: in a few words, and with all that is known."""
     # without a scale that holds, a fill bears tension at all of them
     searches = [x for x in list_scales(data) if x.held or "tension" not in x.states]
     unscaled, least = _list_unscaled(data), np.inf
     several, count = len(searches) + len(unscaled) > 1, len(data.runs)
+    stones = {x.motion: x.dislocated_stones for x in searches}
     some = [f"of {len(searches)} of {count} motions scaled"] * (len(searches) < count)
     some += [UNFINISHED] * any(x.unfinished for x in searches)
     for state in ("falls", "dislocated", "mechanism"):
@@ -69,8 +75,9 @@ def find_first_failures(data: ReportData) -> Iterator[tuple[str, str]]:
         motion = f"'{name}'" if several or count > 1 else "the motion"
         peaks = Ends.of(scale * peak for scale, peak in first.values())
         beside = f" ({', '.join(notes)})" * bool(notes)
-        words = f"{_STATES[state][1]} at {least:#.3g} × {motion}, {peaks:.3g} g{beside}"
-        short = f"{_STATES[state][1]} at {peaks[0]:.3g} g under {motion}"
+        verb = _say_state(state, stones.get(name, ""), first=True)
+        words = f"{verb} at {least:#.3g} × {motion}, {peaks:.3g} g{beside}"
+        short = f"{verb} at {peaks[0]:.3g} g under {motion}"
         yield short + f" ({', '.join(some)})" * bool(some), words
 
 
@@ -80,7 +87,7 @@ def say_fragile(data: ReportData) -> Iterator[str]:
         run = data.runs.get(search.motion)
         outcome = run.verdict.outcome if run else ""
         weaker = [
-            (search.states[state], _STATES[state][0])
+            (search.states[state], _say_state(state, search.dislocated_stones))
             for state in ("falls", "dislocated")
             if search.states.get(state, 1.0) < 1.0 and _FAILURES.get(outcome) != state
         ]
@@ -111,7 +118,8 @@ def describe_scales(data: ReportData) -> Iterator[tuple[float, list[str]]]:
     words += ", which it fails" * (met <= 1.0)
     words += f", of {len(made)} motions" * (len(made) > 1)
     less = {"moves": " or less" * first.moves_in_all}
-    ends = [f"{_STATES[x][0]} at {scale:#.3g} ×{less.get(x, '')}" for x, scale in states.items()]
+    words_of = {x: _say_state(x, first.dislocated_stones) for x in states}
+    ends = [f"{words_of[x]} at {scale:#.3g} ×{less.get(x, '')}" for x, scale in states.items()]
     if not {"falls", "mechanism"} & states.keys():
         ends += ["falls at none"]
     elif first.again:  # a crossing is not claimed
