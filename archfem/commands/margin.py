@@ -110,13 +110,14 @@ def scale(options: argparse.Namespace) -> int:
         doubts += doubt_pieces(case.structure)
     files: Files = {**answers.state_scale(found, motion, doubts)}
     doubts += found.doubts
-    text = "\n".join([f"{motion.name}: {found}", *mark_remarks(doubts), "", found.table()])
-    files["scale.txt"] = text
+    lines = [f"{motion.name}: {found}", *mark_remarks(doubts), "", found.table()]
     if isinstance(found, CollapseScale):
         from archfem.view.studies import draw_scale
 
+        lines[1:1] = filter(None, [found.mechanism])
         limit = DISLOCATION * shallowest_part(case.structure)[0]
         files["scale.png"] = draw_scale(found, limit)
+    files["scale.txt"] = text = "\n".join(lines)
     if found.interrupted:
         runs = [(dt, asdict(run)) for (dt, _), run in found.kept_runs.items()]
         files[KEPT_RUNS] = json.dumps(runs)

@@ -69,6 +69,8 @@ class CollapseState:
         admissible_step: time step that follows sliding; infinite where that of the run does [s].
         loose_share: share of the Arias intensity of the ground that loose blocks were followed
             through, without elastic joints [-].
+        mechanism: joints of rings and piers that had failed when blocks became loose, of a fall, in
+            words such as "by hinges (arch, joints 0 and 7) at 3.405 s, the last with joints".
     """
 
     kind: str
@@ -79,6 +81,7 @@ class CollapseState:
     resting: bool
     admissible_step: float = inf
     loose_share: float = 0.0
+    mechanism: str = ""
 
     @property
     def lacks_joints(self) -> bool:

@@ -21,6 +21,7 @@ from archfem.dynamics.verdict import (
     ALL_DEFINITIONS,
     Verdict,
     brief_mechanism_remarks,
+    describe_failed_joints,
     detect_mechanisms,
     doubt_soft_joints,
     doubt_unassessed_joints,
@@ -279,7 +280,10 @@ class History(ResultDisplay):
         attrs = self.dataset.attrs
         if "fall" not in attrs:
             return None
-        time = float(attrs["fall_time"])
+        time, mechanism = float(attrs["fall_time"]), ""
+        if not np.isnan(time) and "fall_pose" in self.dataset:  # pictures show this instant too
+            loose = float(self.dataset["fall_time"][0])
+            mechanism = describe_failed_joints(self.joints.sel(time=loose, method="nearest"))
         return CollapseState(
             str(attrs["fall"]),
             None if np.isnan(time) else time,
@@ -289,6 +293,7 @@ class History(ResultDisplay):
             bool(attrs["fall_resting"]),
             float(attrs.get("admissible_step", np.inf)),
             float(attrs["fall_loose_share"]),
+            mechanism,
         )
 
     @cached_property
@@ -305,6 +310,8 @@ class History(ResultDisplay):
         remarks = [] if self.ending is Ending.FINISHED else [f"the run {self.outcome}"]
         if self.ending is Ending.INTERRUPTED:
             remarks[0] += ", and no mechanism was verified"
+        if self.fall is not None and self.fall.mechanism:
+            remarks.append(f"it falls {self.fall.mechanism}")
         if self.structure is not None and self.fall is not None and self.fall.time is None:
             remarks.append(describe_dislocation(self.structure))
         farthest, standing = find_farthest(self.dataset, self.structure)

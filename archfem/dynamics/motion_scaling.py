@@ -185,6 +185,13 @@ class CollapseScale:
         varied = f"; varied were the scale and the time step ({steps} ms), and no property"
         return f"{self.sentence}{self._say_tested()}{varied}"
 
+    @property
+    def mechanism(self) -> str:
+        """Joints by which it falls at the smallest such scale, in words; "" if unknown."""
+        falls = (run.fall for run in self._runs if run.scale == self._least_fall)
+        by = next((fall.mechanism for fall in falls if fall and fall.mechanism), "")
+        return f"at {self._least_fall:#.3g} × it falls {by}" if by else ""
+
     def _say_tested(self) -> str:
         """Return in words how closely scales were run up to `lower`; "" where none stands."""
         stood = sorted({scale for scale, _ in self._list_held()})

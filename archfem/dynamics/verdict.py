@@ -31,7 +31,7 @@ from archfem.limit.mechanism_kinematics import first_verified_mechanism
 from archfem.masonry.parts import find_backs, find_directions
 from archfem.masonry.standing import find_bodies, list_own_stones
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
-from archfem.masonry.structure import Structure, join_names
+from archfem.masonry.structure import Structure, join_joint_names, join_names, join_words
 from archfem.models.model import Doubt
 from archfem.units import format_mm, mm
 
@@ -285,6 +285,19 @@ def doubt_soft_joints(
     if fall.time is None and moved > limit and largest > 1.0 / 3.0:
         remedy = "count hinges from a smaller |e|, `criteria.hinge`, and see `archfem limit`"
         yield Doubt(ROCKS_SOFTLY, remedy, (largest, moved))
+
+
+def describe_failed_joints(joints: xr.Dataset) -> str:
+    """Return the assessed joints that have failed at an instant in words; "" without any."""
+    own = assessed_joints(joints)
+    kinds = {"hinges": own["hinge"] != 0, "slides": own["slide"], "gaps": own["open"]}
+    words = [
+        f"{kind} ({join_joint_names(own['name'].values[flags.values].tolist(), most=16)})"
+        for kind, flags in kinds.items()
+        if flags.any()
+    ]
+    at = f" at {float(joints['time']):.3f} s, the last with joints"
+    return f"by {join_words(words)}{at}" if words else ""
 
 
 def find_farthest(

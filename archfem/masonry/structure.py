@@ -79,9 +79,9 @@ def join_words(words: Sequence[str]) -> str:
     return " and ".join(filter(None, [", ".join(words[:-1]), *words[-1:]]))
 
 
-def join_joint_names(names: Sequence[str]) -> str:
+def join_joint_names(names: Sequence[str], most: int = 8) -> str:
     """Join names of joints, as in "north pier, base; main arch, joints 0, 5 and 11"."""
-    return _shorten_list(names, _group_by_stem, "; ")
+    return _shorten_list(names, _group_by_stem, "; ", most)
 
 
 def list_or_count(names: Sequence[str], most: int = 16) -> str:
@@ -91,10 +91,12 @@ def list_or_count(names: Sequence[str], most: int = 16) -> str:
     return join_joint_names(names)
 
 
-def _shorten_list(names: Sequence[str], put: Callable[[Sequence[str]], str], comma: str) -> str:
+def _shorten_list(
+    names: Sequence[str], put: Callable[[Sequence[str]], str], comma: str, most: int = 8
+) -> str:
     """Join a list; of a long one both ends, with its length."""
     # longer lists of names in messages lose their middle
-    if len(names) <= 8:
+    if len(names) <= most:
         return put(names)
     return f"{put(names[:4])}{comma}…{comma}{put(names[-4:])} ({len(names)} in all)"
 

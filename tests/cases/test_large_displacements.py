@@ -9,7 +9,7 @@ import pytest
 import xarray as xr
 
 import archfem as af
-from archfem.cases.report.conclusion import build_conclusion, list_facts
+from archfem.cases.report.conclusion import _describe_ends, build_conclusion, list_facts
 from archfem.cases.report.report_data import ReportData
 from archfem.cases.report.response import _build_mechanism, summarise_outcome
 from archfem.cases.result_text import tabulate_runs
@@ -192,3 +192,8 @@ def test_a_report_has_the_number_of_lost_stones_of_each_part(held):
     stated, *_ = [b.text for b in _build_mechanism(data, run) if hasattr(b, "text")]
     lost = f"Lost: 12 blocks, the first at 1.25 s: {short}. Mechanism: "
     assert stated.startswith(f"Outcome: {words}. {lost}")
+    run = with_fall(held, fall)
+    vars(run)["fall"] = replace(fall, mechanism="by hinges (base) at 1.000 s, the last with joints")
+    (ends,) = _describe_ends(ReportData(case, {"shake": run}))
+    assert ends.endswith(f": {short}; it falls by hinges (base) at 1.000 s, the last with joints")
+    assert "\nit falls by hinges (base) at 1.000 s" in str(run.verdict)

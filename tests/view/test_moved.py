@@ -6,6 +6,7 @@ from bonded import bonded_wall
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 import archfem as af
+from archfem.masonry.structure import join_joint_names
 from archfem.view.joint_marks import joint_marks
 from archfem.view.positions import FallingBlocks, decisive_instant, rotate
 
@@ -158,6 +159,20 @@ def test_a_wall_shows_the_instant_at_which_it_is_farthest_apart():
     assert decisive_instant(af.History(dataset)) == 2.0
     dataset["opening"][3, 5] = 1.5e-3
     assert decisive_instant(af.History(dataset, wall)) == 3.0
+
+
+def test_the_joints_of_a_fall_are_those_of_its_picture(toppled):
+    structure, time = toppled.structure, decisive_instant(toppled)
+    marks = joint_marks(structure, toppled.joints.sel(time=time, method="nearest"))
+    drawn = [
+        joint.name
+        for joint in structure.joints
+        if any(np.allclose(end, mark) for end in joint.ends for mark in marks.hinges)
+    ]
+    assert len(drawn) == len(marks.hinges) > 0 == len(marks.slips) + len(marks.gaps)
+    by = f"by hinges ({join_joint_names(drawn)}) at {time:.3f} s, the last with joints"
+    assert toppled.fall.mechanism == by
+    assert f"\nit falls {by}\n" in str(toppled.verdict)
 
 
 def test_a_joint_that_is_open_at_rest_does_not_decide(ring):

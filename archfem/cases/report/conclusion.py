@@ -595,6 +595,8 @@ def _describe_ends(data: ReportData) -> Iterator[str]:
             yield f"the run under '{name}' {run.verdict.incomplete}"
     if lost := {f"'{k}'": fall for k, fall in falls.items() if fall and fall.time is not None}:
         which = describe_lost(data.case.structure, [*lost.values()])
+        if len(lost) == 1 and (by := next(iter(lost.values())).mechanism):
+            which += f"; it falls {by}"
         yield f"under {join_words([*lost])} it loses {which}"
     if moving := [f"'{name}'" for name, fall in falls.items() if fall and not fall.resting]:
         yield f"blocks still move at the end of {join_words(moving)}"
