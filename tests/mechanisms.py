@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import xarray as xr
 
 import archfem as af
 
@@ -71,3 +72,22 @@ def failing(structure, hinges=(), sliding=(), apart=()):
         resultants[joint, 1] = ratio * WEIGHT
     resultants[list(apart)] = 0.0
     return af.joints.joint_dataset(structure, resultants)
+
+
+def history(structure, instants):
+    """Joints over time, one state a second, with an eccentricity for each joint given."""
+    steps = [failing(structure, hinges) for hinges in instants]
+    return xr.concat(steps, dim="time", coords="minimal", compat="override").assign_coords(
+        time=np.arange(len(instants), dtype=float)
+    )
+
+
+def twitching(part):
+    """The ring beside a pile that hinges at 1 s by 0.01 mm; the ring moves by 3 mm from 3 s on."""
+    structure = beside(part)
+    joints = history(structure, [{}, {len(structure.joints) - 1: 0.5}, {}, FOUR, FOUR, {}])
+    opening = np.zeros(joints["N"].shape)
+    opening[1, -1], opening[3:5, list(FOUR)] = 1e-5, [[1e-3], [3e-3]]
+    slip = np.full_like(opening, 0.1)  # at rest already
+    dims = joints["N"].dims
+    return structure, joints.assign(opening=(dims, opening), slip=(dims, slip))

@@ -30,7 +30,7 @@ from archfem.errors import filter_log
 from archfem.joints.criteria import assessed_joints, envelope, first_time, longest_duration
 from archfem.limit.collapse import Collapse, Outcome, describe_fill
 from archfem.limit.fill_strength import Fill, PlasticFill, as_pressure, has_backing
-from archfem.limit.mechanism_count import duration_text
+from archfem.limit.mechanism_count import Mechanism, duration_text
 from archfem.limit.rating import Rating
 from archfem.masonry.loads import Action, Settlement, describe_massless
 from archfem.masonry.standing import describe_carried, find_bodies
@@ -588,14 +588,22 @@ def format_ratio(value: float) -> str:
 
 
 def _mechanism_cell(verdict: Verdict, definition: str) -> str:
-    """Return the cell of a mechanism: class, time, duration and opening."""
+    """Return the cell of a mechanism, and of the first larger one if it is too small to matter."""
     if definition not in verdict.mechanisms:  # it does not apply, or the structure is unknown
         return "-"
     found = verdict.mechanisms[definition]
+    first = _say_course(verdict, found)
+    if found is None or found.below is None or found.larger is None:
+        return first
+    return f"{first}; beyond {format_mm(found.below)} {_say_course(verdict, found.larger)}"
+
+
+def _say_course(verdict: Verdict, found: Mechanism | None) -> str:
+    """Return class, time, duration and displacement of a mechanism in a few words."""
     if found is None:
         return f"none{verdict.until}"
     assert found.duration is not None  # a run has a duration
-    opening = "" if found.opening is None else f", {format_mm(found.opening)}"
+    opening = "" if found.opening is None else f", {format_mm(found.displacement)}"
     return f"{found.kind} {found.time:.2f} s, {duration_text(found.duration)}{opening}"
 
 

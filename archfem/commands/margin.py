@@ -144,12 +144,20 @@ def _unpack_runs(text: str) -> KeptRuns:
     made = {}
     for dt, run in json.loads(text):
         met = run["mechanisms"].items()
-        run["mechanisms"] = {name: x and Mechanism(**_with_tuples(x)) for name, x in met}
+        run["mechanisms"] = {name: _unpack_mechanism(x) for name, x in met}
         run["fall"] = run["fall"] and CollapseState(**_with_tuples(run["fall"]))
         run["ending"] = Ending(run["ending"])
         run["doubts"] = [Doubt(**_with_tuples(doubt)) for doubt in run["doubts"]]
         made[dt, run["scale"]] = ScaledRun(**_with_tuples(run))
     return made
+
+
+def _unpack_mechanism(values: dict[str, Any] | None) -> Mechanism | None:
+    """Return a mechanism that was written as JSON, or None."""
+    if values is None:
+        return None
+    larger = _unpack_mechanism(values["larger"])
+    return Mechanism(**_with_tuples({**values, "larger": larger}))
 
 
 def _with_tuples(values: dict[str, Any]) -> dict[str, Any]:

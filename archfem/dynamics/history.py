@@ -20,6 +20,7 @@ from archfem.dynamics.export import write_vtk, write_xdmf
 from archfem.dynamics.verdict import (
     ALL_DEFINITIONS,
     Verdict,
+    add_larger_mechanism,
     brief_mechanism_remarks,
     describe_failed_joints,
     detect_mechanisms,
@@ -300,8 +301,11 @@ class History(ResultDisplay):
     def mechanisms(self) -> dict[str, Mechanism | None]:
         """First mechanism by each definition that applies, or None."""
         # of a long run of a wall verification takes minutes, and Ctrl-C wants the end
-        interrupted = self.ending is Ending.INTERRUPTED
-        return detect_mechanisms(self.joints, None if interrupted else self.structure)
+        structure = None if self.ending is Ending.INTERRUPTED else self.structure
+        found = detect_mechanisms(self.joints, structure)
+        if structure is not None and (verified := found.get("verified")):
+            found["verified"] = add_larger_mechanism(self.joints, structure, verified)
+        return found
 
     @cached_property
     def verdict(self) -> Verdict:

@@ -486,6 +486,8 @@ def collapse_scale(
             return kept
         run = _run_as_far(model, motion.scaled(scale), start=begin, damping=damping, dt=step)
         met, follows = run.mechanisms, run.dataset.attrs.get("admissible_step", inf)
+        # one too small to matter does not move the structure
+        met = {name: found and found.decisive for name, found in met.items()}
         return ScaledRun(scale, met, run.ending, run.outcome, run.fall, run.doubts, follows)
 
     limits, limit = admissible_range(between, motion), (COLLAPSE_DEFINITION,)

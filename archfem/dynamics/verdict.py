@@ -55,6 +55,10 @@ ROCKS_SOFTLY = (
     "as soft as these let blocks rock before |e| counts as a hinge"
 )
 
+# Displacement up to which a mechanism is too small to matter, over the depth of the shallowest
+# part, a hundredth of a dislocation [-]
+SMALL = 0.001
+
 # What a run without doubts still leaves open
 NO_RANGE = "one motion, one set of properties: range not computed"
 
@@ -180,6 +184,15 @@ def detect_mechanisms(
         first["verified"] = None if verified is None else verified.moved
     first[PUBLISHED_DEFINITION] = demirel_aldemir_mechanism(counted)
     return first
+
+
+def add_larger_mechanism(joints: xr.Dataset, structure: Structure, found: Mechanism) -> Mechanism:
+    """Return a verified mechanism, one too small to matter with the first that moves farther."""
+    below = SMALL * shallowest_part(structure)[0]
+    if found.opening is None or found.displacement > below:
+        return found
+    larger = first_verified_mechanism(structure, joints, beyond=below)
+    return replace(found, below=below, larger=None if larger is None else larger.moved)
 
 
 def brief_mechanism_remarks(

@@ -7,7 +7,7 @@ Most mechanisms by count close again before anything falls: those of a record ha
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -65,6 +65,11 @@ class Mechanism:
         opening: largest opening of any of its joints meanwhile; of "one part over the record", at
             any time of the run [m]. None for a static state, or where openings are not recorded.
         closes: whether the duration ends before the record does; None over the record.
+        slip: largest slip of any of its joints meanwhile, from its begin on; None as `opening`, and
+            of "one part over the record" [m].
+        below: displacement that a verified mechanism does not reach, being too small to matter [m];
+            None for one that moves farther.
+        larger: first verified mechanism that moves by more than `below`, or None.
     """
 
     kind: str
@@ -77,27 +82,47 @@ class Mechanism:
     duration: float | None = field(default=None, compare=False)
     opening: float | None = field(default=None, compare=False)
     closes: bool | None = field(default=None, compare=False)
+    slip: float | None = field(default=None, compare=False)
+    below: float | None = field(default=None, compare=False)
+    larger: "Mechanism | None" = field(default=None, compare=False)
+
+    @property
+    def displacement(self) -> float:
+        """Largest opening or slip of its joints, as far as they are known [m]."""
+        return max(self.opening or 0.0, self.slip or 0.0)
+
+    @property
+    def decisive(self) -> "Mechanism | None":
+        """This mechanism, or the first larger one if it is too small to matter."""
+        return self if self.below is None else self.larger
 
     @property
     def course(self) -> str:
         """Duration, opening, and whether it closes again, in words; "" for a static state."""
         if self.duration is None:
             return ""
-        wide = "" if self.opening is None else f"by up to {format_mm(self.opening)}"
+        wide = "" if self.opening is None else f"by up to {format_mm(self.displacement)}"
         if self.closes is None:
             span = f"joint by joint within {duration_text(self.duration)}"
             text = f"it forms {span if self.duration > 0.0 else 'at once'}"
             return f"{text}, opens {wide}" if wide else text
-        text = f"it lasts {duration_text(self.duration)}" + (f", opens {wide}" if wide else "")
+        verb = "slips" if self.slip and self.displacement == self.slip else "opens"
+        text = f"it lasts {duration_text(self.duration)}" + (f", {verb} {wide}" if wide else "")
         end = "closes again" if self.closes else "has not closed when the record ends"
         return f"{text} and {end}"
 
     def __str__(self) -> str:
-        """Class, part, time, joints and course, and the blocks that can move."""
+        """Class, part, time, joints and course, the blocks that can move, and a larger one."""
         time = "" if self.time is None else f" at {self.time:.3f} s"
         words = f"{self.kind} mechanism of {self.part}{time} by {join_joint_names(self.names)}"
         moving = f"moving: {join_names(self.block_names, '; ')}" if self.block_names else ""
-        return "; ".join(filter(None, [words, self.course, moving]))
+        farther = ""
+        if self.below is not None:
+            farther = f"moves by more than {format_mm(self.below)}"
+            farther = (
+                f"the first that {farther}: {self.larger}" if self.larger else f"none {farther}"
+            )
+        return "; ".join(filter(None, [words, self.course, moving, farther]))
 
 
 def duration_text(duration: float) -> str:
@@ -280,28 +305,28 @@ def counted_mechanisms(
     return {**found, OVER_RECORD: _find_over_record(joints, failures)}
 
 
-def follow_mechanism(
-    joints: xr.Dataset, found: Mechanism, flags: xr.DataArray | None = None
-) -> Mechanism:
-    """Return a mechanism with duration and opening, for as long as its joints stay failed.
+def follow_mechanism(joints: xr.Dataset, found: Mechanism, flags: xr.DataArray) -> Mechanism:
+    """Return a mechanism with duration, opening and slip, for as long as its joints stay failed.
 
-    The failure flags of the joints, over time and joint, are found where they are not given.
+    Failure flags are over time and joint.
     """
     if "time" not in joints.dims:
         return found
     times = joints["time"].values
     begin = int(np.flatnonzero(times == found.time)[0])
     own = np.isin(joints["joint"].values, found.joints)
-    if flags is None:  # head joints take part in a verified motion
-        flags = _flags_over_time(joints.drop_vars(HEAD_COORDINATE, errors="ignore"))
     all_failed = flags.values[begin:, own].all(axis=1)
     count = len(all_failed) if all_failed.all() else int(all_failed.argmin())
     duration = float(step_lengths(times)[begin : begin + count].sum())
-    opening = None
-    if "opening" in joints:
-        openings = joints.variables["opening"].transpose("time", "joint").values
-        opening = float(np.nanmax(openings[begin : begin + count, own]))
-    return replace(found, duration=duration, opening=opening, closes=begin + count < len(times))
+    moved = {
+        name: joints.variables[name].transpose("time", "joint").values[begin : begin + count, own]
+        for name in ("opening", "slip")
+        if name in joints
+    }
+    if "slip" in moved:
+        moved["slip"] = abs(moved["slip"] - moved["slip"][0])
+    course: Any = {name: float(np.nanmax(values)) for name, values in moved.items()}
+    return replace(found, duration=duration, closes=begin + count < len(times), **course)
 
 
 class Failures(NamedTuple):

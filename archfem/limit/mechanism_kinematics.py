@@ -28,7 +28,13 @@ from archfem._display import ProgressReport
 from archfem._recent import RecentResults
 from archfem._typing import Array, Flags, Numbers
 from archfem._validation import check_type, validate_arguments
-from archfem.joints.criteria import Criteria, find_lasting, with_failure_flags
+from archfem.joints.criteria import (
+    HEAD_COORDINATE,
+    Criteria,
+    find_failed_joints,
+    find_lasting,
+    with_failure_flags,
+)
 from archfem.joints.resultants import check_instant
 from archfem.joints.rigid_kinematics import jump_entries
 from archfem.limit.displaced_blocks import merge_blocks
@@ -178,7 +184,11 @@ def verified_mechanism(
 
 @validate_arguments
 def first_verified_mechanism(
-    structure: Structure, joints: xr.Dataset, criteria: Criteria | None = None
+    structure: Structure,
+    joints: xr.Dataset,
+    criteria: Criteria | None = None,
+    *,
+    beyond: float = 0.0,
 ) -> VerifiedMechanism | None:
     """Find the first instant of a time history from which on the failed joints permit a motion.
 
@@ -189,25 +199,42 @@ def first_verified_mechanism(
         joints: over time and joint.
         criteria: conditions of failure, and their duration; by default those by which the joints
             were judged already.
+        beyond: opening or slip that one of its joints must exceed while they stay failed [m]; by
+            default none.
 
     Returns:
         The motion and its class at that instant; None where no ring and no pier ever moves.
     """
     verifier, joints = get_verifier(structure), with_failure_flags(joints, criteria)
     side, slides, apart, shear = verifier.find_failures(joints)
-    instants = np.flatnonzero(((side != 0) | slides | apart).any(axis=1))
+    failed = (side != 0) | slides | apart
+    # head joints take part in a verified motion
+    flags = find_failed_joints(joints.drop_vars(HEAD_COORDINATE, errors="ignore"))
+    flags = flags.transpose("time", "joint")
+    if beyond > 0.0:  # joints that stay closer take part in no such motion alone
+        opening, slip = (
+            joints.variables[name].transpose("time", "joint").values for name in ("opening", "slip")
+        )
+        able = (opening.max(axis=0) > beyond) | (np.ptp(slip, axis=0) > beyond)
+        failed = failed & able[list(verifier.rigid_regions.joints)]
+    instants = np.flatnonzero(failed.any(axis=1))
     failures = (values[instants] for values in (side, slides, apart, np.sign(shear)))
     freedoms = dict(zip(instants.tolist(), joint_freedoms(*failures), strict=True))
     # Instants with the same pattern of freedoms share the answer, and each motion is solved once.
-    moves: dict[bytes, bool] = {}
+    moves: dict[bytes, Mechanism | None] = {}
 
     def find_motion(instant: int) -> int | None:
         pattern = freedoms[instant].tobytes()
         if pattern not in moves:
             progress.show(f"{times[instant]:.3g} of {times[-1]:.3g} s, {len(moves)} patterns")
             permitted = verifier.loop_check.permits_motion(freedoms[instant])
-            moves[pattern] = permitted and verifier.verify(joints.isel(time=instant)).kind != "none"
-        return instant if moves[pattern] else None
+            motion = verifier.verify(joints.isel(time=instant)) if permitted else None
+            moves[pattern] = motion.moved if motion and motion.kind != "none" else None
+        moved = moves[pattern]
+        if moved is not None and beyond > 0.0:
+            followed = follow_mechanism(joints, replace(moved, time=float(times[instant])), flags)
+            moved = moved if followed.displacement > beyond else None
+        return None if moved is None else instant
 
     times, duration = joints["time"].values, Criteria.of(joints).duration
     with ProgressReport("verified mechanism", None, rarely=True) as progress:
@@ -215,7 +242,7 @@ def first_verified_mechanism(
     if first is None:
         return None
     found = verifier.verify(joints.isel(time=first))
-    return replace(found, moved=follow_mechanism(joints, found.moved))
+    return replace(found, moved=follow_mechanism(joints, found.moved, flags))
 
 
 @dataclass(frozen=True, eq=False)

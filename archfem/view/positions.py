@@ -40,9 +40,8 @@ def first_motion_instant(run: History) -> float:
     instant at which a joint is farthest open or has slid farthest.
     """
     # enough joints may fail while no block can move: a verified motion comes first
-    verified = run.verified if run.structure is not None else None
-    counted = leave_out_walls(run.joints)
-    found = counted_mechanism(counted) if verified is None else verified.moved
+    verified, counted = run.mechanisms.get("verified"), leave_out_walls(run.joints)
+    found = counted_mechanism(counted) if verified is None else verified.decisive or verified
     if found is not None and found.time is not None:
         return found.time
     joints = assessed_joints(counted)

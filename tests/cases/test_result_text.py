@@ -8,10 +8,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from backfilled import slender_bridge
+from mechanisms import FOUR, twitching
 
 import archfem as af
 from archfem.cases.analysis_keys import parse_limit
 from archfem.cases.result_text import (
+    _mechanism_cell,
     describe_collapse,
     describe_limit,
     describe_run,
@@ -60,6 +62,23 @@ def test_table_of_pairs_has_the_verdict_by_each_definition(run, tmp_path):
     assert strong["ring and pier at once"] == "-"  # there is no pier
     alone = tabulate_runs({"pair": af.History.read(run.save(tmp_path / "run.nc"))})
     assert alone.rows[0][alone.head.index("verified")] == "-"
+
+
+def test_a_mechanism_too_small_to_matter_stands_beside_the_first_that_is_not():
+    """By more than a thousandth of the depth, 0.5 mm; without pile it is the first of all."""
+    structure, joints = twitching("pier 2")
+    run = af.History(joints, structure)
+    found = run.mechanisms["verified"]
+    assert found.decisive.joints == tuple(FOUR)
+    assert found.displacement == 1e-5 < found.below == 5e-4
+    first, larger = str(found).split("; the first that moves by more than 0.5 mm: ")
+    assert first.startswith("local mechanism of pier 2 at 1.000 s by ")
+    assert larger == str(af.limit.first_verified_mechanism(*twitching("side wall")).moved)
+    cell = _mechanism_cell(SimpleNamespace(mechanisms=run.mechanisms), "verified")
+    assert cell == "local 1.00 s, 1 s, 0.01 mm; beyond 0.5 mm semi-global 3.00 s, 2 s, 3 mm"
+    brief = af.History(joints.isel(time=slice(0, 3)), structure).mechanisms["verified"]
+    assert str(brief) == f"{first}; none moves by more than 0.5 mm"
+    assert brief.decisive is None
 
 
 def test_words_and_tables_obey_the_criteria_of_the_run(run):

@@ -5,7 +5,7 @@ import json
 import re
 import tomllib
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +20,7 @@ from archfem.cases.run import carry_out
 from archfem.commands import margin
 from archfem.commands.run import print_results
 from archfem.dynamics import fall, motion_scaling, time_history
+from archfem.dynamics.scale_search import ScaledRun
 from archfem.errors import logger
 from archfem.models.model import Doubt
 from archfem.studies import study, variations
@@ -435,6 +436,15 @@ def test_an_interrupted_search_of_a_pair_continues(searched, tmp_path, monkeypat
     (out / "strong" / "scale.txt").unlink()
     assert af.commands.main([*given, "--pair", "strong"]) in (0, 3)
     assert (out / "strong" / "scale.txt").read_text(encoding="utf-8") == text
+
+
+def test_kept_runs_keep_the_larger_mechanism():
+    larger = af.limit.Mechanism("local", "arch", (0, 6), 2.0)
+    met = {"verified": replace(larger, part="pier", below=4e-4, larger=larger), "none": None}
+    run = ScaledRun(1.0, met, af.dynamics.Ending.FINISHED, "")
+    made = margin._unpack_runs(json.dumps([(0.01, asdict(run))]))
+    kept = made[0.01, 1.0].mechanisms
+    assert (kept["verified"].decisive, kept["none"]) == (larger, None)
 
 
 @pytest.mark.slow

@@ -687,6 +687,32 @@ def test_no_bracket_rests_on_a_run_without_an_answer():
     assert not run.fails("collapse")
 
 
+def test_neither_a_twitch_moves_a_structure_nor_is_its_fall_without_a_mechanism(monkeypatch):
+    """A loose stone twitches at every scale, more moves from 1.1 on, and all falls from 2 on."""
+    larger = af.limit.Mechanism("local", "arch", (0, 6), 2.0)
+
+    def run(model, motion, **_):
+        scale = motion.pga / 2.0
+        kind, by = ("fallen", "by hinges (joint 0) at 1.000 s") if scale > 2.0 else ("stands", "")
+        first = replace(larger, part="pier", below=4e-4, larger=larger if scale > 1.1 else None)
+        return SimpleNamespace(
+            mechanisms={"verified": first},
+            ending=Ending.FINISHED,
+            outcome="",
+            fall=CollapseState(kind, None, (), 0.1, 0.1, True, mechanism=by),
+            doubts=(),
+            dataset=SimpleNamespace(attrs={}),
+        )
+
+    monkeypatch.setattr(motion_scaling, "_run_as_far", run)
+    model = af.build(af.column(breadth=1.0, heights=[1.0]), fidelity="rigid", displacements="large")
+    found = af.collapse_scale(model, af.Motion(np.array([0.0, 2.0, 0.0]), dt=0.01), dt=0.01)
+    scales = [run.scale for each in found.searches.values() for run in each.runs]
+    assert found.moves == min(scale for scale in scales if scale > 1.1) > min(scales)
+    falls = f"at {found.states['falls']:#.3g} × it falls by hinges (joint 0) at 1.000 s"
+    assert (found.mechanism, replace(found, searches={}).mechanism) == (falls, "")
+
+
 @pytest.mark.parametrize(
     ("between", "limits"),
     [((0.1, 10.0), (0.1, 2.4516625)), ((0.1, 2.0), (0.1, 2.0)), ((3.0, 4.0), (3.0, 3.0))],

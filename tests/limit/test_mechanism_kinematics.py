@@ -6,8 +6,18 @@ from itertools import pairwise
 import kinematics
 import numpy as np
 import pytest
-import xarray as xr
-from mechanisms import ALTERNATING, FOUR, WEIGHT, arch, beside, failing, filled, piers
+from mechanisms import (
+    ALTERNATING,
+    FOUR,
+    WEIGHT,
+    arch,
+    beside,
+    failing,
+    filled,
+    history,
+    piers,
+    twitching,
+)
 
 import archfem as af
 from archfem.limit import first_verified_mechanism, verified_mechanism
@@ -131,14 +141,6 @@ def test_piers_moving_both_are_global():
     assert found.counted.kind == "global"
 
 
-def history(structure, instants):
-    """Joints over time, one state a second, with an eccentricity for each joint given."""
-    steps = [failing(structure, hinges) for hinges in instants]
-    return xr.concat(steps, dim="time", coords="minimal", compat="override").assign_coords(
-        time=np.arange(len(instants), dtype=float)
-    )
-
-
 def test_first_motion_and_first_count_in_a_history():
     structure = arch()
     wrong = dict.fromkeys(ALTERNATING, 0.5)
@@ -148,6 +150,34 @@ def test_first_motion_and_first_count_in_a_history():
     assert (found.moved.time, found.kind) == (4.0, "local")
     assert found.counted.time == 4.0
     assert first_verified_mechanism(structure, joints.isel(time=slice(0, 4))) is None
+
+
+def test_the_first_mechanism_that_moves_farther_is_that_without_the_loose_stones():
+    found = {}
+    for part in ("pier 2", "side wall"):  # the second counts in no mechanism
+        structure, joints = twitching(part)
+        found[part] = [
+            first_verified_mechanism(structure, joints, beyond=each) for each in (0.0, 2e-3, 4e-3)
+        ]
+    (first, larger, none), (alone, *_) = found.values()
+    assert (first.moved.part, first.moved.time, first.moved.displacement) == ("pier 2", 1.0, 1e-5)
+    assert larger.moved == alone.moved
+    assert (alone.moved.time, alone.moved.opening, alone.moved.duration) == (3.0, 3e-3, 2.0)
+    assert none is None
+
+
+def test_a_stone_that_slides_moves_by_its_slip():
+    structure = beside("pier 2")
+    pile = len(structure.joints) - 1
+    slides = failing(structure, sliding={pile: 1.0})
+    joints = slides.expand_dims(time=[0.0, 1.0])
+    slip = np.zeros(joints["N"].shape)
+    slip[:, pile] = 0.5e-3, -1.5e-3
+    joints = joints.assign(opening=(joints["N"].dims, 0.0 * slip), slip=(joints["N"].dims, slip))
+    found = first_verified_mechanism(structure, joints, beyond=1.9e-3).moved
+    assert (found.part, found.time) == ("pier 2", 0.0)
+    assert "it lasts 2 s, slips by up to 2 mm and has not closed" in str(found)
+    assert first_verified_mechanism(structure, joints, beyond=2.1e-3) is None
 
 
 def test_several_instants_or_other_joints_are_refused():

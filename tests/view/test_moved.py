@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from bonded import bonded_wall
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from mechanisms import twitching
 
 import archfem as af
 from archfem.masonry.structure import join_joint_names
@@ -141,6 +142,11 @@ def test_the_instant_that_decides_is_the_fall_or_else_a_motion(toppled, ring):
     assert decisive_instant(af.History(dataset, ring)) == 2.0
     assert decisive_instant(af.History(dataset)) == 1.0  # by count alone
     assert decisive_instant(af.History(dataset.isel(time=[0, 3]), ring)) == 0.0
+
+
+def test_a_mechanism_too_small_to_matter_does_not_decide():
+    structure, joints = twitching("pier 2")
+    assert decisive_instant(af.History(joints, structure)) == 3.0
 
 
 def test_a_wall_shows_the_instant_at_which_it_is_farthest_apart():
