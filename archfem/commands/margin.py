@@ -13,6 +13,7 @@ from archfem._files import create_result_folder, intact_file_list, path_inside, 
 from archfem.cases import answers
 from archfem.cases.case import Case
 from archfem.cases.result_text import mark_remarks, record_doubts
+from archfem.cases.run import HISTORY_FILE, load_finished_run
 from archfem.commands.cli import ExitCode
 from archfem.commands.run import (
     Command,
@@ -23,7 +24,12 @@ from archfem.commands.run import (
 )
 from archfem.dynamics.collapse_state import DISLOCATION, CollapseState, shallowest_part
 from archfem.dynamics.history import Ending
-from archfem.dynamics.motion_scaling import CollapseScale, collapse_scale, mechanism_scales
+from archfem.dynamics.motion_scaling import (
+    OWN_STEP,
+    CollapseScale,
+    collapse_scale,
+    mechanism_scales,
+)
 from archfem.dynamics.scale_search import KeptRuns, MechanismScales, ScaledRun
 from archfem.dynamics.walls_across import check_across
 from archfem.errors import InvalidInput
@@ -31,6 +37,7 @@ from archfem.limit.mechanism_count import Mechanism
 from archfem.models.model import Doubt
 from archfem.motion.motion import Motion
 from archfem.statics.fill_checks import doubt_pieces
+from archfem.units import format_mm
 from archfem.view.style import Files
 
 # Modules of studies are slow to import, and imported where they are needed.
@@ -71,7 +78,7 @@ def verdict(options: argparse.Namespace) -> int:
     computed = verdict_range(case.analysis, motion, fidelity="rigid", **case.verdict, **sampling)
     _, falls = check_across(case.structure, {motion.name: motion})
     head, line, text = str(computed).partition("\n")
-    text = f"{head}{falls}{line}{text}"
+    text = f"{head}{falls}{_say_steps(case, motion, options)}{line}{text}"
     own: Files = {"verdict_range.nc": computed.save, "verdict_range.txt": text}
 
     def draw() -> Files:
@@ -79,6 +86,19 @@ def verdict(options: argparse.Namespace) -> int:
 
     write_results("verdict", case, options.out, text, draw, options.pair)
     return ExitCode.DOUBTFUL if computed.doubts else 0
+
+
+def _say_steps(case: Case, motion: Motion, options: argparse.Namespace) -> str:
+    """Say that variations take other steps than a run, and how far that in the folder moves."""
+    if case.analysis.dt is not None:
+        return ""
+    text = f"\nvariations take steps of {1e3 * OWN_STEP:g} ms, and a run varies its own"
+    alone = case if options.pair is None else case.alone(options.pair)
+    path = Path(options.out or "") / (options.pair or "") / HISTORY_FILE
+    if options.out is None or (run := load_finished_run(path, alone, motion)) is None:
+        return text
+    most, left = (format_mm(run.dataset.attrs[key]) for key in ("displacement", "residual"))
+    return f"{text}: in this folder it is displaced by up to {most}, {left} at the end"
 
 
 def _choose_motion(case: Case, options: argparse.Namespace) -> Motion:

@@ -28,7 +28,7 @@ from archfem.dynamics.analysis import Analysis, with_one_facet
 from archfem.dynamics.collapse_state import CollapseState, classify_collapse, doubt_soft_blocks
 from archfem.dynamics.damping import damping_kind, resolve_effective_damping, vary_damping
 from archfem.dynamics.loose_fill import loosen_fill
-from archfem.dynamics.motion_scaling import CollapseScale
+from archfem.dynamics.motion_scaling import OWN_STEP, CollapseScale
 from archfem.dynamics.recorder import Record
 from archfem.dynamics.rigid_body.bodies import LooseBlocks
 from archfem.dynamics.rigid_body.simulation import RigidBlockSimulation
@@ -204,7 +204,7 @@ def as_falling(
         structure,
         fidelity=fidelity or ("rigid" if structure.selects_model else structure.fidelity),
         damping=interpret_damping(damping) or structure.damping,
-        dt=dt or structure.dt or 0.005,
+        dt=dt or structure.dt or OWN_STEP,
         displacements="large",
         scheme=Conserving(),
         until=None,

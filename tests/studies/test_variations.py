@@ -13,6 +13,7 @@ from archfem.dynamics import CollapseState, analysis
 from archfem.dynamics.damping import vary_damping
 from archfem.studies import evaluators, variations
 from archfem.studies.variations import Variation, evaluate_variation
+from archfem.units import format_mm
 
 HELD = {name: values[0] for name, values in DEFAULT_RANGES.items()} | {
     **{"k_n": 1.0, "k_s": 1.0, "friction": 0.0, "damping_ratio": 1.0},
@@ -457,6 +458,25 @@ def test_the_command_writes_files_that_a_report_shows(tmp_path, capsys, unplotte
     found = af.dynamics.VerdictRange.read(out / "verdict_range.nc")
     assert str(found) in said
     assert (out / "verdict_range.txt").read_text().strip() == str(found)
+
+
+@pytest.mark.parametrize("ran", [True, False])
+def test_the_command_states_its_steps_beside_those_of_the_run(
+    ran, tmp_path, capsys, unplotted, calls
+):
+    path, out = tmp_path / "column.toml", tmp_path / "out"
+    path.write_text(CASE.replace('dt = "4 ms"', ""))
+    words = "variations take steps of 5 ms, and a run varies its own"
+    if ran:
+        (*_, run) = af.cases.run_case(af.Case.read(path), out)
+        verdict = run.history.verdict
+        most, left = (format_mm(x) for x in (verdict.displacement, verdict.residual))
+        words += f": in this folder it is displaced by up to {most}, {left} at the end"
+    assert af.commands.main(["verdict", str(path), "--out", str(out), "--samples", "1"]) == 0
+    assert calls[0][2] == 0.005
+    said = capsys.readouterr().out
+    assert f"\n{words}\n" in said
+    assert "unvaried it is displaced by 20 mm" in said
 
 
 @pytest.mark.slow
