@@ -326,6 +326,47 @@ def test_the_tip_of_a_gable_is_one_block_with_the_course_below_it_across_the_pla
     assert not describe_carried(whole)
 
 
+def test_floor_and_roof_weigh_on_a_wall_across_its_plane(tmp_path):
+    """A wall of 4 m with a door of 1 m: a floor on course 3, a roof on 5, a statue on all."""
+    thick, floor, roof = 0.5, 4e3, 6e3  # [m, N/m, N/m]
+    names = {2: ("floor", floor), 4: ("roof", roof)}
+    blocks = [af.Block(((0, -1), (4, -1), (4, 0), (0, 0)), af.STONE, "ground", fixed=True)]
+    for low in range(5):
+        cuts = [(0, 1), (2, 3), (3, 4)] if low < 2 else [(0, 1.5), (1.5, 4)]
+        cuts = [(0, 2), (2, 4)] if low == 3 else cuts
+        word, load = names.get(low, (None, 0.0))
+        # course 3 has a window of 1 m, so that 3 m of stones bear the floor of 4 m
+        cuts = [(0, 1.5), (2.5, 4)] if low == 2 else cuts
+        length = sum(b - a for a, b in cuts)
+        unit_weight = 20e3 + 4.0 * load / (length * thick)
+        stone = replace(af.STONE, unit_weight=unit_weight, stands_for=word)
+        for a, b in cuts:
+            outline = ((a, low), (b, low), (b, low + 1), (a, low + 1))
+            blocks.append(af.Block(outline, stone, f"{low} {a}", part="wall", role="pier"))
+    wall = af.masonry.assembled(blocks, af.Contact(1e9, 4e8, friction=0.7), width=thick)
+    statue = af.masonry.StandingBody(
+        x=3.0, length=0.5, weight=40e3, centre_of_gravity=0.5, name="statue"
+    )
+    carrying = af.masonry.carrying(wall, [statue])
+    heights = np.array([0.5, 1.5, 2.5, 3.5, 4.5, 5.5])
+    per_metre = thick * 20e3 + np.array([0.0, 0.0, floor, 0.0, roof, 0.0])
+    per_metre[5] = 10e3
+    of_whole = 4.0 * per_metre - thick * 20e3 * np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
+    for structure, count in ((wall, 5), (carrying, 6)):
+        columns = af.masonry.columns_across(structure)
+        for name, weights in {"strip": per_metre, "whole": of_whole}.items():
+            column = columns[name]
+            found = [x.area * x.material.unit_weight * column.width for x in column.blocks[1:]]
+            assert found == pytest.approx(weights[:count], rel=1e-6)
+            push = af.collapse_factor(column, live=af.BodyForce(1.0), friction=None).factor
+            arm = weights[:count] @ heights[:count] / weights[:count].sum()
+            assert push == pytest.approx(0.5 * thick / arm, rel=2e-3)
+            written = af.Analysis(column, fidelity="rigid").write(tmp_path / f"{name}.toml")
+            kept = "floor, roof and statue" if count == 6 else "floor and roof"
+            note = describe_carried(af.Case.read(written).structure)
+            assert note.startswith(f"the mass of {kept.replace(' and', ',')} counts at the middle")
+
+
 @pytest.mark.parametrize(("breadth", "said"), [(0.65, ""), (65.0, ", more than 6.8 m high")])
 def test_a_column_broader_than_high_is_said_to_be_so(breadth, said):
     strip = af.column(breadth=breadth, heights=[3.4, 3.4])

@@ -7,7 +7,7 @@ left springing.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from itertools import compress, pairwise
 from math import acos, asin, atan2, degrees, isfinite, pi, radians, sin, tan
 from typing import Any
 
@@ -24,7 +24,7 @@ from archfem._validation import (
 from archfem.errors import InvalidStructure
 from archfem.masonry.block import Block, Point, as_point, check_points, measure_path
 from archfem.masonry.materials import COURSE_LENGTH, STONE, STONE_TO_STONE, Contact, Material
-from archfem.masonry.structure import Joint, Structure, merge_levels, record_origin
+from archfem.masonry.structure import Joint, Structure, join_words, merge_levels, record_origin
 from archfem.units import G, in_degrees
 
 # Weight of a course across the plane, over the median, below which it is one block with the course
@@ -223,7 +223,8 @@ def columns_across(wall: Structure) -> dict[str, Structure]:
     length to the next or, without any, one at each bed of a stone. A course of the whole weighs as
     much as that of the wall, less its openings; its joints are as long as the wall. A course of
     less than a fifth of the median weight, as the tip of a gable, is one block with the course
-    below it. The strip is as high as the wall, and passes over openings.
+    below it. The strip has a mean metre of the wall, its openings filled with stones of the course.
+    What stones stand for besides themselves, such as a floor, weighs on both, and is named there.
 
     Args:
         wall: structure in its plane; its width is the thickness of the wall.
@@ -236,8 +237,39 @@ def columns_across(wall: Structure) -> dict[str, Structure]:
         ['strip', 'whole']
     """
     blocks = [wall.blocks[number] for number in wall.free]
+    levels, areas = _divide_into_courses(blocks)
+    unit_weights = np.array([block.material.unit_weight for block in blocks])
+    words = [block.material.stands_for for block in blocks]
+    plain = np.array([not each for each in words]) if None in words else np.ones(len(words))
+    # stones that carry nothing: those of the course, or those of the wall where it has none
+    own = plain[:, None] * (areas + 1e-9 * areas.sum(axis=1, keepdims=True))
+    solid = unit_weights @ own / own.sum(axis=0)
+    # a body that stands on the wall has no masonry beside it
+    solid *= np.array([block.name != block.material.stands_for for block in blocks]) @ areas > 0.0
+    length, heights = float(np.ptp([x for each in blocks for x, _ in each.points])), np.diff(levels)
+    faces = length * heights
+    whole = unit_weights @ areas / faces
+    strip = whole + (1.0 - areas.sum(axis=0) / faces) * solid  # openings filled
+    loads = [join_words(sorted({*filter(None, compress(words, each))})) for each in areas.T]
+    material = blocks[int(plain.argmax())].material
+    contact = wall.joints[int(wall.heads.argmin())].contact
+    given: Any = {"material": material, "contact": contact, "gravity": wall.gravity}
+    bare, columns = column(breadth=wall.width, heights=heights.tolist(), **given), {}
+    for key, width, values in (("strip", bare.width, strip), ("whole", length, whole)):
+        stones = [bare.blocks[0]]
+        rows = zip(bare.blocks[1:], values.round(3).tolist(), loads, strict=True)
+        for block, weight, load in rows:  # equal ones share a material
+            stands_for = load or (COURSE_LENGTH if weight != material.unit_weight else None)
+            stone = replace(material, unit_weight=weight, stands_for=stands_for)
+            stones.append(replace(block, material=stone))
+        columns[key] = replace(bare, blocks=tuple(stones), width=width)
+    return columns
+
+
+def _divide_into_courses(blocks: Sequence[Block]) -> tuple[Array, Array]:
+    """Return the levels of a wall's courses, and the areas of stones in each (n, n_courses)."""
     ends = np.array([[block.points.min(axis=0), block.points.max(axis=0)] for block in blocks])
-    merged, length = merge_levels(ends[..., 1]), float(np.ptp(ends[..., 0]))
+    merged = merge_levels(ends[..., 1])
     levels, low, high = np.unique(merged), merged[:, :1], merged[:, 1:]
     above, below, across = (
         np.ptp(ends[..., 0], axis=1) @ met
@@ -246,24 +278,14 @@ def columns_across(wall: Structure) -> dict[str, Structure]:
     through = np.minimum(above, below) > across  # not those of the stones of an arch
     through[[0, -1]] = True
     levels = levels[through] if through.sum() > 2 else levels
-    covered = np.clip(high, levels[:-1], levels[1:]) - np.clip(low, levels[:-1], levels[1:])
-    weights = np.array([[block.area * block.material.unit_weight] for block in blocks])
-    courses = (weights / (high - low) * covered).sum(axis=0)
-    while courses.min() < LIGHT_COURSE * np.median(courses):
-        k = max(int(courses.argmin()), 1)  # the upper one of two that become one
-        courses[k - 1] += courses[k]
-        courses, levels = np.delete(courses, k), np.delete(levels, k)
-    heights, material = np.diff(levels), blocks[0].material
-    contact = wall.joints[int(wall.heads.argmin())].contact
-    given: Any = {"material": material, "contact": contact, "gravity": wall.gravity}
-    strip = column(breadth=wall.width, heights=heights.tolist(), **given)
-    unit_weights = (courses / (length * heights)).round(3)  # equal ones share a material
-    stones = [
-        replace(block, material=replace(material, unit_weight=weight, stands_for=COURSE_LENGTH))
-        for block, weight in zip(strip.blocks[1:], unit_weights.tolist(), strict=True)
-    ]
-    whole = replace(strip, blocks=(strip.blocks[0], *stones), width=length)
-    return {"strip": strip, "whole": whole}
+    unit_weights = np.array([block.material.unit_weight for block in blocks])
+    areas = np.array([[block.area] for block in blocks]) / (high - low)
+    areas = areas * (np.clip(high, levels[:-1], levels[1:]) - np.clip(low, levels[:-1], levels[1:]))
+    while (weights := unit_weights @ areas).min() < LIGHT_COURSE * np.median(weights):
+        k = max(int(weights.argmin()), 1)  # the upper one of two that become one
+        areas[:, k - 1] += areas[:, k]
+        areas, levels = np.delete(areas, k, axis=1), np.delete(levels, k)
+    return levels, areas
 
 
 @record_origin
