@@ -114,7 +114,7 @@ def find_first_mechanism(
 def describe_ties(
     placed: PlacedBlocks, joints: list[int], coefficient: Array, factor: float
 ) -> str:
-    """Describe the forces of the ties at a factor and along the motion; empty without ties."""
+    """Describe the forces of the ties at a factor; empty without ties."""
     if not placed.ties:
         return ""
     shares, needs = find_tie_shares(placed, joints, coefficient, factor), []
@@ -123,7 +123,4 @@ def describe_ties(
         need = f"{share * size:.4g}" if share > 1e-4 else "none"
         needs.append(f"{need} of the {size:.4g} kN of the tie at {name}")
     side = "right" if placed.direction > 0.0 else "left"
-    return (
-        f"pushed to the {side}, alpha_0 needs {join_names(needs)}; along the motion a tie pulls "
-        "with all of its force where it is stretched, and else with none: verify bar and anchor"
-    )
+    return f"pushed to the {side}, alpha_0 needs {join_names(needs)}"

@@ -73,7 +73,10 @@ from archfem.statics.first_mechanism import (
     select_joints,
     take_fill_as_loads,
 )
-from archfem.units import STANDARD_GRAVITY, kN
+from archfem.units import STANDARD_GRAVITY, format_mm, kN
+
+# Stretch from which a tie is doubted, as its free length is not known: 2 % of 2 m [m]
+MAX_STRETCH = 0.04
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -568,7 +571,13 @@ class _Oscillator:
                 "all along the motion the pressures of the fill on the stones are those of the "
                 "weights as built: that the fill stays in place is not checked"
             )
-        found += [self.ties] * bool(self.ties)
+        if self.ties:
+            at = ", ".join(f"{format_mm(size)} at {name}" for name, size in self.stretches)
+            found.append(
+                f"{self.ties}; along the motion a tie pulls with all of its force where it is "
+                f"stretched{f', at the capacity by {at},' * bool(at)} and else with none: verify "
+                "bar and anchor"
+            )
         if forces := [x.force for x in self.placed.loads if any(x.force) and not x.passive]:
             pushes = any(force[0] * self.placed.direction > 0.0 for force in forces)
             found.append(
@@ -600,6 +609,22 @@ class _Oscillator:
             )
         return found
 
+    @cached_property
+    def stretches(self) -> list[tuple[str, float]]:
+        """Block and stretch of each tie at the capacity of the displacement check [m]."""
+        if self.path is None or len(self.path.factors) == 1:
+            return []
+        moved = np.maximum.accumulate(self.curve["d"].values)
+        capacity = self.given.rules.share * self.curve["d"].values[-1]
+        placed = [self.placed.moved(each).ties for each in self.path.displacements]
+        found = []
+        for k, (block, start, force) in enumerate(self.placed.ties):
+            away = start - np.array([ties[k][1] for ties in placed])
+            size = float(np.interp(capacity, moved, away @ force / np.hypot(*force)))
+            # a hundredth of a millimetre is round-off
+            found.append((self.placed.structure.blocks[block].name, max(round(size, 5), 0.0)))
+        return found
+
     @property
     def opens(self) -> bool:
         """Whether joints that the mechanism keeps closed open or slide on its way."""
@@ -616,8 +641,9 @@ class _Oscillator:
         found = self.given.rules.doubt(self.given.spectrum)
         if self.searched:
             words = (
-                f"whatever moves at this alpha_0, its linear ratio is {self.linear.floor:.3g} at "
-                "least, that of e* = 1"
+                f"pushed to the {'right' if self.placed.direction > 0.0 else 'left'}: whatever "
+                f"moves at this alpha_0, its linear ratio is {self.linear.floor:.3g} at least, "
+                "that of e* = 1"
             )
             found += [self.searched, Doubt(words, values=(UPPER_BOUND,))]
         if self.fill and self.placed.fill is None and self.path is not None:
@@ -630,6 +656,13 @@ class _Oscillator:
             words = f"{place} joints open or slide that the mechanism keeps closed: {what} is {{}}"
             remedy = "a time history with large displacements can test it"
             found.append(Doubt(words, remedy, (UPPER_BOUND,)))
+        for name, size in [each for each in self.stretches if each[1] > MAX_STRETCH]:
+            words = (
+                "at the capacity the tie at {} is stretched by {:mm}, as 2 % of {:.3g} m of bar: "
+                "the displacement check is {}"
+            )
+            remedy = "a bar that breaks before has no share in it: verify its free length"
+            found.append(Doubt(words, remedy, (name, size, size / 0.02, UPPER_BOUND)))
         return found
 
     @cached_property
@@ -717,4 +750,5 @@ class _Oscillator:
         found = AssessmentCheck(
             rules.name, capacity, demand, "m", ratio, float(period), rules.source
         )
-        return replace(found, bounded=bool(self.bounded_at_rest or (self.opens and ratio > starts)))
+        higher = self.opens or any(size > MAX_STRETCH for _, size in self.stretches)
+        return replace(found, bounded=self.bounded_at_rest or (higher and ratio > starts))

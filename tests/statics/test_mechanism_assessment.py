@@ -3,7 +3,7 @@
 from dataclasses import replace
 from functools import partial
 from itertools import pairwise
-from math import atan2, pi, sqrt
+from math import atan2, cos, pi, sin, sqrt
 
 import numpy as np
 import pytest
@@ -196,6 +196,30 @@ def test_a_tie_that_holds_its_point_has_no_displacement_check():
     assert found.displacement is None
     assert "or a tie that holds its point, permit no finite motion: there is no" in found.notes[1]
     assert assess_tied(4.0, 5e3).alpha_0 == pytest.approx((10.0 + 5.0 * 4.0) / 80.0, rel=1e-4)
+
+
+@pytest.mark.parametrize(("height", "doubted"), [(3.0, True), (0.1, False)])
+def test_a_tie_is_stretched_up_to_the_capacity(height, doubted):
+    """As one body about the toe: its point moves by h sin θ + b/2 (1 - cos θ), of α(θ_0) = 0."""
+    force, weight, b, top = 2e3, 40e3, 0.5, 4.0
+    found = assess_tied(height, force)
+    falls = atan2(weight * b / 2 + force * height, (weight * top - force * b) / 2)
+    move = [y * sin(falls) + b / 2 * (1.0 - cos(falls)) for y in (1.0, 3.0)]
+    # δ is 1 and 3, that of the control point
+    assert found.d_0_star == pytest.approx(move[1] * (1 + 9) / (3 * (1 + 3)), rel=1e-3)
+    capacity = 0.4 * move[1]
+    turn = brentq(lambda angle: 3.0 * sin(angle) + b / 2 * (1.0 - cos(angle)) - capacity, 0.0, 1.0)
+    stretch = height * sin(turn) + b / 2 * (1.0 - cos(turn))
+    assert f"stretched, at the capacity by {1e3 * stretch:.3g} mm at block" in found.notes[0]
+    (doubt,) = found.doubts or (None,)
+    assert (doubt is not None) == doubted == (stretch > 0.04)
+    assert found.displacement.bounded == doubted
+    if doubt:
+        says = f"by {1e3 * stretch:.3g} mm, as 2 % of {50.0 * stretch:.3g} m of bar: the displ"
+        assert says in doubt.cause
+    free = assess_tied(height, force, direction=-1.0)
+    assert "at the capacity by 0 mm at block" in free.notes[0]
+    assert not free.doubts
 
 
 def test_a_force_acts_on_its_block():
@@ -471,6 +495,7 @@ def test_a_wedge_of_a_wall_in_bond_has_the_linear_check_alone(wedge, verified):
     assert first.startswith("alpha_0 is an upper bound, the least that a search")
     # of e* = 1, as a_0* = alpha_0 g / e*
     least = 2.0 * factor * G / 1.35 / found.linear.demand
+    assert second.startswith("pushed to the right: ")
     assert f"whatever moves at this alpha_0, its linear ratio is {least:.3g} at least" in second
     assert found.linear.floor == pytest.approx(least, rel=1e-6)
     assert f"; {least:.3g} with e* = 1), by linear" in describe_margin([found])

@@ -265,7 +265,8 @@ def _judge_check(data: ReportData, check: Ratios) -> tuple[str, str]:
         words = ", which it fails with one weight a body"
         return f"it withstands or not, by the split of weights, {of}", words
     if check.bounded:
-        bound = f"its ratio, {format_ratio(check.decisive)}, is an upper bound"
+        least = min(each.decisive for each in list_checks(data) if each.bounded)
+        bound = f"its ratio, {format_ratio(least)}, is an upper bound"
         test = _say_test(data)
         words = f"alone it is not shown to withstand {of}, as {bound}: {test}"
         return words, f", an upper bound: {test}"
