@@ -422,6 +422,13 @@ def test_the_answer_has_displacements_the_first_fall_and_the_checks(case):
         assert f"By the kinematic assessment {found}" in facts["verdict"]
         assert facts["in doubt"] == "kinematic assessment, scale of the motion"
     assert "; " not in facts["verdict"]
+    # in the other sense of a larger ratio: once, with the least
+    both = state("assessment", ratios._replace(directions=["left"], bodies=1.07), ratios)
+    data.statements["assessment"] = both._replace(doubts=[bound])
+    verdict = dict(conclusion.list_facts(data))["verdict"]
+    assert verdict.count("not shown") == 1
+    assert "as its ratio, 1.04, is" in verdict
+    data.statements["assessment"] = state("assessment", ratios)._replace(doubts=[bound])
     said = " ".join(say_margin(data, assessment=data.statements["assessment"]))
     assert (
         "the least margin is 1.04 (0.842 by displacements; 1.1 with the weights apart), on" in said
