@@ -63,6 +63,7 @@ from archfem.statics.assessment_checks import (
     LimitState,
     add_fill_ranges,
     check_assessable,
+    describe_far_masses,
     spectral_acceleration,
 )
 from archfem.statics.first_mechanism import (
@@ -578,6 +579,7 @@ class _Oscillator:
                 f"stretched{f', at the capacity by {at},' * bool(at)} and else with none: verify "
                 "bar and anchor"
             )
+        found += filter(None, [describe_far_masses(self.given.structure, self.given.loads)])
         if forces := [x.force for x in self.placed.loads if any(x.force) and not x.passive]:
             pushes = any(force[0] * self.placed.direction > 0.0 for force in forces)
             found.append(

@@ -235,6 +235,26 @@ def test_a_force_acts_on_its_block():
         assert af.kinematic_assessment(strip, SPECTRUM, loads=[load]).alpha_0 > 0.0
 
 
+@pytest.mark.parametrize(
+    ("height", "kept"),
+    [(4.0, ""), (4.1, "1 kN 2.1 m from block 1"), (6.0, "1 kN 4 m from block 1"), (27.0, None)],
+)
+def test_a_mass_acts_within_the_size_of_the_stones(height, kept):
+    """A block that ends at 2 m and is as high, of a strip of 4 m: 27 m for 2.7 m are refused."""
+    strip = af.column(breadth=0.5, heights=[2.0, 2.0])
+    load = af.masonry.AttachedLoad("block 1", (0.0, height), weight=1e3)
+    if kept is None:
+        says = r"mass acts at \(0\.0, 27\.0\) m, 25 m from 'block 1' .* the 4 m of all stones"
+        with pytest.raises(af.InvalidInput, match=says):
+            af.kinematic_assessment(strip, SPECTRUM, loads=[load])
+        return
+    found = af.kinematic_assessment(strip, SPECTRUM, loads=[load])
+    assert found.alpha_0 == pytest.approx(41e3 * 0.25 / (40e3 * 2.0 + 1e3 * height), rel=1e-4)
+    notes = [note for note in found.notes if note.startswith("masses act further from")]
+    assert len(notes) == bool(kept)
+    assert all(f", {kept}: verify" in note for note in notes)
+
+
 def test_a_portal(verified):
     """Columns b x h rock about their corners, the lintel moves with their tops: α = tan(β - θ)."""
     b, h, span = 0.5, 2.5, 3.0
