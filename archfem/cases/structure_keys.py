@@ -294,10 +294,12 @@ def _call(function: Callable[..., Described], section: str, **values: Any) -> De
     required = [key.name for key in parameters if key.default is key.empty]
     if missing := [key for key in required if key not in values]:
         known = sorted(PRESETS.get(section.partition(".")[0], ()))
+        take = f", take them from preset = '{known[-1]}'" if known else ""
         names = f"; tables of these names change what is there: {known}" if known else ""
+        stiff = " (rigid models take E and ν too, to find blocks that are softer than their joints)"
         raise InvalidInput(
-            f"{section} lacks {', '.join(missing)}: give them, or correct the name of the "
-            f"table{names}"
+            f"{section} lacks {', '.join(missing)}{stiff * ('poisson' in missing)}: give "
+            f"them{take}, or correct the name of the table{names}"
         )
     return function(**values)
 

@@ -49,6 +49,10 @@ def test_changes_from_the_command_line():
         ("structure.material=['stone']", r"structure.material = \['stone'\] is not a word"),
         ("structure.shape=['column']", r"structure.shape = \['column'\] is not known"),
         ("materials.stne={young=1e9}", "materials.stne lacks poisson, unit_weight"),
+        (
+            "materials.lime={young=2e10, unit_weight=24e3}",
+            r"lime lacks poisson \(rigid models take E and ν too, .* from preset = 'stone'",
+        ),
         ("contacts.x={normal_stifness=1e9}", "'contacts.x.normal_stifness': did you mean"),
         ("analysis.dt=-1", r"toml: dt \[s\] = -1.0 is not between 1e-06 and 0.1"),
         ("analysis.dt='5 s'", r"toml: dt \[s\] = 5.0 is not between 1e-06 and 0.1"),
