@@ -15,7 +15,7 @@ from archfem._files import replace_results
 from archfem.cases import answers
 from archfem.cases.case import case_of
 from archfem.cases.defaults import list_finish_ranges
-from archfem.cases.report import conclusion, report_data, response, sections
+from archfem.cases.report import conclusion, outcomes, report_data, response, sections
 from archfem.cases.report.response import _check_row, supported_weight_ratio
 from archfem.cases.result_text import tabulate_joints, tabulate_motions, tabulate_runs
 from archfem.cases.run import MOTION_VARIABLE
@@ -91,12 +91,12 @@ def test_lost_blocks_are_listed_by_their_parts(piers):
     names = [piers.blocks[number].name for number in piers.free]
     ring = [block.name for block in piers.blocks if block.part == "arch"]
     left = next(b.name for b in piers.blocks if b.part == "left pier" and not b.fixed)
-    assert conclusion.list_lost(piers, names[:2]) == ", ".join(names[:2])
+    assert outcomes.list_lost(piers, names[:2]) == ", ".join(names[:2])
     assert len(ring) == 3
-    assert conclusion.list_lost(piers, [left, *ring, names[-1]]) == (
+    assert outcomes.list_lost(piers, [left, *ring, names[-1]]) == (
         "all of arch; 1 of 2 of left pier; 1 of 2 of right pier"
     )
-    assert conclusion.list_lost(piers, names) == "all of left pier, arch and right pier"
+    assert outcomes.list_lost(piers, names) == "all of left pier, arch and right pier"
 
 
 def test_the_doubts_of_several_runs_stand_in_one_table(piers, runs, monkeypatch):
@@ -471,8 +471,8 @@ def test_motions_of_a_suite_are_shown_before_they_were_scaled_and_reduced(monkey
 
 
 def test_sentences_begin_with_a_capital_and_end_with_one_stop():
-    assert conclusion.sentence(" it stands ") == "It stands."
-    assert conclusion.sentence("it stands.") == "It stands."
+    assert outcomes.sentence(" it stands ") == "It stands."
+    assert outcomes.sentence("it stands.") == "It stands."
 
 
 @pytest.mark.parametrize(("players", "megabytes"), [(1, 8.0), (4, 2.0), (100, 0.8)])

@@ -5,6 +5,7 @@
     doubts          doubts and notes of results, and what was not varied
     inputs          inputs with their marks
     motion_rules    rules of norms for suites of motions
+    outcomes        outcomes of runs in words: falls, lost blocks, displacements
     report          HTML report of a case
     report_data     case, runs and files of a report
     response        sections on ground motions, runs and their checks

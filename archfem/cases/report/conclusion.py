@@ -1,7 +1,6 @@
 """Head and conclusion of a report: who signs what, outcome with margin and range."""
 
-from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -28,6 +27,14 @@ from archfem.cases.report.doubts import (
     spans_run,
 )
 from archfem.cases.report.motion_rules import check_motions, find_rule
+from archfem.cases.report.outcomes import (
+    describe_ends,
+    describe_outcomes,
+    describe_peaks,
+    find_worst,
+    list_ranges_of_steps,
+    sentence,
+)
 from archfem.cases.report.report_data import SHOWN_RESULTS, ReportData
 from archfem.cases.report.scales import describe_scales, find_first_failures, say_fragile
 from archfem.cases.report.study_findings import say_what_changes
@@ -37,30 +44,14 @@ from archfem.dynamics.collapse_state import (
     COLLAPSE_STATES,
     FALLEN_STATES,
     RANGE_REMEDY,
-    CollapseState,
-    name_stones,
 )
-from archfem.dynamics.history import History
 from archfem.dynamics.rigid_body.rocking_body import describe_first_fall, say_scale
-from archfem.dynamics.verdict_range import HALF_STEP, UNVARIED, VerdictRange
+from archfem.dynamics.verdict_range import UNVARIED, VerdictRange
 from archfem.dynamics.walls_across import SCALES_ACROSS
-from archfem.masonry.structure import UNCHECKED_ACROSS, Structure, join_names, join_words
+from archfem.masonry.structure import UNCHECKED_ACROSS, join_names, join_words
 from archfem.models.model import Doubt
 from archfem.units import Ends, format_mm, format_ratio
 from archfem.view.pages.document import Grid, Section, TextBlock
-
-# Outcomes of runs as verbs and in plain words, the worst first; small displacements end where
-# blocks begin to move
-_VERBS = {
-    "fallen": ("falls", "does not survive"),
-    "partly fallen": ("falls in part", "does not survive"),
-    "unknown": ("has no known outcome", "may or may not survive"),
-    "mechanism": ("becomes a mechanism", "may or may not survive"),
-    "dislocated": ("is dislocated{} but stands", "survives with damage"),
-    "stands": ("stands", "survives"),
-    "no mechanism": ("forms no mechanism", "survives"),
-}
-
 
 # Doubts of a result that the conclusion states; the others stand in the section of the result
 MAX_DOUBTS = 3
@@ -112,7 +103,7 @@ def list_facts(data: ReportData) -> list[tuple[str, str]]:
     doubts = [("in doubt", ", ".join(doubtful))] if doubtful else []
     verdict = " ".join(map(sentence, _say_plainly(data, doubtful)))
     verdicts = [("verdict", verdict)] if verdict else []
-    peak = [("motions" if len(runs) > 1 else "motion", _describe_peaks(runs))] if runs else []
+    peak = [("motions" if len(runs) > 1 else "motion", describe_peaks(runs))] if runs else []
     return [*signed, *verdicts, *doubts, *blocks, *peak]
 
 
@@ -197,7 +188,7 @@ def _say_survival(
 
     Too few motions decide none, nor do runs without joints; failing assessments stand beside.
     """
-    verdicts, (_, answer) = [run.verdict for run in data.runs.values()], _find_worst(data)
+    verdicts, (_, answer) = [run.verdict for run in data.runs.values()], find_worst(data)
     in_doubt = " (in doubt, as below)" * (HISTORIES in doubtful)
     survives, reason = answer.startswith("survives"), _say_why_undecided(data)
     answer = f"it {answer}{in_doubt}"
@@ -209,7 +200,7 @@ def _say_survival(
     moved = f", and moves by {Ends.of(sizes):mm}" if known else ""
     beside = any(scale <= 1.0 for scale, *_ in _say_across(data))
     lead = f"in its plane{in_doubt} it" if beside else f"{answer}: it"
-    yield f"{lead} {'; it '.join(_describe_outcomes(data))}{moved}"
+    yield f"{lead} {'; it '.join(describe_outcomes(data))}{moved}"
     yield from failed if beside else ()
     ranges = sorted(data.verdict_ranges, key=lambda x: (x.falls.sum(), x.dislocated.sum()))
     for found in ranges[-1:]:
@@ -229,13 +220,6 @@ def _say_why_undecided(data: ReportData) -> str:
     if loose := sum(fall is not None and fall.lacks_joints for fall in falls):
         words.append(f"in {loose} of {count} runs joints were not followed through strong motion")
     return join_words(words)
-
-
-def _find_worst(data: ReportData) -> tuple[str, str]:
-    """Return the worst outcome of the runs as a verb and in plain words."""
-    verdicts = [run.verdict for run in data.runs.values()]
-    outcomes = {"unknown" if x.incomplete else x.outcome for x in verdicts}
-    return next(words for outcome, words in _VERBS.items() if outcome in outcomes)
 
 
 def _say_what_decides(ranges: Sequence[VerdictRange]) -> str:
@@ -285,12 +269,7 @@ def _say_test(data: ReportData) -> str:
     motions = f"the {count} motions" if count > 1 else "the motion"
     of = "matched to" if (data.case.suite or {}).get("matched") else "of"
     decide = f"decide{'s' * (count == 1)}" + f" (rule not met: {missed})" * bool(missed)
-    return f"{motions} {of} this spectrum, under which it {_find_worst(data)[0]}, {decide}"
-
-
-def _describe_peaks(runs: Iterable[History]) -> str:
-    """Return the least and the largest peak acceleration of some runs."""
-    return f"PGA {Ends.of(map(peak_of_ground, runs)):.2f} g"
+    return f"{motions} {of} this spectrum, under which it {find_worst(data)[0]}, {decide}"
 
 
 def build_conclusion(data: ReportData) -> Section:
@@ -385,7 +364,7 @@ def _build_paragraphs(data: ReportData, doubtful: Sequence[str]) -> dict[str, li
         stated = [each.sentences for name, each in data.statements.items() if name != "assessment"]
         stated = [sorted(each, key=lambda x: not _is_of_norm(data, x)) for each in stated]
         answer += [*stated[0]] if len(data.statements) == 1 and stated else [x for x, *_ in stated]
-    answer += [*_describe_ends(data), *_describe_ranges(data)]
+    answer += [*describe_ends(data), *_describe_ranges(data)]
     changes = [*_say_causes(data.verdict_ranges)]
     changes += [text for study in data.studies for text in say_what_changes(study)]
     if fill := join_names(list_elastic_fill(data)):
@@ -521,7 +500,7 @@ def _capacity_rows(data: ReportData) -> Iterator[tuple[str, Row]]:
     """Yield each result with its demand, capacity or outcome, and factor; "-" where is none."""
     if data.runs:
         verdicts = [run.verdict for run in data.runs.values()]
-        demand, outcome = _describe_peaks(data.runs.values()), verdicts[0].outcome
+        demand, outcome = describe_peaks(data.runs.values()), verdicts[0].outcome
         outcome = result_text.count_outcomes(verdicts) if len(verdicts) > 1 else outcome
         outcome += f"; not run: {', '.join(data.missing)}" * bool(data.missing)
         # of a fall it is the way to the ground
@@ -531,7 +510,7 @@ def _capacity_rows(data: ReportData) -> Iterator[tuple[str, Row]]:
         if sizes.size and np.isfinite(sizes).all():
             largest, residual = map(format_mm, sizes.max(axis=0))
             over = "time steps" if data.fidelity == VARIED_FIDELITY else "time steps and fidelity"
-            steps = ", ".join(_list_ranges_of_steps(data))
+            steps = ", ".join(list_ranges_of_steps(data))
             under = f" under '{[*held][sizes[:, 0].argmax()]}'" * (len(data.runs) > 1)
             outcome += f"; displaced by up to {largest}{under}, {residual} at the end"
             outcome += f"; over {over} by {steps}" * bool(steps)
@@ -552,80 +531,3 @@ def _capacity_rows(data: ReportData) -> Iterator[tuple[str, Row]]:
         of = f" of {name_spectrum(data)}" if result == "assessment" else ""
         for row in sorted(statement.rows, key=lambda x: not _is_of_norm(data, x.demand)):
             yield RESULTS[result], row._replace(demand=f"{row.demand}{of}")
-
-
-def _list_ranges_of_steps(data: ReportData) -> Iterator[str]:
-    """Yield how far a motion displaces the structure by the steps of its run and variations."""
-    for found in data.verdict_ranges:
-        motion = found.dataset.attrs.get("motion", "")
-        sizes = [
-            each.displacement
-            for each in found.single_changes
-            if each.name in (UNVARIED, HALF_STEP) and each.outcome in COLLAPSE_STATES[:2]
-        ]
-        run = data.runs.get(motion)
-        if sizes and run and run.verdict.outcome in COLLAPSE_STATES[:2]:
-            sizes.append(run.verdict.displacement)
-            under = f" under '{motion}'" * (len(data.runs) > 1)
-            yield f"{Ends.of(sizes):mm}{under}"
-
-
-def _describe_outcomes(data: ReportData) -> Iterator[str]:
-    """Yield each outcome with the motions that lead to it, and the largest displacement."""
-    total = len(data.runs) + len(data.missing)
-    for outcome, (verb, _) in _VERBS.items():
-        own = {k: run.verdict for k, run in data.runs.items() if run.verdict.outcome == outcome}
-        if not own:
-            continue
-        names, falls = [*own], [x.fall for x in own.values() if x.fall]
-        verb = verb.format(name_stones([*dict.fromkeys(x for fall in falls for x in fall.blocks)]))
-        of = f"of {_describe_peaks(data.runs[name] for name in names)}"
-        under = f"{len(names)} of {total} motions {of}: {', '.join(names)}"
-        if len(names) == total:
-            under = f"all {len(names)} motions {of}"
-            under = under if len(names) > 1 else f"the motion '{names[0]}' {of}"
-        fall = "; whether it falls was not computed" if outcome == "mechanism" else ""
-        yield f"{verb} under {under}{fall}"
-
-
-def _describe_ends(data: ReportData) -> Iterator[str]:
-    """Yield sentences on runs that were broken off, lost blocks, and those that still move."""
-    falls = {name: run.verdict.fall for name, run in data.runs.items()}
-    for name, run in data.runs.items():
-        if run.verdict.incomplete:
-            yield f"the run under '{name}' {run.verdict.incomplete}"
-    if lost := {f"'{k}'": fall for k, fall in falls.items() if fall and fall.time is not None}:
-        which = describe_lost(data.case.structure, [*lost.values()])
-        if len(lost) == 1 and (by := next(iter(lost.values())).mechanism):
-            which += f"; it falls {by}"
-        yield f"under {join_words([*lost])} it loses {which}"
-    if moving := [f"'{name}'" for name, fall in falls.items() if fall and not fall.resting]:
-        yield f"blocks still move at the end of {join_words(moving)}"
-
-
-def describe_lost(structure: Structure, falls: Sequence[CollapseState]) -> str:
-    """Return the number of lost blocks, the time of the first, and of one fall which they are."""
-    counts, times = [len(fall.blocks) for fall in falls], [fall.time or 0.0 for fall in falls]
-    text = f"{Ends.of(counts)} blocks, the first at {Ends.of(times):.2f} s"
-    return text if len(falls) > 1 else f"{text}: {list_lost(structure, falls[0].blocks)}"
-
-
-def list_lost(structure: Structure, names: Sequence[str], max_names: int = 4) -> str:
-    """List lost blocks by name, or many by their parts."""
-    blocks = [structure.blocks[number] for number in structure.free]
-    if len(names) <= max_names:
-        return ", ".join(names)
-    counts, lost = (
-        Counter(block.part or "no part" for block in each)
-        for each in (blocks, [block for block in blocks if block.name in names])
-    )
-    whole = [part for part, count in lost.items() if count == counts[part]]
-    some = [f"{count} of {counts[part]} of {part}" for part, count in lost.items()]
-    some = [text for text, part in zip(some, lost, strict=True) if part not in whole]
-    return "; ".join([f"all of {join_words(whole)}"] * bool(whole) + some)
-
-
-def sentence(text: str) -> str:
-    """Return a text with a capital at its beginning and a full stop at its end."""
-    text = text.strip()
-    return text[:1].upper() + text[1:] + ("" if text.endswith((".", "?")) else ".")

@@ -9,8 +9,8 @@ import xarray as xr
 
 from archfem.cases import result_text
 from archfem.cases.case import Case
-from archfem.cases.report.conclusion import describe_lost, list_lost, sentence
 from archfem.cases.report.motion_rules import find_target, tabulate_checks
+from archfem.cases.report.outcomes import describe_lost, list_lost, sentence
 from archfem.cases.report.report_data import ReportData, build_player
 from archfem.dynamics.collapse_state import FALLEN_STATES
 from archfem.dynamics.history import History

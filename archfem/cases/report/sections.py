@@ -15,9 +15,10 @@ from archfem._display import DOUBT_MARK, NOTE_MARK
 from archfem._files import read_listed
 from archfem.cases.answers import Ratios, read_numbers
 from archfem.cases.defaults import describe_friction_margin
-from archfem.cases.report.conclusion import build_conclusion, sentence
+from archfem.cases.report.conclusion import build_conclusion
 from archfem.cases.report.doubts import list_elastic_fill, list_ranges, list_varied, spans_run
 from archfem.cases.report.inputs import describe_value, tabulate_inputs
+from archfem.cases.report.outcomes import sentence
 from archfem.cases.report.report_data import STATIC_RESULTS, ReportData
 from archfem.cases.report.response import (
     HALF_WIDTH,

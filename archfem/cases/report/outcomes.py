@@ -1,0 +1,113 @@
+"""Outcomes of the runs of a report in words: the worst one, falls, lost blocks, displacements."""
+
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+
+from archfem.cases.report.doubts import peak_of_ground
+from archfem.cases.report.report_data import ReportData
+from archfem.dynamics.collapse_state import COLLAPSE_STATES, CollapseState, name_stones
+from archfem.dynamics.history import History
+from archfem.dynamics.verdict_range import HALF_STEP, UNVARIED
+from archfem.masonry.structure import Structure, join_words
+from archfem.units import Ends
+
+# Outcomes of runs as verbs and in plain words, the worst first; small displacements end where
+# blocks begin to move
+_VERBS = {
+    "fallen": ("falls", "does not survive"),
+    "partly fallen": ("falls in part", "does not survive"),
+    "unknown": ("has no known outcome", "may or may not survive"),
+    "mechanism": ("becomes a mechanism", "may or may not survive"),
+    "dislocated": ("is dislocated{} but stands", "survives with damage"),
+    "stands": ("stands", "survives"),
+    "no mechanism": ("forms no mechanism", "survives"),
+}
+
+
+def find_worst(data: ReportData) -> tuple[str, str]:
+    """Return the worst outcome of the runs as a verb and in plain words."""
+    verdicts = [run.verdict for run in data.runs.values()]
+    outcomes = {"unknown" if x.incomplete else x.outcome for x in verdicts}
+    return next(words for outcome, words in _VERBS.items() if outcome in outcomes)
+
+
+def describe_outcomes(data: ReportData) -> Iterator[str]:
+    """Yield each outcome with the motions that lead to it, and the largest displacement."""
+    total = len(data.runs) + len(data.missing)
+    for outcome, (verb, _) in _VERBS.items():
+        own = {k: run.verdict for k, run in data.runs.items() if run.verdict.outcome == outcome}
+        if not own:
+            continue
+        names, falls = [*own], [x.fall for x in own.values() if x.fall]
+        verb = verb.format(name_stones([*dict.fromkeys(x for fall in falls for x in fall.blocks)]))
+        of = f"of {describe_peaks(data.runs[name] for name in names)}"
+        under = f"{len(names)} of {total} motions {of}: {', '.join(names)}"
+        if len(names) == total:
+            under = f"all {len(names)} motions {of}"
+            under = under if len(names) > 1 else f"the motion '{names[0]}' {of}"
+        fall = "; whether it falls was not computed" if outcome == "mechanism" else ""
+        yield f"{verb} under {under}{fall}"
+
+
+def describe_peaks(runs: Iterable[History]) -> str:
+    """Return the least and the largest peak acceleration of some runs."""
+    return f"PGA {Ends.of(map(peak_of_ground, runs)):.2f} g"
+
+
+def list_ranges_of_steps(data: ReportData) -> Iterator[str]:
+    """Yield how far a motion displaces the structure by the steps of its run and variations."""
+    for found in data.verdict_ranges:
+        motion = found.dataset.attrs.get("motion", "")
+        sizes = [
+            each.displacement
+            for each in found.single_changes
+            if each.name in (UNVARIED, HALF_STEP) and each.outcome in COLLAPSE_STATES[:2]
+        ]
+        run = data.runs.get(motion)
+        if sizes and run and run.verdict.outcome in COLLAPSE_STATES[:2]:
+            sizes.append(run.verdict.displacement)
+            under = f" under '{motion}'" * (len(data.runs) > 1)
+            yield f"{Ends.of(sizes):mm}{under}"
+
+
+def describe_ends(data: ReportData) -> Iterator[str]:
+    """Yield sentences on runs that were broken off, lost blocks, and those that still move."""
+    falls = {name: run.verdict.fall for name, run in data.runs.items()}
+    for name, run in data.runs.items():
+        if run.verdict.incomplete:
+            yield f"the run under '{name}' {run.verdict.incomplete}"
+    if lost := {f"'{k}'": fall for k, fall in falls.items() if fall and fall.time is not None}:
+        which = describe_lost(data.case.structure, [*lost.values()])
+        if len(lost) == 1 and (by := next(iter(lost.values())).mechanism):
+            which += f"; it falls {by}"
+        yield f"under {join_words([*lost])} it loses {which}"
+    if moving := [f"'{name}'" for name, fall in falls.items() if fall and not fall.resting]:
+        yield f"blocks still move at the end of {join_words(moving)}"
+
+
+def describe_lost(structure: Structure, falls: Sequence[CollapseState]) -> str:
+    """Return the number of lost blocks, the time of the first, and of one fall which they are."""
+    counts, times = [len(fall.blocks) for fall in falls], [fall.time or 0.0 for fall in falls]
+    text = f"{Ends.of(counts)} blocks, the first at {Ends.of(times):.2f} s"
+    return text if len(falls) > 1 else f"{text}: {list_lost(structure, falls[0].blocks)}"
+
+
+def list_lost(structure: Structure, names: Sequence[str], max_names: int = 4) -> str:
+    """List lost blocks by name, or many by their parts."""
+    blocks = [structure.blocks[number] for number in structure.free]
+    if len(names) <= max_names:
+        return ", ".join(names)
+    counts, lost = (
+        Counter(block.part or "no part" for block in each)
+        for each in (blocks, [block for block in blocks if block.name in names])
+    )
+    whole = [part for part, count in lost.items() if count == counts[part]]
+    some = [f"{count} of {counts[part]} of {part}" for part, count in lost.items()]
+    some = [text for text, part in zip(some, lost, strict=True) if part not in whole]
+    return "; ".join([f"all of {join_words(whole)}"] * bool(whole) + some)
+
+
+def sentence(text: str) -> str:
+    """Return a text with a capital at its beginning and a full stop at its end."""
+    text = text.strip()
+    return text[:1].upper() + text[1:] + ("" if text.endswith((".", "?")) else ".")
