@@ -28,6 +28,7 @@ from archfem._display import ProgressReport
 from archfem._recent import RecentResults
 from archfem._typing import Array, Flags, Numbers
 from archfem._validation import check_type, validate_arguments
+from archfem.errors import InvalidInput
 from archfem.joints.criteria import (
     HEAD_COORDINATE,
     Criteria,
@@ -204,6 +205,9 @@ def first_verified_mechanism(
 
     Returns:
         The motion and its class at that instant; None where no ring and no pier ever moves.
+
+    Raises:
+        InvalidInput: openings or slips are unknown, of which one must exceed a value.
     """
     verifier, joints = get_verifier(structure), with_failure_flags(joints, criteria)
     side, slides, apart, shear = verifier.find_failures(joints)
@@ -212,6 +216,8 @@ def first_verified_mechanism(
     flags = find_failed_joints(joints.drop_vars(HEAD_COORDINATE, errors="ignore"))
     flags = flags.transpose("time", "joint")
     if beyond > 0.0:  # joints that stay closer take part in no such motion alone
+        if not {"opening", "slip"} <= joints.keys():
+            raise InvalidInput(f"beyond = {beyond:g} needs opening and slip: give joints of a run")
         opening, slip = (
             joints.variables[name].transpose("time", "joint").values for name in ("opening", "slip")
         )

@@ -164,6 +164,8 @@ def test_the_first_mechanism_that_moves_farther_is_that_without_the_loose_stones
     assert larger.moved == alone.moved
     assert (alone.moved.time, alone.moved.opening, alone.moved.duration) == (3.0, 3e-3, 2.0)
     assert none is None
+    with pytest.raises(af.InvalidInput, match=r"beyond = 0\.002 needs opening and slip"):
+        first_verified_mechanism(structure, joints.drop_vars("slip"), beyond=2e-3)
 
 
 def test_a_stone_that_slides_moves_by_its_slip():
