@@ -13,9 +13,9 @@ logger = logging.getLogger("archfem")
 
 
 @contextmanager
-def filter_log(keep: Callable[[logging.LogRecord], bool]) -> Iterator[None]:
-    """Filter what is logged within a block, before the filters of blocks around it."""
-    logger.filters.insert(0, keep)
+def filter_log(keep: Callable[[logging.LogRecord], bool], *, first: bool = False) -> Iterator[None]:
+    """Filter what is logged within a block, after or before the filters of blocks around it."""
+    logger.filters.insert(0 if first else len(logger.filters), keep)
     try:
         yield
     finally:

@@ -68,7 +68,7 @@ def record_doubts(structure: Structure) -> Iterator[list[Doubt]]:
             doubts.append(Doubt(*given.getMessage().rsplit("; ", 1)))  # type: ignore[arg-type]
         return True
 
-    with filter_log(record):
+    with filter_log(record, first=True):  # a study keeps warnings from the log
         yield doubts
 
 
