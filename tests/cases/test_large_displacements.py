@@ -9,7 +9,8 @@ import pytest
 import xarray as xr
 
 import archfem as af
-from archfem.cases.report.conclusion import _describe_ends, build_conclusion, list_facts
+from archfem.cases.report.conclusion import build_conclusion, list_facts
+from archfem.cases.report.outcomes import describe_ends
 from archfem.cases.report.report_data import ReportData
 from archfem.cases.report.response import _build_mechanism, summarise_outcome
 from archfem.cases.result_text import tabulate_runs
@@ -194,6 +195,6 @@ def test_a_report_has_the_number_of_lost_stones_of_each_part(held):
     assert stated.startswith(f"Outcome: {words}. {lost}")
     run = with_fall(held, fall)
     vars(run)["fall"] = replace(fall, mechanism="by hinges (base) at 1.000 s, the last with joints")
-    (ends,) = _describe_ends(ReportData(case, {"shake": run}))
+    (ends,) = describe_ends(ReportData(case, {"shake": run}))
     assert ends.endswith(f": {short}; it falls by hinges (base) at 1.000 s, the last with joints")
     assert "\nit falls by hinges (base) at 1.000 s" in str(run.verdict)
