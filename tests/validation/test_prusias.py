@@ -105,7 +105,7 @@ def test_run_command_on_the_bridge(tmp_path, capsys):
     ]
     options = [word for text in changes for word in ("--set", text)]
     command = ["run", str(MESHES / "prusias.toml"), "--out", str(tmp_path), *options]
-    assert af.commands.main(command) == 0
+    assert af.commands.main(command) == 3  # elastic fill in tension is in doubt
     printed = capsys.readouterr().out
     assert "the first and the last effective along x" in printed
     for name in ("dead.png", "dead_stress.png", "free_body.png", "suite.txt", "envelope.png"):
@@ -182,7 +182,8 @@ def test_the_bridge_stands_at_the_peak_of_1999(verified):
     run = af.time_history(model, motion, start=af.dead_load(model), damping=damping, dt=0.005)
     assert run.verdict.outcome == "stands"
     assert not any(run.verdict.mechanisms.values())
-    assert not run.verdict.doubts
+    (doubt,) = run.verdict.doubts
+    assert doubt.words.startswith("elastic fill bears")
     # 9 mm are left; rattling joints may add some on another processor
     assert run.verdict.residual < 0.015
     case = "the bridge under a pair of the 0.299 g of Düzce 1999"
