@@ -13,7 +13,7 @@ from archfem.limit.fill_range import FillAssumption, FillRange
 from archfem.masonry.block import Block
 from archfem.masonry.loads import AttachedLoad
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
-from archfem.masonry.structure import Structure, join_names
+from archfem.masonry.structure import Structure
 from archfem.models.model import Doubt
 from archfem.motion.design_spectra import (
     DesignSpectrum,
@@ -25,7 +25,7 @@ from archfem.motion.design_spectra import (
 )
 from archfem.motion.motion import Motion
 from archfem.motion.response_spectra import response_spectrum
-from archfem.units import STANDARD_GRAVITY, format_ratio, kN
+from archfem.units import STANDARD_GRAVITY, format_ratio
 
 # Outcome of a check that passes with the weights of single blocks alone
 BY_SPLIT = "passes or fails by the split of weights"
@@ -255,10 +255,10 @@ def _check_place(load: AttachedLoad, block: Block, structure: Structure) -> None
     Masses may have their centre off the block that carries them, but a structure carries none that
     is further away than its stones reach.
     """
-    kind, near, of = "force", MAX_OFFSET * _measure(block), "an anchor"
+    kind, near, of = "force", MAX_OFFSET * measure_blocks(block), "an anchor"
     if not any(load.force):
         stones = [structure.blocks[number] for number in structure.free]
-        kind, near, of = "mass", _measure(*stones), "all stones together"
+        kind, near, of = "mass", measure_blocks(*stones), "all stones together"
     if (away := block.distance_to(load.point)) > near:
         (left, low), (right, high) = block.points.min(axis=0), block.points.max(axis=0)
         raise InvalidInput(
@@ -268,21 +268,9 @@ def _check_place(load: AttachedLoad, block: Block, structure: Structure) -> None
         )
 
 
-def _measure(*blocks: Block) -> float:
+def measure_blocks(*blocks: Block) -> float:
     """Return the length or height of blocks together, if this is larger [m]."""
     return float(np.ptp(np.concatenate([block.points for block in blocks]), axis=0).max())
-
-
-def describe_far_masses(structure: Structure, loads: Sequence[AttachedLoad]) -> str:
-    """Name masses that are further from their blocks than these are large; empty for none."""
-    far = []
-    for load in loads:
-        block = structure.blocks[structure.block_number(load.block)]
-        away = block.distance_to(load.point)
-        if load.weight and away > _measure(block):
-            far.append(f"{load.weight / kN:.4g} kN {away:.3g} m from {block.name}")
-    words = "masses act further from their blocks than these are large, {}: verify their points"
-    return words.format(join_names(far)) if far else ""
 
 
 def add_fill_ranges(found: Any, others: Mapping[FillAssumption, Any]) -> Any:

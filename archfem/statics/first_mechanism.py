@@ -18,12 +18,18 @@ from archfem.limit.displaced_blocks import (
     find_mechanism,
     find_tie_shares,
 )
+from archfem.limit.finite_mechanism import MechanismPath
 from archfem.limit.linear_programme import NoEquilibrium
 from archfem.limit.mechanism_kinematics import find_rigid_regions
 from archfem.masonry.loads import AttachedLoad
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import Structure, join_names
-from archfem.units import kN
+from archfem.models.model import Doubt
+from archfem.statics.assessment_checks import UPPER_BOUND, measure_blocks
+from archfem.units import format_mm, kN
+
+# Stretch from which a tie is doubted, as its free length is not known: 2 % of 2 m [m]
+MAX_STRETCH = 0.04
 
 
 class DoesNotStand(InvalidInput):
@@ -122,5 +128,72 @@ def describe_ties(
         size, name = np.hypot(*force) / kN, placed.structure.blocks[block].name
         need = f"{share * size:.4g}" if share > 1e-4 else "none"
         needs.append(f"{need} of the {size:.4g} kN of the tie at {name}")
-    side = "right" if placed.direction > 0.0 else "left"
-    return f"pushed to the {side}, alpha_0 needs {join_names(needs)}"
+    return f"pushed to the {placed.side}, alpha_0 needs {join_names(needs)}"
+
+
+def find_stretches(
+    placed: PlacedBlocks, path: MechanismPath | None, moved: Array, share: float
+) -> list[tuple[str, float]]:
+    """Return block and stretch of each tie at a share of a displacement on a path [m]."""
+    if path is None or len(moved) == 1:
+        return []
+    found, ties = [], [placed.moved(each).ties for each in path.displacements]
+    for k, (block, start, force) in enumerate(placed.ties):
+        away = (start - np.array([each[k][1] for each in ties])) @ force / np.hypot(*force)
+        size = float(np.interp(share * moved[-1], np.maximum.accumulate(moved), away))
+        # a hundredth of a millimetre is round-off
+        found.append((placed.structure.blocks[block].name, max(round(size, 5), 0.0)))
+    return found
+
+
+def doubt_stretches(stretches: Sequence[tuple[str, float]]) -> list[Doubt]:
+    """Return the doubts about ties that are stretched further than a short bar bears."""
+    words = (
+        "at the capacity the tie at {} is stretched by {:mm}, as 2 % of {:.3g} m of bar: the "
+        "displacement check is {}"
+    )
+    remedy = "a bar that breaks before has no share in it: verify its free length"
+    return [
+        Doubt(words, remedy, (name, size, size / 0.02, UPPER_BOUND))
+        for name, size in stretches
+        if size > MAX_STRETCH
+    ]
+
+
+def describe_loads(
+    placed: PlacedBlocks,
+    loads: Sequence[AttachedLoad],
+    ties: str,
+    stretches: Sequence[tuple[str, float]],
+) -> list[str]:
+    """Describe loads along the motion: fill, ties and constant forces; and masses far away."""
+    found = list[str]()
+    if placed.fill is not None:
+        found.append(
+            "all along the motion the pressures of the fill on the stones are those of the "
+            "weights as built: that the fill stays in place is not checked"
+        )
+    if ties:
+        at = ", ".join(f"{format_mm(size)} at {name}" for name, size in stretches)
+        found.append(
+            f"{ties}; along the motion a tie pulls with all of its force where it is stretched"
+            f"{f', at the capacity by {at},' * bool(at)} and else with none: verify bar and anchor"
+        )
+    if forces := [load.force for load in loads if any(load.force) and not load.passive]:
+        pushes = any(force[0] * placed.direction > 0.0 for force in forces)
+        found.append(
+            "constant forces have no mass, so that they are not pushed, and count from the start "
+            "of the motion to its end; attach only those whose presence is verified up to collapse"
+            + "; one pushes in this sense: a tie is `passive = true`"
+            * pushes
+        )
+    far = []
+    for load in loads:
+        block = placed.structure.blocks[placed.structure.block_number(load.block)]
+        away = block.distance_to(load.point)
+        if load.weight and away > measure_blocks(block):
+            far.append(f"{load.weight / kN:.4g} kN {away:.3g} m from {block.name}")
+    if far:
+        words = "masses act further from their blocks than these are large"
+        found.append(f"{words}, {join_names(far)}: verify their points")
+    return found

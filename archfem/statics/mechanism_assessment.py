@@ -63,21 +63,20 @@ from archfem.statics.assessment_checks import (
     LimitState,
     add_fill_ranges,
     check_assessable,
-    describe_far_masses,
     spectral_acceleration,
 )
 from archfem.statics.first_mechanism import (
     DoesNotStand,
+    describe_loads,
     describe_ties,
+    doubt_stretches,
     find_first_mechanism,
+    find_stretches,
     press_stones,
     select_joints,
     take_fill_as_loads,
 )
-from archfem.units import STANDARD_GRAVITY, format_mm, kN
-
-# Stretch from which a tie is doubted, as its free length is not known: 2 % of 2 m [m]
-MAX_STRETCH = 0.04
+from archfem.units import STANDARD_GRAVITY, kN
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -566,27 +565,8 @@ class _Oscillator:
         """Return the assumptions of the curve, and its omissions on the safe side."""
         if self.path is None:
             return []
-        found, collapse = [], self.path.mechanisms[0].factor
-        if self.placed.fill is not None:
-            found.append(
-                "all along the motion the pressures of the fill on the stones are those of the "
-                "weights as built: that the fill stays in place is not checked"
-            )
-        if self.ties:
-            at = ", ".join(f"{format_mm(size)} at {name}" for name, size in self.stretches)
-            found.append(
-                f"{self.ties}; along the motion a tie pulls with all of its force where it is "
-                f"stretched{f', at the capacity by {at},' * bool(at)} and else with none: verify "
-                "bar and anchor"
-            )
-        found += filter(None, [describe_far_masses(self.given.structure, self.given.loads)])
-        if forces := [x.force for x in self.placed.loads if any(x.force) and not x.passive]:
-            pushes = any(force[0] * self.placed.direction > 0.0 for force in forces)
-            found.append(
-                "constant forces have no mass, so that they are not pushed, and count from the "
-                "start of the motion to its end; attach only those whose presence is verified up "
-                "to collapse" + "; one pushes in this sense: a tie is `passive = true`" * pushes
-            )
+        found = describe_loads(self.placed, self.given.loads, self.ties, self.stretches)
+        collapse = self.path.mechanisms[0].factor
         if factor < (1.0 - 1e-3) * collapse:
             found.append(
                 f"sliding that dilates (associated flow) would raise alpha_0 to {collapse:.4g}, "
@@ -614,18 +594,8 @@ class _Oscillator:
     @cached_property
     def stretches(self) -> list[tuple[str, float]]:
         """Block and stretch of each tie at the capacity of the displacement check [m]."""
-        if self.path is None or len(self.path.factors) == 1:
-            return []
-        moved = np.maximum.accumulate(self.curve["d"].values)
-        capacity = self.given.rules.share * self.curve["d"].values[-1]
-        placed = [self.placed.moved(each).ties for each in self.path.displacements]
-        found = []
-        for k, (block, start, force) in enumerate(self.placed.ties):
-            away = start - np.array([ties[k][1] for ties in placed])
-            size = float(np.interp(capacity, moved, away @ force / np.hypot(*force)))
-            # a hundredth of a millimetre is round-off
-            found.append((self.placed.structure.blocks[block].name, max(round(size, 5), 0.0)))
-        return found
+        moved = self.curve["d"].values
+        return find_stretches(self.placed, self.path, moved, self.given.rules.share)
 
     @property
     def opens(self) -> bool:
@@ -643,11 +613,11 @@ class _Oscillator:
         found = self.given.rules.doubt(self.given.spectrum)
         if self.searched:
             words = (
-                f"pushed to the {'right' if self.placed.direction > 0.0 else 'left'}: whatever "
-                f"moves at this alpha_0, its linear ratio is {self.linear.floor:.3g} at least, "
-                "that of e* = 1"
+                "pushed to the {}: whatever moves at this alpha_0, its linear ratio is {:.3g} at "
+                "least, that of e* = 1"
             )
-            found += [self.searched, Doubt(words, values=(UPPER_BOUND,))]
+            values = self.placed.side, self.linear.floor, UPPER_BOUND
+            found += [self.searched, Doubt(words, values=values)]
         if self.fill and self.placed.fill is None and self.path is not None:
             words = "the fill counts as weight and mass on the stones, without its pressure on them"
             found.append(Doubt(words, "give fill for it"))
@@ -658,13 +628,7 @@ class _Oscillator:
             words = f"{place} joints open or slide that the mechanism keeps closed: {what} is {{}}"
             remedy = "a time history with large displacements can test it"
             found.append(Doubt(words, remedy, (UPPER_BOUND,)))
-        for name, size in [each for each in self.stretches if each[1] > MAX_STRETCH]:
-            words = (
-                "at the capacity the tie at {} is stretched by {:mm}, as 2 % of {:.3g} m of bar: "
-                "the displacement check is {}"
-            )
-            remedy = "a bar that breaks before has no share in it: verify its free length"
-            found.append(Doubt(words, remedy, (name, size, size / 0.02, UPPER_BOUND)))
+        found += doubt_stretches(self.stretches)
         return found
 
     @cached_property
@@ -749,8 +713,6 @@ class _Oscillator:
         acceleration = spectral_acceleration(self.given.spectrum, periods, rules.damping)
         demand = float((acceleration * (periods / (2.0 * np.pi)) ** 2).max())
         ratio = max(capacity / demand, starts)
-        found = AssessmentCheck(
-            rules.name, capacity, demand, "m", ratio, float(period), rules.source
-        )
-        higher = self.opens or any(size > MAX_STRETCH for _, size in self.stretches)
-        return replace(found, bounded=self.bounded_at_rest or (higher and ratio > starts))
+        higher = ratio > starts and bool(self.opens or doubt_stretches(self.stretches))
+        values = rules.name, capacity, demand, "m", ratio, float(period), rules.source
+        return AssessmentCheck(*values, bounded=self.bounded_at_rest or higher)
