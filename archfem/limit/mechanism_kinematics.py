@@ -226,17 +226,17 @@ def first_verified_mechanism(
     instants = np.flatnonzero(failed.any(axis=1))
     failures = (values[instants] for values in (side, slides, apart, np.sign(shear)))
     freedoms = dict(zip(instants.tolist(), joint_freedoms(*failures), strict=True))
-    # Instants with the same pattern of freedoms share the answer, and each motion is solved once.
-    moves: dict[bytes, Mechanism | None] = {}
 
     def find_motion(instant: int) -> int | None:
-        pattern = freedoms[instant].tobytes()
-        if pattern not in moves:
-            progress.show(f"{times[instant]:.3g} of {times[-1]:.3g} s, {len(moves)} patterns")
+        def move() -> Mechanism | None:
+            known = len(verifier.moves)
+            progress.show(f"{times[instant]:.3g} of {times[-1]:.3g} s, {known} patterns")
             permitted = verifier.loop_check.permits_motion(freedoms[instant])
             motion = verifier.verify(joints.isel(time=instant)) if permitted else None
-            moves[pattern] = motion.moved if motion and motion.kind != "none" else None
-        moved = moves[pattern]
+            return motion.moved if motion and motion.kind != "none" else None
+
+        # instants with the same pattern of freedoms share the answer
+        moved = verifier.moves.look_up(freedoms[instant].astype(np.int8).tobytes(), move)
         if moved is not None and beyond > 0.0:
             followed = follow_mechanism(joints, replace(moved, time=float(times[instant])), flags)
             moved = moved if followed.displacement > beyond else None
@@ -318,6 +318,11 @@ class Verifier:
         return VerifiedMechanism(moved, counted_mechanism(joints), regions.expand_motion(motion))
 
     @cached_property
+    def moves(self) -> RecentResults[Mechanism | None]:
+        """Mechanisms by the freedoms, or None: several searches of one history share them."""
+        return RecentResults(MAX_KNOWN_MOVES)
+
+    @cached_property
     def _motions(self) -> RecentResults[Array]:
         """Largest motions by the freedoms, scaled (3 n_free,): many histories share them."""
         return RecentResults(MAX_KNOWN_PATTERNS)
@@ -393,6 +398,10 @@ def _largest_motion(blocks: RigidBlocks, freedoms: Array) -> Array:
 
 # Patterns of failed joints whose answers are kept, of some kilobytes each at most
 MAX_KNOWN_PATTERNS = 4096
+
+# Those whose mechanism is kept, or that there is none, of some hundred bytes each: a run of 30 s of
+# a gate of 52 stones has 14 000, and is searched again by other criteria and from its file
+MAX_KNOWN_MOVES = 100_000
 
 
 @dataclass(frozen=True, eq=False)
