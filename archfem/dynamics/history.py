@@ -63,7 +63,8 @@ LOOSE_BLOCKS = (
     "rigid ones: with elastic joints they may move farther, and mechanisms were sought until then"
 )
 MEETING_REMEDY = (
-    "join these stones by a joint or make them one, or leave a gap that they do not close"
+    "join these stones by a joint or make them one, end a bed away from a corner that they share, "
+    "or leave a gap that they do not close"
 )
 
 # Kind of the file of a history
