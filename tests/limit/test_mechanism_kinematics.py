@@ -22,7 +22,7 @@ from mechanisms import (
 import archfem as af
 from archfem.limit import first_verified_mechanism, verified_mechanism
 from archfem.limit.linear_programme import RigidBlocks
-from archfem.limit.mechanism_kinematics import LoopCheck
+from archfem.limit.mechanism_kinematics import LoopCheck, get_verifier
 
 
 def test_four_alternating_hinges_are_a_mechanism():
@@ -166,6 +166,17 @@ def test_the_first_mechanism_that_moves_farther_is_that_without_the_loose_stones
     assert none is None
     with pytest.raises(af.InvalidInput, match=r"beyond = 0\.002 needs opening and slip"):
         first_verified_mechanism(structure, joints.drop_vars("slip"), beyond=2e-3)
+
+
+def test_patterns_that_one_search_answers_are_known_to_the_next(monkeypatch):
+    """Those of a run, of its summary and of its file are the same; another structure has none."""
+    get_verifier.cache_clear()
+    structure, joints = twitching("pier 2")
+    first = first_verified_mechanism(structure, joints, beyond=2e-3)
+    monkeypatch.setattr(LoopCheck, "permits_motion", lambda *_: pytest.fail("asked again"))
+    assert first_verified_mechanism(structure, joints, beyond=2e-3).moved == first.moved
+    with pytest.raises(pytest.fail.Exception, match="asked again"):
+        first_verified_mechanism(*twitching("side wall"), beyond=2e-3)
 
 
 def test_a_stone_that_slides_moves_by_its_slip():
