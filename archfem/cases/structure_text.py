@@ -33,7 +33,7 @@ def describe_supports(structure: Structure, max_names: int = 4) -> str:
 
 
 def describe_depths(structure: Structure) -> str:
-    """Describe depths of the assessed joints by part, and clear spans and piers, in two lines."""
+    """Describe depths of the assessed joints by part, clear spans and piers, and lintels."""
     depths = np.where(structure.judged, structure.depths, np.inf)
     parts = np.array([joint.part for joint in structure.joints])
     names = dict.fromkeys(parts[structure.judged].tolist())
@@ -45,7 +45,7 @@ def describe_depths(structure: Structure) -> str:
     return (
         f"depth of joints: {format_mm(float(depths.min()))} at least, at "
         f"{structure.joints[int(depths.argmin())].name}; median {join_names(medians)}\n"
-        f"{describe_spans(structure)}{_name_slivers(structure)}"
+        f"{describe_spans(structure)}{_name_slivers(structure)}{_describe_bearing(structure)}"
     )
 
 
@@ -58,8 +58,30 @@ def _name_slivers(structure: Structure, share: float = 0.25) -> str:
         return ""
     return (
         f"\nstones shorter than {share:g} of the usual {format_mm(usual)}: {join_names(slivers)}; "
-        "put jambs of openings above one another, or further apart"
+        "put jambs of openings further apart"
     )
+
+
+def _describe_bearing(structure: Structure) -> str:
+    """Return a line on the lintel of a wall in bond with the least bearing for its gap, if any."""
+    found, beds = [], np.flatnonzero(~structure.heads)
+    pairs = structure.pairs[beds]
+    above = pairs[np.arange(len(beds)), structure.centroids[pairs, 1].argmax(axis=1)]
+    for number in np.unique(above) if structure.heads.any() else ():
+        ends = np.sort(structure.ends[beds[above == number], :, 0], axis=1)
+        ends = ends[ends[:, 0].argsort()]
+        gaps = ends[1:, 0] - ends[:-1, 1]
+        edges = np.flatnonzero(gaps > 0.01)  # wider than gaps of a survey
+        if len(edges):
+            bearing = float((ends[[*edges, -1], 1] - ends[[0, *(edges + 1)], 0]).min())
+            # NHBC Standards 2020, 6.1.12, table 5: lintels of steel or concrete
+            usual = 0.10 if gaps.max() <= 1.2 else 0.15
+            found.append((bearing / usual, bearing, usual, structure.blocks[number].name))
+    if not found:
+        return ""
+    share, bearing, usual, name = min(found)
+    short = f", less than the {format_mm(usual)} of lintels in new houses" if share < 1.0 else ""
+    return f"\nleast bearing of a lintel: {format_mm(bearing)}, of '{name}'{short}"
 
 
 def describe_thickness(case: Case, ring: Ring) -> tuple[str, float, list[str]]:

@@ -542,15 +542,30 @@ def test_without_a_solution_the_bound_is_the_answer(monkeypatch):
     assert found.hinges == dilating.hinges
 
 
+def slivered_facade():
+    """A door below a window; jambs and head joints of both stand in every second course."""
+    levels, blocks = [*np.linspace(0.0, 3.6, 13), 3.925, 4.25, 4.575, 4.9], []
+    ground = [(-3.5, -0.5), (3.5, -0.5), (3.5, 0.0), (-3.5, 0.0)]
+    blocks.append(af.Block(ground, af.STONE, "ground", fixed=True, part="ground", role="other"))
+    least = [0.5] * 5 + [1.0, 0.3, 0.3, 0.3, 0.4] + [0.0] * 6  # lintels have no joints within
+    holes = [0.5] * 5 + [0.0] * 2 + [0.3] * 2 + [0.0] * 7
+    for k, (low, high) in enumerate(pairwise(levels)):
+        ends = [min(2.5, 2.5 * (4.9 - y) / 1.3) for y in (low, high)]
+        places = [x for x in ((1.5, 0.5, 0.3), (2.0, 1.0, 0.4, 0.0))[k % 2] if x >= least[k]]
+        inner = {s * x for x in [*places, *filter(None, [holes[k]])] for s in (-1, 1)}
+        inner = sorted(x for x in inner if abs(x) < ends[1] - 0.18)
+        lower, upper = ([-end, *inner, end] for end in ends)
+        for (a, b), (c, d) in zip(pairwise(lower), pairwise(upper), strict=True):
+            if not holes[k] or abs(a + b) > 1e-9:
+                corners = tuple(dict.fromkeys([(a, low), (b, low), (d, high), (c, high)]))
+                name = f"course {k + 1}, stone {len(blocks)}"
+                blocks.append(af.Block(corners, af.STONE, name, part="wall", role="pier"))
+    return af.masonry.assembled(blocks, af.masonry.STONE_TO_STONE, width=0.55)
+
+
 def test_a_facade_in_bond_settles_at_a_state(monkeypatch):
     """Neither what relaxes by a share of 0.1 alone nor the associated state leads to a state."""
-    openings = {
-        "door": {"left": "-0.5 m", "breadth": "1 m", "head": "1.5 m"},
-        "window": {"left": "-0.3 m", "breadth": "0.6 m", "sill": "2.1 m", "head": "2.7 m"},
-    }
-    lengths = {"breadth": 5.0, "height": 4.9, "eaves": 3.6, "width": 0.55, "course": 0.3}
-    settings = {"shape": "wall", "stone": 0.9, "openings": openings} | lengths
-    structure = af.Case.of({"structure": settings}).structure
+    structure = slivered_facade()
     joints = [replace(joint, contact=rough(0.65)) for joint in structure.joints]
     structure = replace(structure, joints=tuple(joints))
     monkeypatch.setattr(nonassociated, "MAX_START_COUNT", 1)

@@ -1,6 +1,7 @@
 """Walls in bond by a few lengths, against areas by hand, stones laid one by one, closed forms."""
 
 import re
+from dataclasses import replace
 from functools import cache
 from itertools import pairwise
 
@@ -114,7 +115,7 @@ def test_opening_takes_its_area_or_is_refused(opening, area):
 
 
 def test_stones_far_shorter_than_most_are_named():
-    """A jamb of the window is 0.25 m from one of the door: half of it is 125 mm."""
+    """A pier between two windows is 0.1 m broad, of three courses; one lintel spans both."""
     lengths = {
         "breadth": 6.2,
         "height": 6.1,
@@ -123,13 +124,102 @@ def test_stones_far_shorter_than_most_are_named():
         "course": 0.3,
         "stone": 0.75,
     }
+    openings = [lay_opening(-0.7, -0.1, 3.0, 3.9), lay_opening(0.0, 0.7, 3.0, 3.9, "other")]
+    says = describe_depths(af.shapes.wall(**lengths, openings=openings)).splitlines()
+    assert says[2].startswith("stones shorter than 0.25 of the usual 800 mm")
+    assert re.findall(r"\((\d+) mm\)", says[2]) == ["100", "100", "100"]
+    # its jambs are 0.25 m from those of the door, which leaves stones of three eighths
     door, window = lay_opening(-0.6, 0.6, 0.0, 2.1), lay_opening(-0.35, 0.35, 3.0, 3.9)
-    says = describe_depths(af.shapes.wall(**lengths, openings=[door, window])).splitlines()
-    assert says[2].startswith("stones shorter than 0.25 of the usual 7")
-    assert re.findall(r"\((\d+) mm\)", says[2]) == ["125", "125"]
-    aligned = lay_opening(-0.6, 0.6, 3.0, 3.9)
-    whole = describe_depths(af.shapes.wall(**lengths, openings=[door, aligned]))
-    assert len(whole.splitlines()) == 2
+    whole = describe_depths(af.shapes.wall(**lengths, openings=[door, window])).splitlines()
+    assert "shorter than" not in "".join(whole)
+
+
+def lay_front(bearing=None, extra=()):
+    """A door and two windows below three upper windows on nearly the same axes."""
+    places = [(-2.9, 1.0, 0.0, 2.1), (-0.6, 0.9, 0.9, 2.1), (1.6, 0.9, 0.9, 2.1)]
+    places += [(left, 0.8, 3.6, 4.7) for left in (-2.8, -0.55, 1.65)]
+    openings = [
+        af.shapes.Opening(left=x, breadth=b, sill=low, head=high, bearing=bearing, name=f"{k}")
+        for k, (x, b, low, high) in enumerate([*places, *extra])
+    ]
+    lengths = {"breadth": 7.6, "height": 5.4, "width": 0.5, "course": 0.3, "stone": 0.6}
+    return lengths | {"openings": openings}
+
+
+def random_front(seed):
+    """Three storeys on one to three axes, with openings of a breadth of each storey."""
+    rng = np.random.default_rng(seed)
+    breadth, count, openings = rng.uniform(6.0, 9.0), rng.integers(1, 4), []
+    axes = ((np.arange(count) + 0.5) / count - 0.5) * (breadth - 1.0)
+    for storey, (sill, head) in enumerate([(0.9, 2.1), (3.6, 4.7), (6.3, 7.3)]):
+        wide = rng.uniform(0.7, 1.1)
+        for k, x in enumerate(axes.tolist()):
+            opening = lay_opening(x - wide / 2, x + wide / 2, sill, head, f"{storey}.{k}")
+            openings.append(opening if k or storey else replace(opening, sill=0.0))
+    sizes = {"breadth": breadth, "height": 8.0, "width": 0.5, "course": 0.3}
+    return sizes | {"stone": rng.uniform(0.4, 0.7), "openings": openings}
+
+
+def measure_bond(wall, openings):
+    """Least stone and overlap of head joints, and bearings of each opening; from outlines [m]."""
+    courses = {}
+    for number in wall.free:
+        (left, low), (right, _) = (
+            wall.blocks[number].points.min(0),
+            wall.blocks[number].points.max(0),
+        )
+        courses.setdefault(round(low, 6), []).append((left, right))
+    rows = [sorted(courses[low]) for low in sorted(courses)]
+    shortest = min(right - left for row in rows for left, right in row)
+    heads = [[b for (_, b), (c, _) in pairwise(row) if abs(b - c) < 1e-9] for row in rows]
+    overlap = min(abs(x - y) for one, other in pairwise(heads) for x in one for y in other)
+    bearings = {}
+    for each in openings:
+        ((left, right),) = (
+            ends
+            for ends in courses[round(each.head, 6)]
+            if ends[0] < each.left and ends[1] > each.right
+        )
+        bearings[each.name] = (each.left - left, right - each.right)
+    return shortest, overlap, bearings
+
+
+@pytest.mark.parametrize(
+    "lengths",
+    [lay_front(), lay_front(0.25), *(random_front(seed) for seed in range(8))],
+    ids=["front", "bearing", *(f"seed {seed}" for seed in range(8))],
+)
+def test_jambs_of_one_storey_leave_the_bond_of_others(lengths):
+    """Jambs nearly above one another cut no slivers, and head joints keep a quarter of a stone."""
+    wall, stone, openings = af.shapes.wall(**lengths), lengths["stone"], lengths["openings"]
+    void = sum(each.breadth * (each.head - each.sill) for each in openings)
+    area = sum(wall.blocks[number].area for number in wall.free)
+    assert area == pytest.approx(lengths["breadth"] * lengths["height"] - void, rel=1e-12)
+    shortest, overlap, bearings = measure_bond(wall, openings)
+    assert shortest > 0.374 * stone
+    assert overlap > 0.249 * stone
+    assert min(map(min, bearings.values())) > 0.249 * stone
+
+
+def test_lintels_bear_on_the_given_length_or_a_quarter_of_a_stone():
+    lengths = lay_front(0.25)
+    wall = af.shapes.wall(**lengths)
+    *_, bearings = measure_bond(wall, lengths["openings"])
+    assert np.array([*bearings.values()]) == pytest.approx(0.25, abs=1e-12)
+    assert describe_depths(wall).endswith(
+        "\nleast bearing of a lintel: 250 mm, of 'course 17, stone 3'"
+    )
+    short = af.shapes.wall(**lay_front(0.08))
+    assert re.search(r": 80 mm, of '[^']*', less than the 100 mm of", describe_depths(short))
+    broad = lay_front() | {"openings": [lay_opening(-0.8, 0.8, 0.0, 2.1)]}  # from 1.2 m on 150 mm
+    broad["openings"] = [replace(broad["openings"][0], bearing=0.12)]
+    assert ": 120 mm, of 'course 8, stone 6', less than the 150 mm of" in describe_depths(
+        af.shapes.wall(**broad)
+    )
+    # lintels that meet have a joint between them; the pier is 1.3 m broad
+    lengths = lay_front(0.65) | {"openings": lay_front(0.65)["openings"][:2]}
+    *_, bearings = measure_bond(af.shapes.wall(**lengths), lengths["openings"])
+    assert np.array([*bearings.values()]) == pytest.approx(0.65, abs=1e-12)
 
 
 def test_a_course_is_no_taller_than_the_wall():
@@ -230,6 +320,19 @@ def test_case_file_has_openings_by_name(tmp_path):
         (
             {"openings": [DOOR, af.shapes.Opening(left=-0.5, breadth=0.5, sill=2.0, head=2.2)]},
             "lintel",
+        ),
+        ({"openings": [replace(DOOR, bearing=0.0)]}, r"door: bearing \[m\] = 0.0 is not above 0"),
+        (
+            {"openings": [replace(DOOR, bearing=1.2)]},
+            r"from x = -1\.95 to 1\.45 m, with its bearing, and.*has room",
+        ),
+        (  # its lintel is below a slope
+            {"eaves": 1.9, "openings": [replace(DOOR, left=-0.5, bearing=1.2)]},
+            r"below 1\.5\d* m from",
+        ),
+        (
+            {"openings": [replace(DOOR, bearing=0.1), replace(DOOR, left=0.6, breadth=0.4)]},
+            r"0\.35 m apart, and bearings of lintels take 0\.225 m.*leave 0\.1875 m for a stone",
         ),
     ],
 )

@@ -1,12 +1,14 @@
 """Walls of dry stone in running bond, in their plane: rectangles and gables, with openings.
 
 The origin is at the middle of the foot. Head joints stand above one another in every second course
-and are counted from the jambs of the openings, in walls without openings from the middle.
+and are counted from the jambs of the openings, in walls without openings from the middle. Where
+jambs of two storeys are nearly above one another, those of the lower one count; a head joint too
+near a jamb, the end of a lintel or another head joint moves a little, or is left out.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import combinations, pairwise
+from itertools import combinations, pairwise, permutations
 
 import numpy as np
 
@@ -22,21 +24,30 @@ from archfem.units import G
 # Least distance of a head joint from the edge of a wall, over the length of a stone
 LEAST_END = 0.2
 
+# Over the length of a stone: least stone beside a jamb or lintel, and most by which a head joint
+# moves; longest stone with a joint left out; least overlap of head joints and bearing of a lintel
+LEAST_STONE, LONGEST_STONE, LEAST_OVERLAP, LEAST_BEARING = 0.375, 1.5, 0.25, 0.25
+ROUND_OFF = 1e-9  # of places of head joints, over the same
+
 # Depth of the ground below a wall, and its breadth beside it [m]
 GROUND_DEPTH, GROUND_BESIDE = 0.5, 1.0
+
+Span = tuple[float, float]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Opening:
     """A door or window of a wall, below a lintel of one course.
 
-    The lintel ends at the first head joints of its course beyond both jambs.
+    Openings too near one another for two lintels have one.
 
     Attributes:
         left: place x of the left jamb, from the middle of the wall [m].
         breadth: clear breadth [m].
         head: height of the lintel's lower face above the ground [m].
         sill: height of the sill above the ground; 0 of a door [m].
+        bearing: length on which the lintel bears beside each jamb; by default to the first head
+            joints of its course from a quarter of a stone on [m].
         name: name of the opening.
     """
 
@@ -44,6 +55,7 @@ class Opening:
     breadth: Metres
     head: Metres
     sill: Metres = 0.0
+    bearing: Metres | None = None
     name: str = "opening"
 
     @property
@@ -88,8 +100,8 @@ def wall(  # noqa: PLR0913  (all are lengths and properties of one structure)
 
     Raises:
         InvalidInput: there are more than 10 000 stones.
-        InvalidStructure: a length is not positive; or an opening is not within the wall, overlaps
-            another, or leaves no course for its lintel.
+        InvalidStructure: a length is not positive; or an opening or its lintel is not within the
+            wall, overlaps another opening, or leaves no course for its lintel.
 
     Example:
         >>> barn = af.shapes.wall(breadth=4.0, height=4.0, eaves=2.5, width=0.4)
@@ -114,18 +126,19 @@ def wall(  # noqa: PLR0913  (all are lengths and properties of one structure)
     for each in openings:
         _check_opening(each, height, half(each.head) - LEAST_END * stone)
     _check_overlap(openings)
+    _check_bearings(openings, stone)
     side = 0.5 * breadth + GROUND_BESIDE
     ground = ((-side, -GROUND_DEPTH), (side, -GROUND_DEPTH), (side, 0.0), (-side, 0.0))
     blocks = [Block(ground, material, "ground", fixed=True, part="ground", role="other")]
     stops = {0.0, shoulder, height}.union(*((each.sill, each.head) for each in openings))
     levels = _divide(sorted(stops), course)
-    bond = _lay_bond(0.5 * breadth, openings, stone)
-    check_integer(len(levels) * len(bond[0]), "courses times stones", maximum=10_000)
-    # half stones beside the jambs carry the lintel of the lowest head
-    first = levels.index(min(each.head for each in openings)) + 1 if openings else 0
+    for each in openings:
+        if each.bearing is not None:
+            top = levels[levels.index(each.head) + 1]  # of the lintel, below a slope
+            _check_opening(each, height, half(top) - LEAST_END * stone)
+    laid = _lay_courses(levels, 0.5 * breadth, openings, stone)
     for k, (low, high) in enumerate(pairwise(levels)):
-        joints = _lay_course(bond[(k - first) % 2], openings, low)
-        inner = [x for x in joints if abs(x) < half(high) - LEAST_END * stone]
+        inner = [x for x in laid[k] if abs(x) < half(high) - LEAST_END * stone]
         lower, upper = ([-end, *inner, end] for end in (half(low), half(high)))
         rows = zip(pairwise(lower), pairwise(upper), strict=True)
         gaps = {each.left for each in openings if each.sill <= low < each.head}
@@ -139,12 +152,17 @@ def wall(  # noqa: PLR0913  (all are lengths and properties of one structure)
 
 def _check_opening(opening: Opening, height: float, reach: float) -> None:
     """Refuse an opening that is not within a wall, up to `reach` from its middle at the head."""
+    if opening.bearing is not None:
+        check_between(opening.bearing, f"{opening.name}: bearing [m]", 0.0, error=InvalidStructure)
     within = 0.0 <= opening.sill < opening.head < height and opening.breadth > 0.0
-    if not within or max(-opening.left, opening.right) >= reach:
+    bearing = opening.bearing or 0.0
+    words = ", with its bearing," if bearing else ""
+    left, right = opening.left - bearing, opening.right + bearing
+    if not within or max(-left, right) >= reach:
         raise InvalidStructure(
-            f"opening '{opening.name}' is from x = {opening.left:.4g} to {opening.right:.4g} m and "
-            f"from {opening.sill:.4g} to {opening.head:.4g} m high: the wall is {height:.4g} m "
-            f"high, and has room for it below {reach:.4g} m from the middle at its head: "
+            f"opening '{opening.name}' is from x = {left:.4g} to {right:.4g} m{words} "
+            f"and from {opening.sill:.4g} to {opening.head:.4g} m high: the wall is {height:.4g} m "
+            f"high, and has room for it below {reach:.4g} m from the middle there: "
             "move it, or make it smaller"
         )
 
@@ -160,6 +178,24 @@ def _check_overlap(openings: Sequence[Opening]) -> None:
             )
 
 
+def _check_bearings(openings: Sequence[Opening], stone: float) -> None:
+    """Refuse given bearings for which there is no room, or only that of a sliver, beside them."""
+    least = LEAST_STONE * stone
+    for one, other in permutations(openings, 2):
+        if one.bearing is None or not other.sill <= one.head <= other.head:
+            continue
+        needed = one.bearing
+        if one.head == other.head:
+            needed += other.bearing or LEAST_BEARING * stone
+        free = max(one.left - other.right, other.left - one.right) - needed
+        if min(abs(free), least - free) > ROUND_OFF * stone:
+            raise InvalidStructure(
+                f"openings '{one.name}' and '{other.name}' are {needed + free:.4g} m apart, and "
+                f"bearings of lintels take {needed:.4g} m: change these until the lintels meet, or "
+                f"leave {least:.4g} m for a stone between them"
+            )
+
+
 def _divide(stops: Sequence[float], size: float) -> list[float]:
     """Divide intervals into equal pieces of about a given size, and return all their ends."""
     pieces = [
@@ -169,11 +205,40 @@ def _divide(stops: Sequence[float], size: float) -> list[float]:
     return np.unique(np.concatenate(pieces)).tolist()
 
 
+def _lay_courses(
+    levels: Sequence[float], half: float, openings: Sequence[Opening], stone: float
+) -> list[Array]:
+    """Return the places at which stones end in each course, from below."""
+    bond, lows = _lay_bond(half, openings, stone), levels[:-1]
+    check_integer(len(levels) * len(bond[0]), "courses times stones", maximum=10_000)
+    # lintels of the lowest head end half a stone beside the jambs
+    first = levels.index(min(each.head for each in openings)) + 1 if openings else 0
+    courses = [bond[(k - first) % 2] for k in range(len(lows))]
+    holes = [[(e.left, e.right) for e in openings if e.sill <= low < e.head] for low in lows]
+    heads = [[e for e in openings if e.head == low] for low in lows]
+    lintels = [_span_lintels(*each, stone) for each in zip(courses, holes, heads, strict=True)]
+    jambs, ends = (
+        [[x for span in spans for x in span if np.isfinite(x)] for spans in rows] + [[]]
+        for rows in (holes, lintels)
+    )
+    laid, below = [], list[float]()
+    for k, joints in enumerate(courses):
+        free = _outside(joints, holes[k] + lintels[k], -ROUND_OFF * stone)
+        above = ends[k + 1] + [x for x in jambs[k + 1] if x not in joints]
+        below = ends[k] + _settle(free, jambs[k] + ends[k], below + above, stone)
+        laid.append(np.unique(jambs[k] + below))
+    return laid
+
+
 def _lay_bond(half: float, openings: Sequence[Opening], stone: float) -> tuple[Array, Array]:
     """Return the head joints of courses with joints at the jambs, and of those between them."""
-    jambs = sorted({x for each in openings for x in (each.left, each.right)}) or [0.0]
+    jambs: list[float] = []
+    for _, x in sorted((each.head, x) for each in openings for x in (each.left, each.right)):
+        # half a stone between nearer ones would be less than the least overlap
+        if all(abs(x - other) >= 2.0 * LEAST_OVERLAP * stone for other in jambs):
+            jambs.append(x)
     whole, between = [], []
-    for low, high in pairwise([-half, *jambs, half]):
+    for low, high in pairwise([-half, *(sorted(jambs) or [0.0]), half]):
         # half stones: their number is even between jambs, any beside the outer ones
         outer = low == -half or high == half
         count = count_pieces(high - low, 0.5 * stone if outer else stone, "stones of a course")
@@ -184,11 +249,58 @@ def _lay_bond(half: float, openings: Sequence[Opening], stone: float) -> tuple[A
     return np.unique(np.concatenate(whole)), np.concatenate(between)
 
 
-def _lay_course(joints: Array, openings: Sequence[Opening], low: float) -> Array:
-    """Return the head joints of a course from a level, given those of the bond."""
-    for each in openings:
-        if each.sill <= low <= each.head:  # no stone ends in an opening, or within its lintel
-            joints = joints[(joints < each.left) | (joints > each.right)]
-        if each.sill <= low < each.head:
-            joints = np.append(joints, [each.left, each.right])
-    return np.unique(joints)
+def _outside(joints: Array, spans: Sequence[Span], inside: float) -> Array:
+    """Return the head joints outside of spans, or within them by up to a length."""
+    for low, high in spans:
+        joints = joints[(joints <= low + inside) | (joints >= high - inside)]
+    return joints
+
+
+def _span_lintels(
+    joints: Array, holes: Sequence[Span], heads: Sequence[Opening], stone: float
+) -> list[Span]:
+    """Return from where to where lintels of a course are; infinite to the ends of the wall."""
+    least, bearing = LEAST_STONE * stone, LEAST_BEARING * stone
+    spans = [
+        (each.left - each.bearing, each.right + each.bearing) for each in heads if each.bearing
+    ]
+    known, heads = [*holes, *spans], [each for each in heads if not each.bearing]
+    kept = [(left - least, right + least) for left, right in known]
+    kept += [(each.left - bearing, each.right + bearing) for each in heads]
+    inner = _outside(joints, kept, ROUND_OFF * stone)
+    stops = [-np.inf, *inner, *(x for span in known for x in span), np.inf]
+    for each in heads:
+        left = max(x for x in stops if x <= each.left)
+        right = min(x for x in stops if x >= each.right)
+        # beside a jamb that the bond does not follow, half a stone is enough where one fits beyond
+        alone = not any(left < x.left < each.left or each.right < x.left < right for x in heads)
+        if alone and each.left - left > stone and each.left not in joints:
+            left = each.left - 0.5 * stone
+        if alone and right - each.right > stone and each.right not in joints:
+            right = each.right + 0.5 * stone
+        spans.append((left, right))
+    return spans
+
+
+def _settle(
+    joints: Array, ends: Sequence[float], others: Sequence[float], stone: float
+) -> list[float]:
+    """Move head joints too near ends in their course, or joints of others, or leave them out."""
+    least, overlap, near = (share * stone for share in (LEAST_STONE, LEAST_OVERLAP, ROUND_OFF))
+
+    def has_room(x: float, fixed: Sequence[float]) -> bool:
+        limits = (fixed, least), (others, overlap)
+        return all((np.abs(np.array(far) - x) >= length - near).all() for far, length in limits)
+
+    settled = [x for x in joints.tolist() if has_room(x, ends)]
+    for joint in sorted(set(joints.tolist()).difference(settled), key=abs):
+        fixed = [*ends, *settled]
+        low = max((x for x in fixed if x < joint), default=-np.inf)
+        high = min((x for x in fixed if x > joint), default=np.inf)
+        places = [x + move for x in fixed for move in (-least, least)]
+        places += [x + move for x in others for move in (-overlap, overlap)]
+        # the nearest place counts, and one farther than this is beyond a jamb
+        fits = [x for x in places if abs(x - joint) <= least and has_room(x, fixed)]
+        if fits and high - low > LONGEST_STONE * stone:
+            settled.append(min(fits, key=lambda x: (round(abs(x - joint) / near), abs(x))))
+    return settled
