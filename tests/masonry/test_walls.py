@@ -161,7 +161,7 @@ def random_front(seed):
 
 
 def measure_bond(wall, openings):
-    """Least stone and overlap of head joints, and bearings of each opening; from outlines [m]."""
+    """Least and longest stone, overlap of head joints, and bearings; from outlines [m]."""
     courses = {}
     for number in wall.free:
         (left, low), (right, _) = (
@@ -170,7 +170,7 @@ def measure_bond(wall, openings):
         )
         courses.setdefault(round(low, 6), []).append((left, right))
     rows = [sorted(courses[low]) for low in sorted(courses)]
-    shortest = min(right - left for row in rows for left, right in row)
+    lengths = [right - left for row in rows for left, right in row]
     heads = [[b for (_, b), (c, _) in pairwise(row) if abs(b - c) < 1e-9] for row in rows]
     overlap = min(abs(x - y) for one, other in pairwise(heads) for x in one for y in other)
     bearings = {}
@@ -181,7 +181,8 @@ def measure_bond(wall, openings):
             if ends[0] < each.left and ends[1] > each.right
         )
         bearings[each.name] = (each.left - left, right - each.right)
-    return shortest, overlap, bearings
+        lengths = [x for x in lengths if x != right - left]
+    return (min(lengths), max(lengths)), overlap, bearings
 
 
 @pytest.mark.parametrize(
@@ -195,9 +196,11 @@ def test_jambs_of_one_storey_leave_the_bond_of_others(lengths):
     void = sum(each.breadth * (each.head - each.sill) for each in openings)
     area = sum(wall.blocks[number].area for number in wall.free)
     assert area == pytest.approx(lengths["breadth"] * lengths["height"] - void, rel=1e-12)
-    shortest, overlap, bearings = measure_bond(wall, openings)
+    (shortest, longest), overlap, bearings = measure_bond(wall, openings)
     assert shortest > 0.374 * stone
+    assert longest < 1.501 * stone
     assert overlap > 0.249 * stone
+    assert wall.depths[~wall.heads].min() > 0.249 * stone  # beds of stones below a sill too
     assert min(map(min, bearings.values())) > 0.249 * stone
 
 
@@ -209,6 +212,10 @@ def test_lintels_bear_on_the_given_length_or_a_quarter_of_a_stone():
     assert describe_depths(wall).endswith(
         "\nleast bearing of a lintel: 250 mm, of 'course 17, stone 3'"
     )
+    # by default to the next head joints, and half a stone beside jambs that the bond leaves out
+    *_, bearings = measure_bond(af.shapes.wall(**lay_front()), lengths["openings"])
+    assert np.array([bearings[name] for name in "345"]) == pytest.approx(0.3, abs=1e-12)
+    assert np.array([bearings[name] for name in "12"]) == pytest.approx(1.3 / 4, abs=1e-12)
     short = af.shapes.wall(**lay_front(0.08))
     assert re.search(r": 80 mm, of '[^']*', less than the 100 mm of", describe_depths(short))
     broad = lay_front() | {"openings": [lay_opening(-0.8, 0.8, 0.0, 2.1)]}  # from 1.2 m on 150 mm
@@ -216,6 +223,11 @@ def test_lintels_bear_on_the_given_length_or_a_quarter_of_a_stone():
     assert ": 120 mm, of 'course 8, stone 6', less than the 150 mm of" in describe_depths(
         af.shapes.wall(**broad)
     )
+    # one lintel spans both sides of a pier of a quarter of a stone
+    narrow = [lay_opening(-1.2, -0.4, 3.6, 4.7, "left"), lay_opening(-0.25, 0.6, 3.6, 4.7, "right")]
+    narrow = lay_front() | {"openings": [lay_opening(-0.5, 0.5, 0.0, 2.1), *narrow]}
+    *_, bearings = measure_bond(af.shapes.wall(**narrow), narrow["openings"])
+    assert bearings["left"][1] == pytest.approx(0.15 + 0.85 + bearings["right"][1])
     # lintels that meet have a joint between them; the pier is 1.3 m broad
     lengths = lay_front(0.65) | {"openings": lay_front(0.65)["openings"][:2]}
     *_, bearings = measure_bond(af.shapes.wall(**lengths), lengths["openings"])
