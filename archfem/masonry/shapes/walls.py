@@ -82,8 +82,8 @@ def wall(  # noqa: PLR0913  (all are lengths and properties of one structure)
     """Return a wall in running bond on fixed ground, in its plane.
 
     Courses are of equal height between the levels of eaves, sills, heads and ridge, stones of equal
-    length between jambs. Head joints of a course are half a stone beside those of the next one.
-    Every course begins its numbers at the left: "course 3, stone 1".
+    length between jambs. Head joints of a course are half a stone beside those of the next one, or
+    a quarter where jambs or lintels need it. Every course begins its numbers at the left: "course 3, stone 1".
 
     Args:
         breadth: breadth at the ground [m].
