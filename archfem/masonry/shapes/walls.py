@@ -83,7 +83,8 @@ def wall(  # noqa: PLR0913  (all are lengths and properties of one structure)
 
     Courses are of equal height between the levels of eaves, sills, heads and ridge, stones of equal
     length between jambs. Head joints of a course are half a stone beside those of the next one, or
-    a quarter where jambs or lintels need it. Every course begins its numbers at the left: "course 3, stone 1".
+    a quarter where jambs or lintels need it. Every course begins its numbers at the left: "course
+    3, stone 1".
 
     Args:
         breadth: breadth at the ground [m].
