@@ -115,6 +115,7 @@ def test_each_result_is_shown_in_a_line_or_two(things):
     assert "factor 0.25" in repr(things[4])  # b / h of the whole column, 0.4 / 1.6
 
 
+@pytest.mark.slow
 def test_pictures_are_loaded_on_first_use():
     script = """
 import sys, archfem as af

@@ -130,6 +130,7 @@ def test_damaged_code_is_found_and_compiled_anew(which, damage, stored):
         compiled(hits=1)
 
 
+@pytest.mark.slow
 def test_one_of_two_processes_compiles(tmp_path):
     """They begin at once, and one loads the code that the other has stored."""
     (tmp_path / "functions.py").write_text(FUNCTION)

@@ -119,6 +119,7 @@ def test_a_given_strength_of_the_stones_is_that_of_the_limit_analysis():
     assert strength_of(materials=given, limit={"strength": "none"}) == np.inf
 
 
+@pytest.mark.slow
 def test_crushing_lowers_the_push_of_all_weights_that_an_assessment_has(tmp_path, capsys):
     """Of a stone of breadth b by the length N / (σ w) that its edge crushes, over b."""
     breadth, height, strength, extra = 0.6, 2.0, 1e6, 60e3
@@ -157,6 +158,7 @@ def test_crushing_is_compared_at_each_end_of_what_a_fill_may_do():
     assert abs(low - high) > 0.01
 
 
+@pytest.mark.slow
 def test_results_state_the_strength_with_which_joints_crush(tmp_path, capsys, monkeypatch):
     """A column under its weight and an axle: its factor, and that without a given strength."""
     monkeypatch.setattr("archfem.limit.rating._places_along", lambda *_: (0.2,))

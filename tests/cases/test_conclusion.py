@@ -865,6 +865,7 @@ def test_a_report_of_a_wall_has_its_falls_across_the_plane_as_one_rigid_body(mon
     assert column.across == ({}, "")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("share", "falls"),
     [

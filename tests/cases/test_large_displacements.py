@@ -75,6 +75,7 @@ def test_schemes_without_memory_are_refused_in_python_too(path):
         af.time_history(model, motion, scheme=af.dynamics.Newmark())
 
 
+@pytest.mark.slow
 def test_a_run_writes_all_its_files_and_begins_with_the_verdict(path, tmp_path, undrawn):
     class Given:
         case, changes, out, workers = path, (), tmp_path / "out", 1

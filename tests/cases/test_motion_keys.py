@@ -41,6 +41,7 @@ def test_a_suite_is_matched_on_request_of_the_case():
     assert match.motion.name == "one"
 
 
+@pytest.mark.slow
 def test_ground_rests_behind_a_matched_motion_as_it_was_matched():
     """Matching with the rest would shake the ground there."""
     target = {"code": "EC8", "ag": 0.25, "ground": "B"}

@@ -44,6 +44,7 @@ def states(data):
     return {check.rule.partition(",")[0]: check.state for check in motion_rules.check_motions(data)}
 
 
+@pytest.mark.slow
 def test_rules_are_met_by_matched_motions_of_thirty_seconds():
     data = data_of()
     assert [*states(data).values()] == ["met", "met", "not checked", "met", "met"]

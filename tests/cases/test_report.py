@@ -440,6 +440,7 @@ def test_results_are_read_though_a_file_was_deleted(kept):
     assert set(af.cases.open_results(kept).runs) == {"first", "second"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["rubble", pytest.param("own", marks=pytest.mark.slow)])
 def test_results_need_no_drawing_beside_them(name, unplotted, undoubted, tmp_path, capsys):
     """A pier of a drawing is run, and reported and filmed from a folder that was moved alone."""
@@ -1122,6 +1123,7 @@ def test_motions_are_measured_by_themselves_without_their_files(tmp_path, unplot
     assert "Steps of runs miss peaks: of 'record' 0 of 0.204 g." in words
 
 
+@pytest.mark.slow
 def test_a_motion_is_measured_to_its_end_where_the_structure_falls_before(tmp_path, unplotted):
     """A pulse that overturns a stone, and a stronger one after the fall."""
     step, path = 0.005, tmp_path / "pulse.csv"
@@ -1146,6 +1148,7 @@ def test_a_motion_is_measured_to_its_end_where_the_structure_falls_before(tmp_pa
     assert list(row.values()) == result_text.tabulate_motions([whole]).rows[0]
 
 
+@pytest.mark.slow
 def test_a_study_stands_in_a_report(kept, unplotted, tmp_path, capsys):
     table = tomllib.loads(CASE)["suite"]["pairs"]["first"]["synthetic"]
     study, folder = tmp_path / "study.toml", tmp_path / "study"

@@ -100,6 +100,7 @@ def files_below(folder):
     return {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
 
 
+@pytest.mark.slow
 def test_no_reader_takes_a_file_of_another_run(two_runs, capsys):
     """Each file in turn is replaced by that of the other run."""
     folder, other = two_runs

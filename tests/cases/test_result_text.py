@@ -282,6 +282,7 @@ def test_dead_loads_that_a_push_leaves_at_rest_are_noted(tmp_path, capsys, unplo
     assert "no mass" not in str(point) + str(moved)
 
 
+@pytest.mark.slow
 def test_parapets_of_a_rating_that_a_push_leaves_out_are_noted(tmp_path, capsys, unplotted):
     """2 kN/m along 0.6 m are 1.2 kN, 4.2 % of 28.8 kN: runs, limits, assessments say so."""
     tables = {

@@ -271,6 +271,7 @@ def test_modules_of_a_case_are_among_its_files(tmp_path):
     assert found == [tmp_path / "stones.dxf", tmp_path / "laws.py"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("thickness", "count"), [(0.05, 1), pytest.param(0.6, 0, marks=pytest.mark.slow)]
 )

@@ -263,6 +263,7 @@ def test_the_least_push_of_a_study_is_that_of_both_senses(tmp_path):
     assert found["push"] == pytest.approx(up, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_a_push_over_the_acceleration_of_the_site_is_the_least_over_the_fill():
     wall = {"length": 1.0, "height": 0.5, "above": 0.5, "state": "fixed"}
     ring = {"span": 6.0, "rise": 1.5, "thickness": 0.4, "voussoirs": 15}

@@ -130,6 +130,7 @@ def run(small, *changes):
     return af.commands.main(["run", str(small), "--out", str(small.parent / "out"), *given])
 
 
+@pytest.mark.slow
 def test_one_command_runs_all_and_again_keeps_finished_runs(small, undrawn, request, capsys):
     out = small.parent / "out"
     assert run(small) == 0
@@ -200,6 +201,7 @@ def run_with(small, shake):
     print_results(case, carry_out(case, out, run_motion=shake), out)
 
 
+@pytest.mark.slow
 def test_a_range_in_doubt_has_the_exit_code_of_doubts(small, unplotted, monkeypatch, capsys):
     compute = variations.verdict_range
 
@@ -357,6 +359,7 @@ def searched(tmp_path, undrawn, monkeypatch):
     return ["scale", str(tmp_path / "block.toml"), "--out", str(tmp_path / "out")], names
 
 
+@pytest.mark.slow
 def test_scales_of_the_pairs_of_a_suite_stand_side_by_side(searched, tmp_path, capsys):
     """The report has the least of all, and names those that were not scaled."""
     given, made = searched
@@ -800,6 +803,7 @@ def test_rating_of_a_case(tmp_path, ring, capsys):
     assert "Thrust line at collapse" in page
 
 
+@pytest.mark.slow
 def test_a_rating_that_is_stopped_keeps_the_vehicles_before(tmp_path, unplotted, monkeypatch):
     path, out = tmp_path / "ring.toml", tmp_path / "out"
     path.write_text(LIMIT.replace("= 17", "= 7"))
@@ -918,6 +922,7 @@ def test_a_vehicle_that_is_not_known_is_refused_with_those_of_the_case(tmp_path,
     assert said.endswith("HL93-truck; or Eurocode, CS454, HL93, each for all of a code\n")
 
 
+@pytest.mark.slow
 def test_a_vehicle_without_factors_has_the_rank_of_the_worst_code(tmp_path, unplotted, monkeypatch):
     """One axle of 50 kN is 171 kN by CS 454, more than 126 kN of 60 kN with 1.5 × 1.4."""
     path, out = tmp_path / "ring.toml", tmp_path / "out"
@@ -938,6 +943,7 @@ def test_a_vehicle_without_factors_has_the_rank_of_the_worst_code(tmp_path, unpl
     assert any(words in each for each in kept)
 
 
+@pytest.mark.slow
 def test_the_vehicle_that_decides_is_varied(tmp_path, unplotted, monkeypatch):
     """Its factor is the nearest to 1: of a worse one other properties would change no outcome."""
     path, out = tmp_path / "ring.toml", tmp_path / "out"
@@ -970,6 +976,7 @@ def test_the_vehicle_that_decides_is_varied(tmp_path, unplotted, monkeypatch):
     assert title in (out / "report.html").read_text()
 
 
+@pytest.mark.slow
 def test_a_bridge_that_does_not_stand_is_rated_for_no_vehicle(tmp_path, unplotted, capsys):
     """A ring of a tenth of the least thickness of a semicircle by Heyman."""
     path, out = tmp_path / "ring.toml", tmp_path / "out"
@@ -1007,6 +1014,7 @@ def test_results_are_written_before_they_are_printed(tmp_path, unplotted, monkey
     assert (out / "archfem.json").is_file()
 
 
+@pytest.mark.slow
 def test_limit_analysis_refuses_soil_before_all_else(tmp_path, capsys):
     options = ["--set", "limit.horizontal=1", "--out", str(tmp_path)]
     assert af.commands.main(["run", str(RING.with_name("prusias.toml")), *options]) == 1

@@ -162,6 +162,7 @@ fidelity = "rigid"
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("friction", "least"), [(None, "0.442"), pytest.param(0.45, "0.441", marks=pytest.mark.slow)]
 )

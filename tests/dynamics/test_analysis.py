@@ -99,6 +99,7 @@ def test_its_searches_are_those_of_the_functions():
         replace(ROCKING, displacements="small").scale(MOTION)
 
 
+@pytest.mark.slow
 def test_studies_take_it(tmp_path):
     longer = af.Motion.synthetic(duration=1.0, pga=2.5, seed=2)
     ida = ROCKING.ida([longer], limits=["first hinge"], precision=0.3, workers=1)

@@ -253,6 +253,7 @@ def test_attributes_that_no_run_has_are_refused_by_name(
     assert History.read(path, run.structure).fall.kind == "stands"
 
 
+@pytest.mark.slow
 def test_variables_that_no_run_has_are_refused_by_name(few_instants, run, tmp_path):
     History.read(History(few_instants).save(tmp_path / "run.nc"), run.structure)
     changed = {

@@ -166,6 +166,7 @@ def test_a_structure_without_fill_is_returned_as_it_is(ring):
     assert loose.start is start
 
 
+@pytest.mark.slow
 def test_a_search_of_a_fall_has_one_facet_of_fill_on_each_stone(footbridge, monkeypatch):
     """Default cells end a run as stones slide by a facet; why it has no answer is said."""
     analysis = af.Analysis(
@@ -204,6 +205,7 @@ def ida_cells(analysis, monkeypatch, motion):
     return {name: model[name] for name in ("cells", "cell")}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rule", ["exact", pytest.param("rigid", marks=pytest.mark.slow)])
 def test_a_bridge_with_fill_in_one_piece_falls_by_elastic_and_rigid_joints(footbridge, rule):
     """Fill as one rigid body overlapped with stones, or held them: no run had an answer."""

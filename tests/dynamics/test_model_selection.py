@@ -195,6 +195,7 @@ def test_a_model_in_a_few_words(given, words):
     assert discretisation_label(af.models.Discretisation(**given)).endswith(words)
 
 
+@pytest.mark.slow
 def test_a_structure_that_does_not_stand_raises_the_error_of_its_dead_load(monkeypatch):
     """Far below the least thickness of Milankovitch, 0.107 of the radius for a half circle."""
     thin = af.circular_arch(radius=3.0, thickness=0.2, embrace=180.0, voussoirs=11)

@@ -319,6 +319,7 @@ def test_mechanisms_too_short_to_count_are_reported(paced):
         assert words in str(strict.verdict)
 
 
+@pytest.mark.slow
 def test_an_event_ends_a_run_of_any_steps_in_its_first_mechanism(paced, model, motion):
     halted = af.time_history(
         model, motion, damping=af.Rayleigh(0.05, (8.0, 16.0)), until=af.CountedMechanism()

@@ -218,6 +218,7 @@ def test_steps_conserve_energy(displacements, damping, quadrature):
     assert lost[1:].min() > -1e-12 * np.abs(work).max()
 
 
+@pytest.mark.slow
 def test_compiled_steps_are_those_of_snes():
     damping = af.StiffnessDamping(0.05, 11.0)
     compiled, _ = shaken(thin_ring("small"), damping=damping, end=0.3)

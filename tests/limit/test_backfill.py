@@ -400,6 +400,7 @@ def push_by_levels(structure, fill, sense=1.0):
     return -linprog(cost, A_eq=matrix, b_eq=-dead, bounds=[*bounds, (0.0, None)]).fun
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "levels",
     [np.arange(0.7, 0.78, 0.02), pytest.param(np.arange(0.5, 1.0, 0.02), marks=pytest.mark.slow)],

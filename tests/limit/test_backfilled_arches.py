@@ -56,6 +56,7 @@ def test_a_wall_pushed_into_its_fill_meets_rankine(friction, part):
     assert bool(found.sliding) == (slide < tilt)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("friction", [0.3, pytest.param(0.9, marks=pytest.mark.slow)])
 def test_a_wall_pushed_into_its_fill_without_dilatancy_starts_from_states_with_the_fill(friction):
     """On level rock N is the weight, so that nothing changes; no start lacks equilibrium."""

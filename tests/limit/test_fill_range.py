@@ -50,6 +50,7 @@ def turning_factors(passive, mobilisation=1.0 / 3.0):
     return expected
 
 
+@pytest.mark.slow
 def test_an_assumption_without_a_state_is_left_out_of_the_range(monkeypatch, caplog):
     """No state without dilatancy is found with it: a factor of 0 would say that nothing stands."""
     search, calls = collapse.search_nonassociated, []
@@ -69,6 +70,7 @@ def test_an_assumption_without_a_state_is_left_out_of_the_range(monkeypatch, cap
     assert "with which no state without dilatancy was found" in caplog.text
 
 
+@pytest.mark.slow
 def test_a_stone_turns_into_a_fill_at_a_factor_by_each_assumption(verified):
     fill = af.limit.Fill(friction_angle=30.0)
     live = af.BodyForce(1.0)
@@ -142,6 +144,7 @@ def test_an_assessment_of_a_backed_stone_has_the_ratio_without_backing():
     assert assessed.linear.over_fill.ends[0] == pytest.approx(bare.linear.over_fill.ends[0])
 
 
+@pytest.mark.slow
 def test_an_assessment_has_a_linear_ratio_by_each_assumption():
     """By hand, and the least of all is that of one fill."""
     structure, fill = buried_stone(), af.limit.Fill(friction_angle=30.0)

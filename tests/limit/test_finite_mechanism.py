@@ -84,6 +84,7 @@ def test_a_sliding_block_tips_over_the_edge_that_it_slides_to():
     assert path.displacements[-1, 1, 0] == pytest.approx(0.3, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_a_block_on_a_wide_block_slides_on_all_of_it():
     blocks = (
         box(-3.0, 3.0, -0.5, 0.0, "base", fixed=True),
@@ -400,6 +401,7 @@ def test_multiples_of_the_weight_stay_and_grow():
     assert "\n" not in repr(path)
 
 
+@pytest.mark.slow
 def test_the_work_of_a_point_load_is_the_rise_of_the_weights():
     """Hinges take no work: ∫ α f·du by the trapezoidal rule of 1e-3, up to each place."""
     path = af.limit.collapse_path(RING, live=af.PointLoad(1.0, (0.0, -1e3)), friction=None)

@@ -107,6 +107,7 @@ def test_strength_lowers_the_factor_steadily():
     )
 
 
+@pytest.mark.slow
 def test_the_strength_of_a_material_is_that_of_its_stones_and_no_default_is(monkeypatch):
     """In the functions of limit analysis alike; infinite is none."""
     monkeypatch.setattr(rating, "_places_along", lambda *_: (-0.3, 0.6))

@@ -402,6 +402,7 @@ def test_only_a_symmetric_structure_has_a_mirror_image():
 HALVES = [[0.5, 0.5], [1.0]]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("structure", "drop"),
     [
@@ -563,6 +564,7 @@ def slivered_facade():
     return af.masonry.assembled(blocks, af.masonry.STONE_TO_STONE, width=0.55)
 
 
+@pytest.mark.slow
 def test_a_facade_in_bond_settles_at_a_state(monkeypatch):
     """Neither what relaxes by a share of 0.1 alone nor the associated state leads to a state."""
     structure = slivered_facade()

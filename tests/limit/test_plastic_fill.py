@@ -138,6 +138,7 @@ def test_bounds_of_the_finest_mesh_that_is_solved_are_returned(monkeypatch, capl
         bound(FILL)
 
 
+@pytest.mark.slow
 def test_the_least_of_several_loads_is_that_of_each_on_its_own(monkeypatch, capsys):
     """Other loads keep bounds of coarse meshes, above the least one; progress is shown in lines."""
     monkeypatch.setattr("archfem._display.PROGRESS_INTERVAL", 0.0)

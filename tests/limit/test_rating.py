@@ -123,6 +123,7 @@ def test_an_axle_on_an_overhang_by_hand():
         assert other.passes == (other.geometric >= 1.0) == stands
 
 
+@pytest.mark.slow
 def test_a_strength_that_is_not_given_is_stated_by_hand():
     """The base crushes over N / (σ b) at the toe, and turns about the middle of that.
 
@@ -219,6 +220,7 @@ def _scaled(moving, share):
     return replace(moving, worst=replace(moving.worst, factor=share * moving.worst.factor))
 
 
+@pytest.mark.slow
 def test_a_distributed_load_on_an_overhang_by_hand():
     """It counts where it turns the stone: beyond the toe at 1 m, with its middle at 1.5 m.
 
@@ -289,6 +291,7 @@ def test_parapets_are_a_dead_load_along_the_bridge(monkeypatch):
         af.rate(plain, axle, **given, parapets=17.6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("axles", "turns", "direction", "number"),
     [
@@ -378,6 +381,7 @@ def test_the_depth_of_fill_is_found_beside_its_ends_too():
         assert Vehicle("axle", (1e5,)).spread_over(bridge) == pytest.approx(1.95, abs=1e-9), span
 
 
+@pytest.mark.slow
 def test_of_a_wider_vehicle_the_factor_by_rule_is_stated():
     stone, axle = column_under_axle(width=6.0), Vehicle("axle", (50e3,), live=1.0, impact=1.0)
     rule, wide = (af.rate(stone, axle, **given) for given in ({}, {"width": 6.0}))
@@ -511,6 +515,7 @@ def test_words_and_table(lorry_rating):
     assert least == pytest.approx(lorry_rating.factor, rel=1e-5)  # six digits
 
 
+@pytest.mark.slow
 def test_the_range_over_the_pressure_of_the_fill_is_that_of_all_places(lorry_rating):
     """Of the same axles at all places, on heavier materials: none of it, and all."""
     worst, vehicle = lorry_rating.moving.worst, lorry_rating.vehicle
@@ -604,6 +609,7 @@ def test_a_narrow_worst_place_is_found(monkeypatch):
     assert found.without_pressure == pytest.approx(found.factor, rel=EXACT)
 
 
+@pytest.mark.slow
 def test_a_plastic_fill_has_the_factors_of_its_pressure_beside_its_own(monkeypatch):
     """Those of a rating with the fill as weight and pressure, of the same strength and backing."""
     monkeypatch.setattr(rating, "_places_along", lambda *_: (3.0, 3.5, 4.0, 5.5, 6.5))
@@ -626,6 +632,7 @@ def test_a_plastic_fill_has_the_factors_of_its_pressure_beside_its_own(monkeypat
     assert tabulate_ratings([pressed]).head[2:6] == head
 
 
+@pytest.mark.slow
 def test_a_bridge_that_the_fill_holds_has_no_factor_without_it(monkeypatch):
     monkeypatch.setattr(rating, "_places_along", lambda *_: (4.5,))
     found = af.rate(
@@ -705,6 +712,7 @@ def test_a_mobilisation_below_the_active_pressure_is_noted(lorry_rating, given, 
     assert notes[-1].startswith("note: left out: a second lorry that meets the vehicle")
 
 
+@pytest.mark.slow
 def test_a_rating_with_backing_has_the_factor_without_it(monkeypatch):
     monkeypatch.setattr(rating, "_places_along", lambda *_: (6.5,))
     backed, axle = replace(GRAVEL, backing=0.6), Vehicle("axle", (1e4,))
@@ -833,6 +841,7 @@ def test_factors_of_codes_are_stated_with_outcome_and_range(monkeypatch):
     assert not replace(given, vehicle=VEHICLES["LM2"], by_cs454={}).by_codes
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("area_load", "searches"), [(0.0, 1), pytest.param(9e3, 2, marks=pytest.mark.slow)]
 )
@@ -892,6 +901,7 @@ def test_the_impact_on_a_train_is_that_of_half_the_span(span, impact, monkeypatc
     assert found.describe_codes() == [f"LM71 {name}: factor {factor:.4g}, {outcome}"]
 
 
+@pytest.mark.slow
 def test_abutments_that_cannot_move_are_noted(monkeypatch):
     """Those with courses of their own are not, nor a ring on free blocks."""
     arch = af.shapes.Arch(span=5.0, rise=1.25, thickness=0.5, voussoirs=9)

@@ -181,6 +181,7 @@ def test_a_ring_leaps_where_only_far_hinges_would_hold():
     assert hinged.admissible((0, 6, 9), (1, 1, 0), beyond)
 
 
+@pytest.mark.slow
 def test_the_work_of_the_thrust_is_that_of_the_weights():
     ring = semicircle(0.2, 8)
     found = largest_movement(ring, SPREAD, friction=None)

@@ -102,6 +102,7 @@ def test_sliding_flat_is_searched_from_place_to_place(monkeypatch):
     assert swept < each * (1.0 + len(places) / 5.0)  # the worst place by the whole search, too
 
 
+@pytest.mark.slow
 def test_the_worst_place_is_that_of_the_least_factor():
     structure = arch_bridge(voussoirs=5)
     found = over(structure, *LORRY, fill=GRAVEL)
@@ -189,6 +190,7 @@ def descent(structure, motion, x):
     return -v - turn * (point[0] - structure.blocks[number].centroid[0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "fill", [GRAVEL, pytest.param(None, marks=pytest.mark.slow)], ids=["fill", "bare"]
 )

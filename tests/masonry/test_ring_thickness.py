@@ -63,6 +63,7 @@ def test_joints_have_the_corners_of_their_stones_to_the_last_bit(tmp_path):
                 assert {joint.intrados, joint.extrados} <= {*alone.blocks[number].outline}
 
 
+@pytest.mark.slow
 def test_noise_of_a_survey_changes_it_by_little(tmp_path):
     path = draw_semicircle(tmp_path / "arch.dxf", 33, 3.0, 0.6, between=0, noise=0.003)
     ring = find_ring(read(path, snap=2e-3))
@@ -118,6 +119,7 @@ def test_stones_of_unequal_depth_touch_along_what_is_common():
     assert [block.area for block in half.blocks[:3]] == pytest.approx([0.5, 0.4, 0.4])
 
 
+@pytest.mark.slow
 def test_unequal_stones_that_no_longer_touch_do_not_stand(tmp_path):
     """Every second stone of a semicircle is deeper outwards: thin ones miss their neighbours."""
     angles, drawing = np.linspace(np.pi, 0.0, 14), ezdxf.new(units=ezdxf.units.M)

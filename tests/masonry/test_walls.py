@@ -204,6 +204,7 @@ def test_jambs_of_one_storey_leave_the_bond_of_others(lengths):
     assert min(map(min, bearings.values())) > 0.249 * stone
 
 
+@pytest.mark.slow
 def test_lintels_bear_on_the_given_length_or_a_quarter_of_a_stone():
     lengths = lay_front(0.25)
     wall = af.shapes.wall(**lengths)
@@ -297,6 +298,7 @@ def test_wall_equals_stones_laid_one_by_one():
     assert len(wall.joints) == len(laid.joints)
 
 
+@pytest.mark.slow
 def test_triangle_slides_at_its_friction():
     # all bed joints reach μ at once, and a triangle overturns at 1.5 B / H = 2.25 g only
     lengths = {"breadth": 1.5, "height": 1.0, "eaves": 0.0, "width": 0.4}

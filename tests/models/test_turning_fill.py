@@ -159,6 +159,7 @@ def test_slip_of_faces_is_stated_in_facets():
     assert plane.face_mismatch(np.full(plane.size, 0.1)) == (0.0, "")
 
 
+@pytest.mark.slow
 def test_one_triangle_on_each_stone_leaves_no_facets_to_slide():
     """Quadrilaterals have two facets or more on each stone, at any number of cells."""
     arch = af.shapes.Arch(span=6.0, rise=1.5, thickness=0.4, voussoirs=11)

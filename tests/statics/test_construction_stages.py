@@ -156,6 +156,7 @@ def test_blocks_that_move_far_go_on_from_where_they_were_built(fidelity, cells):
         assert run.joints["N"].values[-1] == pytest.approx([60e3, 40e3, 20e3], rel=1e-6)
 
 
+@pytest.mark.slow
 def test_a_bridge_built_in_stages_is_in_balance_where_it_has_moved(bridge, built):
     """Its joints carry forces near those of small displacements."""
     given = {"fidelity": "rigid", "cells": (2, 1), "quadrature": "exact"}
@@ -196,6 +197,7 @@ def test_stages_that_build_nothing_are_refused(column, stages, words):
         af.dead_load(model, stages=stages)
 
 
+@pytest.mark.slow
 def test_a_stage_that_cannot_stand_is_named():
     """Fill without its walls' weight, placed as one ring without centring, falls at once."""
     ring = af.circular_arch(radius=1.0, thickness=0.08, embrace=180.0, voussoirs=4, chords=1)

@@ -153,6 +153,7 @@ def test_doubts_use_the_friction_of_the_criteria():
     assert "slide from 0.2 on" in dead_load_doubts(resting(friction=None), 0.2)[0].cause
 
 
+@pytest.mark.slow
 def test_large_slips_and_small_coefficients_are_doubts():
     """A wedge that friction does not hold comes to rest millimetres below where it was drawn."""
     slid, smooth = dead_load_doubts(resting(embrace=7.0, voussoirs=3, friction=1e-3))
@@ -270,6 +271,7 @@ def test_a_fixed_stone_of_a_pier_or_a_flat_arch_is_a_doubt():
         assert doubt.cause.startswith(f"'{structure.blocks[number].name}' at (")
 
 
+@pytest.mark.slow
 def test_a_fixed_course_on_one_that_moves_is_a_doubt(tmp_path, capsys):
     """The springing of a ring on piers is of two parts; the course below hangs from nothing."""
     sizes = {"radius": 1.5, "thickness": 0.35, "voussoirs": 9, "pier_breadth": 0.7}

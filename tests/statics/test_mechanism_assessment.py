@@ -161,6 +161,7 @@ def assess_tied(height, force, direction=1.0):
     return af.kinematic_assessment(strip, SPECTRUM, direction=direction, loads=[tie])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("force", "factor", "pull"),
     [
@@ -393,6 +394,7 @@ def test_spectra_at_another_damping_and_beyond_four_seconds():
     assert eight == pytest.approx(four / 4.0)
 
 
+@pytest.mark.slow
 def test_parts_and_blocks_by_themselves():
     blocks = (
         box(0.0, 3.0, -0.5, 0.0, "base", fixed=True, part="ground", role="other"),
@@ -465,6 +467,7 @@ def wedge():
     return found, af.kinematic_assessment(wall, SPECTRUM)
 
 
+@pytest.mark.slow
 def test_a_search_that_finds_nothing_leaves_the_mechanism_that_dilates(monkeypatch):
     """Its factor is the upper bound of the static theorem, and no lower bound of the search."""
     monkeypatch.setattr("archfem.limit.nonassociated.find_solution", lambda *_, **__: None)
@@ -551,6 +554,7 @@ def test_a_fill_is_weight_on_the_stones():
         af.kinematic_assessment(bridge, SPECTRUM, friction="nonassociated")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lever", [1.0, pytest.param(0.0, marks=pytest.mark.slow)])
 def test_a_body_on_the_fill_is_weight_and_mass_and_no_load_is_attached_to_fill(lever):
     """The factor is that of limit analysis, under either assumption on the fill's inertia."""
@@ -572,6 +576,7 @@ def test_a_body_on_the_fill_is_weight_and_mass_and_no_load_is_attached_to_fill(l
     assert any("constant forces have no mass" in note for note in noted.notes)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("direction", "part"), [(-1.0, 1.0), pytest.param(1.0, 0.4, marks=pytest.mark.slow)]
 )
@@ -601,6 +606,7 @@ def test_a_wall_turns_from_the_fill_behind_it_or_into_it(direction, part, verifi
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "kind", ["ground", *(pytest.param(x, marks=pytest.mark.slow) for x in ("strut", "fill"))]
 )
@@ -701,6 +707,7 @@ def test_refused_structures_and_rules():
         af.masonry.AttachedLoad(1, (0.0, 1.0), weight=1e12)
 
 
+@pytest.mark.slow
 def test_cohesion_that_is_left_out_is_named(caplog):
     """The squat stone slides at its friction, 0.6 g, as without cohesion, and a warning says so."""
     glue = af.Contact(1e9, 1e9, 0.6, cohesion=1e5)
@@ -765,6 +772,7 @@ def test_a_fill_rests_on_the_stone_below_it():
     assert "the fill counts as weight" in found.doubts[0].cause
 
 
+@pytest.mark.slow
 def test_sliding_without_dilatancy_is_searched_for_whole_structures_only():
     """Slabs slide, and a pier turns: then there is nothing to search for."""
     slabs, pier = (af.column(breadth=b, heights=[h, h]) for b, h in ((4.0, 0.5), (0.6, 1.2)))
@@ -803,6 +811,7 @@ def test_notes_tell_where_the_curve_is_an_upper_bound(ring):
         assert check.bounded is not rests  # a bool, which files hold
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("limit_state", "count"), [("NTC-2018 SLV", 1), pytest.param(OWN, 0, marks=pytest.mark.slow)]
 )
@@ -837,6 +846,7 @@ def test_courses_that_move_as_one_raise_both_ratios(verified):
     assert "weights are at the centroids" not in str(whole)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("scale", "count"),
     [

@@ -83,6 +83,7 @@ def test_rigid_blocks_on_elastic_joints_reach_the_limit(control, load):
     assert found.factor <= limit * (1.0 + 1e-6)  # joints' end points carry the edge exactly
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("fidelity", "load"),
     [
@@ -499,6 +500,7 @@ def test_a_dead_load_is_refused_where_it_makes_the_structure_fall():
         af.pushover(model, push, dead=[push])
 
 
+@pytest.mark.slow
 def test_a_support_spreads_below_a_press():
     """The thrust of limit analysis under the same loads."""
     ring = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17)
@@ -511,6 +513,7 @@ def test_a_support_spreads_below_a_press():
         af.pushover(large, spread, dead=[press])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("stiffness", "factor"),
     [(50e6, 0.037855), pytest.param(200e6, 0.060848, marks=pytest.mark.slow)],

@@ -60,6 +60,7 @@ def test_a_block_stays_on_an_incline_up_to_the_angle_of_friction(friction, rule)
     assert not af.stands(incline(np.arctan(friction + 1e-6), friction + 0.9e-6))
 
 
+@pytest.mark.slow
 def test_cohesion_holds_a_block_on_a_steeper_incline():
     """W sin φ = μ W cos φ + c A, of a block so low that its bed stays closed."""
     angle, friction = np.radians(40.0), 0.5

@@ -83,6 +83,7 @@ def test_an_analysis_of_blocks_is_varied_on_a_cluster_and_on_processes(tmp_path,
     assert found["N"].values == pytest.approx([12e3, 24e3], rel=1e-9)
 
 
+@pytest.mark.slow
 def test_a_pair_is_matched_once_on_a_cluster(matching_study, tmp_path, client):
     study, marks = matching_study(tmp_path / "marks")
     found = study.run(tmp_path / "out", client=client)

@@ -130,6 +130,7 @@ def test_a_rate_from_beyond_the_periods_of_codes_is_in_doubt_with_a_law(factor, 
     assert f"of pga, {ratio:.2g} times that of 475 years" in risk.sentence
 
 
+@pytest.mark.slow
 def test_the_interval_holds_the_rate_as_often_as_it_says():
     """Each record has one sample: ln λ varies by b² β² / n (1 + b² β² / 2)."""
     random, inside, widths = np.random.default_rng(1), 0, []
@@ -239,6 +240,7 @@ def test_a_motion_of_nothing_is_refused():
         af.collapse_risk(analysis, [*motions, still], SITE)
 
 
+@pytest.mark.slow
 def test_dispersion_is_split_into_its_parts():
     random = np.random.default_rng(2)
     record, alternative = np.arange(1200) % 30, (np.arange(1200) // 30) % 2
@@ -322,6 +324,7 @@ def test_no_bracket_is_narrower_than_its_precision(quick_runs, precision, begin)
     assert found["upper"] / found["lower"] == pytest.approx(1.0 + precision, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_steps_too_long_for_sliding_at_a_bound_are_in_doubt(monkeypatch):
     """Those of runs far from the bracket do not count."""
 
@@ -347,6 +350,7 @@ def test_steps_too_long_for_sliding_at_a_bound_are_in_doubt(monkeypatch):
     assert "sliding" not in str(found.doubts)
 
 
+@pytest.mark.slow
 def test_samples_that_stand_without_joints_in_strong_motion_are_in_doubt(monkeypatch):
     """Half of the samples have loose blocks, of which those that fall count for nothing."""
 
@@ -519,6 +523,7 @@ def test_too_few_records_are_refused():
         af.collapse_risk(analysis, motions[:1], SITE)
 
 
+@pytest.mark.slow
 def test_a_case_file_gives_the_same_rate(tmp_path, capsys, quick_runs, low_resolution):
     path = tmp_path / "block.toml"
     path.write_text(

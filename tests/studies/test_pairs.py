@@ -13,6 +13,7 @@ def histories(case, folder):
     return {run.motion.name: run for run in found if isinstance(run, af.cases.Run)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("workers", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_pairs_are_kept_where_they_are_looked_for(small, tmp_path, undoubted, workers):
     case = af.Case.read(small)

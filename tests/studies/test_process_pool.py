@@ -46,6 +46,7 @@ def study_of(case, find, thicknesses, folder):
     return af.Study(case, over, find)
 
 
+@pytest.mark.slow
 def test_the_driver_reports_once_that_workers_compile(small_ring, tmp_path, finders, capsys):
     over = {"structure.thickness": [0.5, 0.6, 0.7, 0.8]}
     study = af.Study(small_ring, over, "finders_of_tests:compiling")

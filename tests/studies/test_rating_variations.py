@@ -168,6 +168,7 @@ def test_a_backing_is_left_out_alone_and_at_once_with_the_worst_of_the_others(
     assert float(cells["all unfavourable at once"]) == pytest.approx(whole, rel=SEARCHED)
 
 
+@pytest.mark.slow
 def test_variations_before_a_stop_are_computed_once(tmp_path, unplotted, monkeypatch):
     """Their factors are here the mean depths of the joints."""
     path, out = tmp_path / "case.toml", tmp_path / "out"

@@ -307,6 +307,7 @@ def test_progress_is_reported_where_the_output_is_a_file(
     assert any("0 failed" in line and "s remaining" in line for line in lines)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("workers", [pytest.param(1, marks=pytest.mark.slow), 2])
 def test_progress_of_a_range_is_reported_where_the_output_is_a_file(monkeypatch, capsys, workers):
     monkeypatch.setattr(result_store, "PROGRESS_INTERVAL", 0.02)
@@ -333,6 +334,7 @@ def test_a_repeated_warning_is_logged_once(small_ring, finders, caplog, workers)
     assert said[2:] == ["4 more warnings as above, of other runs, are not repeated"]
 
 
+@pytest.mark.slow
 def test_cases_and_findings_are_in_one_file(ring_file, low_resolution, tmp_path, capsys):
     path, folder = tmp_path / "study.toml", tmp_path / "out"
     path.write_text(
@@ -464,6 +466,7 @@ def test_status_states_the_progress_of_a_study(study_file, tmp_path, capsys):
     assert af.studies.Status(4, 2, 1, 0.5).remaining == pytest.approx(4.0)
 
 
+@pytest.mark.slow
 def test_an_interrupted_study_writes_the_table_of_what_is_done(
     study_file, tmp_path, monkeypatch, capsys
 ):
@@ -579,6 +582,7 @@ def test_limit_analysis_needs_no_pairs(small, tmp_path):
         assert len(af.Study.read(path).points) == points
 
 
+@pytest.mark.slow
 def test_a_study_of_ratings_has_the_factors_of_rate(small, monkeypatch):
     monkeypatch.setattr(af.limit.rating, "_places_along", lambda *_: (0.2, 0.6))
     axle = '{ name = "axle", axles = ["10 kN"], live = 1.5, impact = 1.2 }'
@@ -589,6 +593,7 @@ def test_a_study_of_ratings_has_the_factors_of_rate(small, monkeypatch):
         assert factor == af.rate(case.structure, vehicle, dead=dead).factor
 
 
+@pytest.mark.slow
 def test_a_study_of_assessments_has_the_least_margin_of_assess(tmp_path, capsys):
     """What a tie gains is a study; a stone that crushes is in doubt, as by the command."""
     column = '[structure]\nshape = "column"\nbreadth = 0.6\nheights = [2.0, 1.0]\nwidth = 1.0\n'

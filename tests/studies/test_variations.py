@@ -301,6 +301,7 @@ def test_the_sample_is_a_latin_hypercube(column, motion, calls):
     assert again.dataset.identical(found.dataset)
 
 
+@pytest.mark.slow
 def test_factors_over_more_than_twice_are_spread_in_their_logarithm(column, motion, calls):
     """Each of six equal parts of the range, in one measure or the other, has one sample."""
     for vary, even, in_logarithm in (
@@ -428,6 +429,7 @@ animation = false
 """
 
 
+@pytest.mark.slow
 def test_a_case_gives_its_damping_and_its_step(tmp_path, calls):
     path = tmp_path / "column.toml"
     path.write_text(CASE)
@@ -446,6 +448,7 @@ def test_a_case_gives_its_damping_and_its_step(tmp_path, calls):
     assert calls[-1][2] == 0.005  # without one
 
 
+@pytest.mark.slow
 def test_the_command_writes_files_that_a_report_shows(tmp_path, capsys, unplotted, calls):
     path, out = tmp_path / "column.toml", tmp_path / "out"
     path.write_text(CASE)
@@ -507,6 +510,7 @@ def report(folder):
     return af.cases.open_results(folder).report().read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_a_stopped_range_continues_from_its_folder(
     column, motion, calls, monkeypatch, tmp_path, caplog
 ):

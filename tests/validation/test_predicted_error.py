@@ -240,6 +240,7 @@ def test_study_of_speed_against_error(ring):
     assert len(found.table().splitlines()) == 9
 
 
+@pytest.mark.slow
 def test_a_setting_that_fails_is_reported_as_such(monkeypatch):
     """Steps of 10 ms end in an error; results of the others stand."""
     ring = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=5)

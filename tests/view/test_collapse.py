@@ -184,6 +184,7 @@ def test_an_assessment_without_a_finite_motion_shows_the_mechanism_as_it_begins(
     assert axes.collections[1].get_label() == "mechanism as it begins"
 
 
+@pytest.mark.slow
 def test_a_rating_shows_factors_over_the_middle_and_the_mechanism(coarse_ring, few_places):
     lorry = af.limit.Vehicle("lorry", (5e3, 5e3), (1.0,))
     found = af.rate(coarse_ring, lorry)
@@ -241,6 +242,7 @@ def test_a_rating_marks_where_the_distributed_load_stands(coarse_ring, few_place
     assert 0 < len(strips) < 40
 
 
+@pytest.mark.slow
 def test_several_vehicles_are_drawn_each_at_its_worst_place(coarse_ring, few_places, monkeypatch):
     """Of seven the first six: a line each, and a panel with its own axles."""
     monkeypatch.setattr(cut_road, "__defaults__", (8,))

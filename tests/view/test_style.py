@@ -107,6 +107,7 @@ def drawings(bridge, run, runs):
     yield view.draw_convergence(dict.fromkeys(("cells", "steps"), (sizes, sizes, 0.0, 0.5)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("millimetres", [85.0, pytest.param(170.0, marks=pytest.mark.slow)])
 def test_figures_fit_a_column_and_a_page_with_type_of_seven_points(bridge, run, runs, millimetres):
     """The width is what is printed: no type is scaled, and none is cut off."""

@@ -282,6 +282,7 @@ def test_energy_from_nowhere_is_refused(monkeypatch, chords):
         )
 
 
+@pytest.mark.slow
 def test_a_fall_without_a_step_halves_steps_until_that_changes_little():
     """Three drums under a synthetic motion: 9.8 mm by 0.5 ms, 33.5 mm by half, 34.9 mm at last."""
     drums = af.column(breadth=0.6, heights=[0.8, 0.7, 0.9], contact=af.Contact(1e9, 4e8, 0.5))

@@ -31,6 +31,7 @@ def test_a_film_decodes_to_its_frames(model, run, tmp_path, suffix):
     assert [each.name for each in path.parent.iterdir()] == [path.name]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("options", "frames", "fps"),
     [
@@ -62,6 +63,7 @@ def test_frames_follow_at_even_times_whatever_the_steps(model):
     assert fields_at(run, times) == pytest.approx(np.outer(times, np.arange(1.0, 4.0)))
 
 
+@pytest.mark.slow
 def test_frames_of_a_run_that_chose_its_steps(model, tmp_path):
     """Each frame states its own time, and its joints are of a record next to it."""
     time = np.linspace(0.0, 0.3, 61)

@@ -46,6 +46,7 @@ def test_a_run_without_fields_is_refused(shaken):
         af.view.viewer(run, model)
 
 
+@pytest.mark.slow
 def test_pyvista_draws_the_films_of_matplotlib(shaken, tmp_path):
     model, run = shaken
     films = {
@@ -73,6 +74,7 @@ def read_film(path):
         return [np.asarray(frame.convert("RGB")) for frame in ImageSequence.Iterator(film)]
 
 
+@pytest.mark.slow
 def test_pyvista_writes_a_page_without_links(shaken, tmp_path):
     pytest.importorskip("trame", reason="the extra for notebooks is not installed")
     model, run = shaken

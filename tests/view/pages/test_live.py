@@ -125,6 +125,7 @@ CLOSING = """
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("thickness", "finish"),
     [pytest.param(0.55, "sawn", marks=pytest.mark.slow), (0.35, "weathered")],
