@@ -9,7 +9,10 @@ COUNTS = {"case_files": 25, "records": 100, "drawings": 40, "calls": 100, "shake
 
 
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
-@pytest.mark.parametrize("campaign", COUNTS)
+@pytest.mark.parametrize(
+    "campaign",
+    [pytest.param(x, marks=pytest.mark.slow if x == "shakes" else ()) for x in COUNTS],
+)
 def test_odd_input_ends_in_an_answer_or_a_named_error(tmp_path, monkeypatch, campaign):
     monkeypatch.chdir(tmp_path)
     module = importlib.import_module(f"fuzz.{campaign}")

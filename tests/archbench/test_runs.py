@@ -60,7 +60,7 @@ def test_a_run_returns_the_answer_with_version_settings_and_cost(tmp_path):
         (
             'return {"values"',
             'import time; time.sleep(60)\n    return {"values"',
-            "no answer within 1 s",
+            "no answer within 0.3 s",
         ),
         ('return {"values"', 'import os; os.abort()\n    return {"values"', "died of signal 6"),
         ('return {"values"', 'raise ValueError("no way")\n    return {"values"', "no way"),
@@ -69,7 +69,7 @@ def test_a_run_returns_the_answer_with_version_settings_and_cost(tmp_path):
     ],
 )
 def test_a_failed_run_reports_its_error(tmp_path, old, new, message):
-    limit = 1.0 if "sleep" in new else 60.0
+    limit = 0.3 if "sleep" in new else 60.0
     found = answer(toy(tmp_path, GOOD.replace(old, new)), {"n": 1}, limit)
     assert message in found["failed"]
     assert run.failures("toy", {"S04": {"runs": [found]}}) == [f"toy S04: {found['failed']}"]

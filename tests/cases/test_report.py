@@ -815,7 +815,9 @@ pier = { breadth = "1.2 m", height = "2 m", course = "1 m" }
 @pytest.mark.parametrize(
     ("command", "given", "found"),
     [
-        ("rate", ["--vehicle", "LM1"], "Rating for LM1: factor"),
+        pytest.param(
+            *("rate", ["--vehicle", "LM1"], "Rating for LM1: factor"), marks=pytest.mark.slow
+        ),
         (
             "limit",
             ["--set", "limit.horizontal=1.0"],

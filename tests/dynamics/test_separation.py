@@ -119,7 +119,7 @@ def overlap_depth(one, two):
     [
         (beside_a_wall, 0.3, "'column' met 'wall'"),
         pytest.param(two_columns, 0.3, "'slender' met 'stout'", marks=pytest.mark.slow),
-        (running_bond, 1.2, "met 'stone"),
+        pytest.param(running_bond, 1.2, "met 'stone", marks=pytest.mark.slow),
     ],
 )
 def test_stones_without_a_joint_do_not_pass_through_each_other(build, peak, met):

@@ -4,6 +4,7 @@ import numba
 import numpy as np
 import pytest
 from kernels import from_python
+from repeats import each_once
 
 import archfem as af
 from archfem._numba import kernel
@@ -126,9 +127,9 @@ def random_measures(rng, count, depth):
     return signs * [size[0], slip, size[2]]
 
 
-@pytest.mark.parametrize("lag", [0.0, 0.4])
-@pytest.mark.parametrize("quadrature", [None, "lobatto"])
-@pytest.mark.parametrize("name", CONTACTS)
+@pytest.mark.parametrize(
+    ("name", "quadrature", "lag"), each_once([*CONTACTS], [None, "lobatto"], [0.4, 0.0])
+)
 def test_joints_side_by_side_equal_joints_one_by_one(name, quadrature, lag):
     """Random steps, each joint by another part of the law; equal to rounding."""
     law, rng = joints_of(CONTACTS[name], quadrature), np.random.default_rng(5)

@@ -730,10 +730,10 @@ def test_a_rating_with_backing_has_the_factor_without_it(monkeypatch):
         ("own", {}, "live × impact"),
         pytest.param("own", {"live": 1.5}, "impact", marks=pytest.mark.slow),
         pytest.param("own", {"impact": 1.3}, "live", marks=pytest.mark.slow),
-        ("own", {"live": 1.5, "impact": 1.3}, ""),
+        pytest.param("own", {"live": 1.5, "impact": 1.3}, "", marks=pytest.mark.slow),
         pytest.param("own", {"live": 1.1, "impact": 1.0}, "", marks=pytest.mark.slow),
         pytest.param("alone", {}, "", marks=pytest.mark.slow),
-        ("by span", {"live": 1.45}, "impact"),
+        pytest.param("by span", {"live": 1.45}, "impact", marks=pytest.mark.slow),
         ("LM2", {}, ""),
     ],
 )

@@ -135,7 +135,7 @@ def hinges_of(stage):
         (0.15, 8, SPREAD, 0),
         pytest.param(0.12, 60, SPREAD, 1, marks=pytest.mark.slow),
         pytest.param(0.2, 8, SINK, 0, marks=pytest.mark.slow),
-        (0.15, 13, SINK, 1),
+        pytest.param(0.15, 13, SINK, 1, marks=pytest.mark.slow),
     ],
 )
 def test_every_state_is_one_of_three_hinges_and_the_last_one_is_the_last(

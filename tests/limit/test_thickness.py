@@ -72,7 +72,9 @@ def test_the_greatest_that_can_be_built_may_be_the_only_one_that_stands():
     assert minimum_thickness(bounded, tolerance=1e-4) == pytest.approx(free, rel=2e-4)
 
 
-@pytest.mark.parametrize("share", [0.5, pytest.param(1.0, marks=pytest.mark.slow), 1.4])
+@pytest.mark.parametrize(
+    "share", [*(pytest.param(share, marks=pytest.mark.slow) for share in (0.5, 1.0)), 1.4]
+)
 def test_a_thickness_too_thin_to_build_does_not_stand(share):
     """The least that can be built stands where it is thicker than the least that stands."""
     free = minimum_thickness(lambda t: ring(thickness=t), tolerance=1e-4)

@@ -299,7 +299,12 @@ def test_a_fixed_course_on_one_that_moves_is_a_doubt(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("moved", "name", "why"),
     [
-        ({"WEST 1": "SLAB"}, "SLAB 1", "mm broad) is fixed, as is 'SLAB 2' beside it, and carries"),
+        pytest.param(
+            {"WEST 1": "SLAB"},
+            "SLAB 1",
+            "mm broad) is fixed, as is 'SLAB 2' beside it, and carries",
+            marks=pytest.mark.slow,
+        ),
         pytest.param(
             {"WEST 1": "SLAB", "WEST 2": "SLAB"},
             "SLAB 2",
@@ -319,14 +324,24 @@ def test_a_fixed_course_on_one_that_moves_is_a_doubt(tmp_path, capsys):
             "from most others of it: it may be one of 'west pier'",
             marks=pytest.mark.slow,
         ),
-        ({"WEST 3": "RING"}, "RING 1", "mm broad as 'WEST 2' below, where its joints are 299 mm"),
+        pytest.param(
+            {"WEST 3": "RING"},
+            "RING 1",
+            "mm broad as 'WEST 2' below, where its joints are 299 mm",
+            marks=pytest.mark.slow,
+        ),
         pytest.param(
             {"WEST 2": "EAST"},
             "EAST 1",
             "of 'east pier', apart from most others of it: it may be o",
             marks=pytest.mark.slow,
         ),
-        ({"RING 4": "EAST"}, "EAST 1", "apart from most others of it: it may be one of 'arch'"),
+        pytest.param(
+            {"RING 4": "EAST"},
+            "EAST 1",
+            "apart from most others of it: it may be one of 'arch'",
+            marks=pytest.mark.slow,
+        ),
         pytest.param(
             {"RING 11": "WEST"},
             "WEST 4",
@@ -375,7 +390,7 @@ def draw_on_footings(folder, moved=()):
 @pytest.mark.parametrize(
     ("moved", "whys"),
     [
-        ({}, []),
+        pytest.param({}, [], marks=pytest.mark.slow),
         pytest.param(
             {"WEST 1": "SLAB"},
             ["'SLAB 1' .* cannot move, but lies on 'FOOT 1'"],
@@ -531,10 +546,10 @@ CASES = [*ROOT.glob("meshes/*.toml"), *ROOT.glob("archfem/cases/new/*.toml")]
 @pytest.mark.parametrize(
     "path",
     [
-        # these differ from "prusias" in piers, fill or motion
+        # the largest; most differ from "prusias" in piers, fill or motion alone
         pytest.param(
             *(path,),
-            marks=pytest.mark.slow if path.stem.startswith("prusias_") else (),
+            marks=pytest.mark.slow if re.match("prusias|survey", path.stem) else (),
             id=path.stem,
         )
         for path in CASES

@@ -199,7 +199,9 @@ def test_a_tie_that_holds_its_point_has_no_displacement_check():
     assert assess_tied(4.0, 5e3).alpha_0 == pytest.approx((10.0 + 5.0 * 4.0) / 80.0, rel=1e-4)
 
 
-@pytest.mark.parametrize(("height", "doubted"), [(3.0, True), (0.1, False)])
+@pytest.mark.parametrize(
+    ("height", "doubted"), [(3.0, True), pytest.param(0.1, False, marks=pytest.mark.slow)]
+)
 def test_a_tie_is_stretched_up_to_the_capacity(height, doubted):
     """As one body about the toe: its point moves by h sin θ + b/2 (1 - cos θ), of α(θ_0) = 0."""
     force, weight, b, top = 2e3, 40e3, 0.5, 4.0
@@ -238,7 +240,12 @@ def test_a_force_acts_on_its_block():
 
 @pytest.mark.parametrize(
     ("height", "kept"),
-    [(4.0, ""), (4.1, "1 kN 2.1 m from block 1"), (6.0, "1 kN 4 m from block 1"), (27.0, None)],
+    [
+        (4.0, ""),
+        (4.1, "1 kN 2.1 m from block 1"),
+        pytest.param(6.0, "1 kN 4 m from block 1", marks=pytest.mark.slow),
+        (27.0, None),
+    ],
 )
 def test_a_mass_acts_within_the_size_of_the_stones(height, kept):
     """A block that ends at 2 m and is as high, of a strip of 4 m: 27 m for 2.7 m are refused."""

@@ -65,7 +65,7 @@ def test_rate_of_a_lognormal_capacity_is_that_of_cornell():
     assert peak == pytest.approx(median * np.exp(dispersion * z), rel=0.04)  # a bin is 4 %
 
 
-@pytest.mark.parametrize("last", [2.5, 8.0])
+@pytest.mark.parametrize("last", [pytest.param(2.5, marks=pytest.mark.slow), 8.0])
 def test_a_rate_from_beyond_the_last_point_of_the_hazard_is_in_doubt(last):
     median, dispersion = 5.0, 0.4
     capacity = median * np.exp(dispersion * norm.ppf((np.arange(400) + 0.5) / 400))
@@ -434,8 +434,17 @@ def test_another_hazard_keeps_the_samples_of_a_file(tmp_path, quick_runs, monkey
     assert CollapseRisk.read(options["out"]).hazard.rate == pytest.approx(rare.rate)
 
 
-@pytest.mark.parametrize(("ratio", "doubted"), [(0.87, True), (0.92, False), (1.09, False)])
-@pytest.mark.parametrize("measure", ["pga", "sa"])
+@pytest.mark.parametrize(
+    ("measure", "ratio", "doubted"),
+    [
+        ("pga", 0.87, True),
+        ("sa", 0.92, False),
+        pytest.param("pga", 0.92, False, marks=pytest.mark.slow),
+        pytest.param("pga", 1.09, False, marks=pytest.mark.slow),
+        pytest.param("sa", 0.87, True, marks=pytest.mark.slow),
+        pytest.param("sa", 1.09, False, marks=pytest.mark.slow),
+    ],
+)
 def test_a_hazard_of_other_ground_than_the_target_is_in_doubt(ratio, doubted, measure, quick_runs):
     """Soil C of EN 1998-1 has S = 1.15, and 1.15 · 2.5 on its plateau: rock is 13 % below."""
     design = 9.80665 * 0.22 * 1.15 * (2.5 if measure == "sa" else 1.0)

@@ -41,7 +41,7 @@ def of(structure, displacements, dt=0.005):
     [
         ("small", None, (0.1, 0.8)),
         pytest.param("large", None, SCALES, marks=pytest.mark.slow),
-        ("large", 2e-4, SCALES),
+        pytest.param("large", 2e-4, SCALES, marks=pytest.mark.slow),
     ],
 )
 def test_each_history_is_that_of_the_run_on_its_own(ring, motions, displacements, closure, scales):

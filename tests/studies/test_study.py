@@ -293,7 +293,7 @@ def title(found):
     return found["name"].values[0]
 
 
-@pytest.mark.parametrize("workers", [1, 2])
+@pytest.mark.parametrize("workers", [pytest.param(1, marks=pytest.mark.slow), 2])
 def test_progress_is_reported_where_the_output_is_a_file(
     small_ring, finders, tmp_path, monkeypatch, capsys, workers
 ):

@@ -219,7 +219,7 @@ def test_damping_that_is_given_is_varied(column, motion, monkeypatch, given, kin
     [
         "run",
         pytest.param("scale", marks=pytest.mark.slow),
-        "verdict_range",
+        pytest.param("verdict_range", marks=pytest.mark.slow),
         "ensemble",
         pytest.param("ida", marks=pytest.mark.slow),
     ],
@@ -463,7 +463,7 @@ def test_the_command_writes_files_that_a_report_shows(tmp_path, capsys, unplotte
     assert (out / "verdict_range.txt").read_text().strip() == str(found)
 
 
-@pytest.mark.parametrize("ran", [True, False])
+@pytest.mark.parametrize("ran", [pytest.param(True, marks=pytest.mark.slow), False])
 def test_the_command_states_its_steps_beside_those_of_the_run(
     ran, tmp_path, capsys, unplotted, calls
 ):

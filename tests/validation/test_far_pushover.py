@@ -47,7 +47,8 @@ def test_peaks(load, rule, peak, verified):
 
 
 @pytest.mark.parametrize(
-    ("load", "rule", "left"), [(POINT, "nodal", 16.69), (POINT, "exact", 16.36)]
+    ("load", "rule", "left"),
+    [pytest.param(POINT, "nodal", 16.69, marks=pytest.mark.slow), (POINT, "exact", 16.36)],
 )
 def test_load_factors_after_a_tenth_of_a_metre(load, rule, left):
     """Within 3 %: the load's own displacement, of a point that turns with its voussoir."""

@@ -154,7 +154,16 @@ def shaken(side):
 known = cache(lambda answers: answers(1.0))
 
 
-@pytest.mark.parametrize("answers", [at_rest, in_the_blocks, at_the_limit, assessed, shaken])
+@pytest.mark.parametrize(
+    "answers",
+    [
+        at_rest,
+        in_the_blocks,
+        at_the_limit,
+        pytest.param(assessed, marks=pytest.mark.slow),
+        shaken,
+    ],
+)
 def test_answers_do_not_depend_on_the_side(answers):
     for name, value in answers(-1.0).items():
         expected = np.asarray(known(answers)[name], float)

@@ -110,7 +110,8 @@ known = cache(lambda answers: answers(1.0, 1.0, 1.0))
 
 
 @pytest.mark.parametrize(
-    "answers", [at_rest, pytest.param(at_the_limit, marks=pytest.mark.slow), shaken]
+    "answers",
+    [*(pytest.param(each, marks=pytest.mark.slow) for each in (at_rest, at_the_limit)), shaken],
 )
 @pytest.mark.parametrize(
     "scale", [pytest.param(SCALES[0], marks=pytest.mark.slow), SCALES[1]], ids=["light", "small"]
