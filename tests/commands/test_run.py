@@ -994,7 +994,7 @@ def test_a_bridge_that_does_not_stand_is_rated_for_no_vehicle(tmp_path, unplotte
     assert "nan" not in (out / "rating.txt").read_text()
 
 
-@pytest.mark.parametrize("command", ["limit", "rate"])
+@pytest.mark.parametrize("command", ["limit", pytest.param("rate", marks=pytest.mark.slow)])
 def test_results_are_written_before_they_are_printed(tmp_path, unplotted, monkeypatch, command):
     """`head` may close the pipe after a line."""
 

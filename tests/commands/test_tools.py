@@ -85,6 +85,7 @@ def kept(tmp_path_factory):
     return folder
 
 
+@pytest.mark.slow
 def test_a_history_is_filmed_beside_its_case(kept, capsys):
     film = kept / "film.gif"
     given = ["--out", str(film), "--size", "480x320", "--window", "0.1,0.15", "--fps", "10"]

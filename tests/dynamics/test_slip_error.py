@@ -53,7 +53,7 @@ def slid(built, motion, **steps):
     return run, slip[-1] - slip[0], *slide(motion.horizontal, motion.dt, LIMIT)
 
 
-@pytest.mark.parametrize("displacements", ["small", "large"])
+@pytest.mark.parametrize("displacements", ["small", pytest.param("large", marks=pytest.mark.slow)])
 def test_default_steps_follow_cyclic_sliding(displacements, verified):
     """A few millimetres in each of ten to thirty half cycles, most of which cancel."""
     for peak, frequency, cycles, dt in ((4.0, 2.0, 6, 0.01), (4.5, 5.0, 15, 0.02)):

@@ -18,7 +18,6 @@ from backfilled import (
     slender_bridge,
     two_walls,
 )
-from repeats import each_once
 from scipy.integrate import quad
 from scipy.optimize import linprog
 from shapely import LineString, Point, Polygon
@@ -423,16 +422,20 @@ def test_backing_holds_faces_up_to_its_level_as_in_an_independent_programme(leve
         assert push_by_levels(structure, backed) == pytest.approx(factor, rel=5e-3)
 
 
+QUICK = (6.0, 1.2), None, -1.0
+"""End of the right ring, backing and sense of the case that takes least."""
+
+
 @pytest.mark.parametrize(
     ("rings", "backing", "sense"),
     [
-        *each_once(
-            [
-                {"left": (8.4, 2.1), "right": (8.4, 2.2)},
-                {"left": (8.4, 2.1), "right": (6.0, 1.2)},
-            ],
-            [0.7, None],
-            [1.0, -1.0],
+        *(
+            pytest.param(
+                *({"left": (8.4, 2.1), "right": right}, backing, sense),
+                marks=() if (right, backing, sense) == QUICK else pytest.mark.slow,
+            )
+            for right in ((8.4, 2.2), (6.0, 1.2))
+            for backing, sense in product((0.7, None), (1.0, -1.0))
         ),
         *(
             pytest.param(

@@ -225,7 +225,9 @@ def block(held=HELD, friction=FRICTION):
     return af.column(breadth=1.0, heights=[1.0], contact=glued)
 
 
-@pytest.mark.parametrize("friction", ["coulomb", "nonassociated"])
+@pytest.mark.parametrize(
+    "friction", ["coulomb", pytest.param("nonassociated", marks=pytest.mark.slow)]
+)
 def test_a_block_slides_on_the_closed_part_of_its_bed(friction, verified, caplog):
     """A pushover loses cohesion where the bed opens; limit analysis has it whole, and says so."""
     push = af.pushover(af.build(block(), fidelity="rigid"), SIDEWAYS)
@@ -302,7 +304,9 @@ def test_a_bond_that_yields_turns_about_the_toe(strength, caplog):
     assert float(found.joints["N"][0]) == pytest.approx(weight, rel=1e-6)
 
 
-@pytest.mark.parametrize("friction", ["coulomb", "nonassociated"])
+@pytest.mark.parametrize(
+    "friction", ["coulomb", pytest.param("nonassociated", marks=pytest.mark.slow)]
+)
 def test_a_bond_is_pulled_off_and_sheared_by_its_strength(friction):
     """Lifted: the weight and T. Pushed at its foot: c A + μ N, with N of the weight alone."""
     column = bonded_column()

@@ -85,6 +85,7 @@ def with_depths(structure, share):
     return replace(structure, joints=tuple(joints))
 
 
+@pytest.mark.slow
 def test_the_least_thickness_is_that_of_limit_analysis():
     ring = live.describe_arch(structures()["ring"])
     found = run_in_node({"arch": ring, "push": 0.0}, STATICS)["least"]
