@@ -130,7 +130,6 @@ LONG = (
 """Notebooks whose results other tests check as well."""
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     "name",
     [pytest.param(name, marks=pytest.mark.slow if name in LONG else ()) for name in EXPECTED],

@@ -870,8 +870,8 @@ def test_a_report_of_a_wall_has_its_falls_across_the_plane_as_one_rigid_body(mon
     ("share", "falls"),
     [
         (0.8, True),
-        pytest.param(1.25, False, marks=pytest.mark.slow),
-        pytest.param(2.5, None, marks=pytest.mark.slow),
+        (1.25, False),
+        (2.5, None),
     ],
 )
 def test_a_run_of_a_wall_says_at_which_scale_it_falls_across_its_plane(

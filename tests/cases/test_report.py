@@ -441,7 +441,7 @@ def test_results_are_read_though_a_file_was_deleted(kept):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["rubble", pytest.param("own", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("name", ["rubble", "own"])
 def test_results_need_no_drawing_beside_them(name, unplotted, undoubted, tmp_path, capsys):
     """A pier of a drawing is run, and reported and filmed from a folder that was moved alone."""
     drawing, place = tmp_path / "drawn" / "pier.geojson", tmp_path / "elsewhere"

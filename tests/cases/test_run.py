@@ -272,9 +272,7 @@ def test_modules_of_a_case_are_among_its_files(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("thickness", "count"), [(0.05, 1), pytest.param(0.6, 0, marks=pytest.mark.slow)]
-)
+@pytest.mark.parametrize(("thickness", "count"), [(0.05, 1), (0.6, 0)])
 def test_a_ring_that_only_its_elastic_fill_holds_up_is_a_doubt(thickness, count):
     """By limit analysis with the fill of [limit], of which a run without a push makes no use."""
     sides = {"state": "fixed", "length": 2.0, "height": 1.0, "above": 1.5}

@@ -130,7 +130,6 @@ def run(small, *changes):
     return af.commands.main(["run", str(small), "--out", str(small.parent / "out"), *given])
 
 
-@pytest.mark.slow
 def test_one_command_runs_all_and_again_keeps_finished_runs(small, undrawn, request, capsys):
     out = small.parent / "out"
     assert run(small) == 0

@@ -164,9 +164,7 @@ fidelity = "rigid"
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("friction", "least"), [(None, "0.442"), pytest.param(0.45, "0.441", marks=pytest.mark.slow)]
-)
+@pytest.mark.parametrize(("friction", "least"), [(None, "0.442"), (0.45, "0.441")])
 def test_the_friction_from_which_it_stands_is_said(friction, least, tmp_path, capsys):
     """By checks, thicknesses and reports, with a note where the case leaves it open."""
     given = "" if friction is None else f'[contacts."stone to stone"]\nfriction = {friction}\n'

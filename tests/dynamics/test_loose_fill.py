@@ -206,7 +206,7 @@ def ida_cells(analysis, monkeypatch, motion):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("rule", ["exact", pytest.param("rigid", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("rule", ["exact", "rigid"])
 def test_a_bridge_with_fill_in_one_piece_falls_by_elastic_and_rigid_joints(footbridge, rule):
     """Fill as one rigid body overlapped with stones, or held them: no run had an answer."""
     analysis = af.Analysis(

@@ -57,7 +57,7 @@ def test_a_wall_pushed_into_its_fill_meets_rankine(friction, part):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("friction", [0.3, pytest.param(0.9, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("friction", [0.3, 0.9])
 def test_a_wall_pushed_into_its_fill_without_dilatancy_starts_from_states_with_the_fill(friction):
     """On level rock N is the weight, so that nothing changes; no start lacks equilibrium."""
     wall, fill = retaining_wall(1.5, 2.0, friction), replace(ALL, active=0.0)

@@ -229,9 +229,7 @@ ROUGH_WALL = [FOUR, FOUR_CUT] * 4
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("few_starts")
-@pytest.mark.parametrize(
-    "friction", [1.0, *(pytest.param(mu, marks=pytest.mark.slow) for mu in (0.8, 1.2))]
-)
+@pytest.mark.parametrize("friction", [1.0, *(mu for mu in (0.8, 1.2))])
 def test_a_rough_wall_fails_by_a_wedge_above_a_stepped_crack(friction):
     """The rigid wedge is a solution with any friction that holds it; the associated one slides."""
     structure = wall(ROUGH_WALL, friction)
@@ -406,11 +404,9 @@ HALVES = [[0.5, 0.5], [1.0]]
 @pytest.mark.parametrize(
     ("structure", "drop"),
     [
-        pytest.param(wall(HALVES * 2, 0.5), 0.01, marks=pytest.mark.slow),
-        pytest.param(wall([[1.0, 0.5], [0.5, 1.0], [1.0, 0.5]], 0.7), 0.0, marks=pytest.mark.slow),
-        pytest.param(
-            ring(voussoirs=7, thickness=0.8, contact=rough(0.35)), 0.0, marks=pytest.mark.slow
-        ),
+        (wall(HALVES * 2, 0.5), 0.01),
+        (wall([[1.0, 0.5], [0.5, 1.0], [1.0, 0.5]], 0.7), 0.0),
+        (ring(voussoirs=7, thickness=0.8, contact=rough(0.35)), 0.0),
         (ring(voussoirs=7, thickness=0.8, contact=rough(0.3, 1e3)), 0.0),
     ],
     ids=["pile", "corner", "ring", "glued ring"],
@@ -443,9 +439,7 @@ def random_structure(seed):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "seed", [k if k < 4 else pytest.param(k, marks=pytest.mark.slow) for k in range(30)]
-)
+@pytest.mark.parametrize("seed", range(30))
 def test_random_rings_and_walls_are_weaker_without_dilatancy(seed):
     structure = random_structure(seed)
     associated = af.collapse_factor(structure, live=SIDEWAYS)

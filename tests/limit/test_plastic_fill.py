@@ -272,11 +272,7 @@ def test_a_mesh_covers_its_fill_and_stays_conforming(chosen):
     ("live", "half"),
     [
         (af.PointLoad(x=3.3, force=(0.0, -1e3)), lambda f: af.PointLoad(3.3, (0.0, -500.0 * f))),
-        pytest.param(
-            af.BodyForce(1.0, 0.2),
-            lambda f: af.BodyForce(0.5 * f, 0.1 * f),
-            marks=pytest.mark.slow,
-        ),
+        (af.BodyForce(1.0, 0.2), lambda f: af.BodyForce(0.5 * f, 0.1 * f)),
     ],
 )
 def test_half_of_the_load_that_stays_is_no_longer_live(live, half):

@@ -842,9 +842,7 @@ def test_factors_of_codes_are_stated_with_outcome_and_range(monkeypatch):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("area_load", "searches"), [(0.0, 1), pytest.param(9e3, 2, marks=pytest.mark.slow)]
-)
+@pytest.mark.parametrize(("area_load", "searches"), [(0.0, 1), (9e3, 2)])
 def test_one_axle_has_multiples_of_its_factors_by_cs454(area_load, searches, monkeypatch):
     """Without a distributed load, against a rating with 1.9 and 1.8; with one it is searched."""
     monkeypatch.setattr(rating, "_places_along", lambda *_: (3.0, 4.0))

@@ -191,9 +191,7 @@ def descent(structure, motion, x):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "fill", [GRAVEL, pytest.param(None, marks=pytest.mark.slow)], ids=["fill", "bare"]
-)
+@pytest.mark.parametrize("fill", [GRAVEL, None], ids=["fill", "bare"])
 def test_a_distributed_load_stands_on_the_worst_of_all_sets_of_strips(fill, monkeypatch):
     """Against each of the 2**5 sets of strips, solved one by one with the axles."""
     monkeypatch.setattr(vehicles.cut_road, "__defaults__", (5,))

@@ -118,7 +118,7 @@ def thinnest(rise, sections=400):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("rise", [sqrt(3.0), pytest.param(1.3, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("rise", [sqrt(3.0), 1.3])
 def test_least_thickness_of_a_pointed_arch_by_lines_of_thrust(rise):
     """The more joints, the more of the sections bind: 40 stones lack half a per cent of it."""
     found = af.minimum_thickness(

@@ -88,11 +88,11 @@ def test_rigid_blocks_on_elastic_joints_reach_the_limit(control, load):
     ("fidelity", "load"),
     [
         ("faces", "two at the crown"),
-        pytest.param("condensed", "sideways", marks=pytest.mark.slow),
-        pytest.param("full", "two at the crown", marks=pytest.mark.slow),
-        pytest.param("faces", "sideways", marks=pytest.mark.slow),
-        pytest.param("condensed", "two at the crown", marks=pytest.mark.slow),
-        pytest.param("full", "sideways", marks=pytest.mark.slow),
+        ("condensed", "sideways"),
+        ("full", "two at the crown"),
+        ("faces", "sideways"),
+        ("condensed", "two at the crown"),
+        ("full", "sideways"),
     ],
 )
 def test_every_fidelity_reaches_the_limit_of_its_polygon(fidelity, load, verified):
@@ -516,7 +516,7 @@ def test_a_support_spreads_below_a_press():
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("stiffness", "factor"),
-    [(50e6, 0.037855), pytest.param(200e6, 0.060848, marks=pytest.mark.slow)],
+    [(50e6, 0.037855), (200e6, 0.060848)],
 )
 def test_a_strip_on_soil_turns_under_a_smaller_push(stiffness, factor):
     """By hand: N (e d - 2 θ) / 2 m of a strip of 0.4 × 4 m is largest at (0.5 - e)³ = 8 N / 9 k d³.

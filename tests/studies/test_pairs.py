@@ -14,7 +14,7 @@ def histories(case, folder):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("workers", [1, pytest.param(2, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("workers", [1, 2])
 def test_pairs_are_kept_where_they_are_looked_for(small, tmp_path, undoubted, workers):
     case = af.Case.read(small)
     assert run_pairs(case, tmp_path / "out", workers=workers) == ["finished", "finished"]

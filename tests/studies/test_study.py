@@ -308,7 +308,7 @@ def test_progress_is_reported_where_the_output_is_a_file(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("workers", [pytest.param(1, marks=pytest.mark.slow), 2])
+@pytest.mark.parametrize("workers", [1, 2])
 def test_progress_of_a_range_is_reported_where_the_output_is_a_file(monkeypatch, capsys, workers):
     monkeypatch.setattr(result_store, "PROGRESS_INTERVAL", 0.02)
     column = af.column(breadth=0.5, heights=[1.0])

@@ -108,7 +108,7 @@ def drawings(bridge, run, runs):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("millimetres", [85.0, pytest.param(170.0, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("millimetres", [85.0, 170.0])
 def test_figures_fit_a_column_and_a_page_with_type_of_seven_points(bridge, run, runs, millimetres):
     """The width is what is printed: no type is scaled, and none is cut off."""
     with af.view.limit_width(millimetres):

@@ -35,10 +35,8 @@ def test_a_film_decodes_to_its_frames(model, run, tmp_path, suffix):
 @pytest.mark.parametrize(
     ("options", "frames", "fps"),
     [
-        pytest.param({}, 6, 20.0, marks=pytest.mark.slow),  # as long as the run
-        pytest.param(
-            {"seconds": 3.0}, 13, 13 / 3.0, marks=pytest.mark.slow
-        ),  # no more frames than fields
+        ({}, 6, 20.0),  # as long as the run
+        ({"seconds": 3.0}, 13, 13 / 3.0),  # no more frames than fields
         ({"seconds": 0.1, "fps": 50.0}, 5, 50.0),
     ],
 )

@@ -129,7 +129,7 @@ CLOSING = """
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("thickness", "finish"),
-    [pytest.param(0.55, "sawn", marks=pytest.mark.slow), (0.35, "weathered")],
+    [(0.55, "sawn"), (0.35, "weathered")],
 )
 def test_joints_that_close_bear_as_those_of_python(thickness, finish):
     """e and closing under dead load, and the peak of the pushover at large displacements."""
