@@ -189,7 +189,7 @@ def test_a_wall_has_its_assessed_joints_alone_in_pictures_and_the_worst_in_a_tab
     assert whole.count(" to course ") - brief.count(" to course ") >= judged - 20 - 10
     assert f"20 of {judged} joints, those of the largest |e|: summary.txt has all" in brief
     size = abs(run.joints["eccentricity"]).max("time").where(wall.judged, 0.0)
-    assert f"\n{run.joints['name'].values[int(size.argmax())]} " in brief
+    assert f"\n{run.joints['name'].values[int(size.values.argmax())]} " in brief
 
 
 def test_a_wall_that_slides_has_one_of_many_mechanisms():
