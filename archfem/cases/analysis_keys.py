@@ -17,7 +17,15 @@ from archfem.limit.fill_strength import Fill, PlasticFill
 from archfem.limit.rating import ASSUMED_STRENGTH, Rating, rate
 from archfem.limit.self_weight import check_options, self_weight_programme
 from archfem.limit.vehicles import VEHICLES, VEHICLES_OF_CODES, Vehicle
-from archfem.masonry.loads import Action, AttachedLoad, BlockLoad, BodyForce, PointLoad, Settlement
+from archfem.masonry.loads import (
+    Action,
+    AttachedLoad,
+    BlockLoad,
+    BodyForce,
+    PointLoad,
+    Settlement,
+    name_side,
+)
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import Structure, join_names
 from archfem.motion.design_spectra import DesignSpectrum
@@ -407,7 +415,7 @@ class AssessmentSettings:
             )
         found: dict[str, KinematicAssessment] = {}
         for direction in self.directions:
-            side, options = ("right", "left")[direction < 0.0], {**self.options}
+            side, options = name_side(direction), {**self.options}
             options["direction"] = direction
             if parts:
                 # without dilatancy the whole alone is searched

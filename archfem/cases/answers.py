@@ -13,6 +13,7 @@ from archfem.dynamics.motion_scaling import CollapseScale
 from archfem.dynamics.scale_search import MechanismScales
 from archfem.limit.fill_range import FillRange
 from archfem.limit.rating import Rating
+from archfem.masonry.loads import name_side
 from archfem.masonry.structure import join_words
 from archfem.models.model import Doubt, read_doubts, write_doubts
 from archfem.motion.hazard import DESIGN_PERIOD, MEASURES
@@ -305,7 +306,7 @@ def describe_margin(found: Iterable[KinematicAssessment]) -> str:
             text = f"{format_ratio(ratios.bodies)} with one weight a body, {text} with them apart"
         outcome = check.words if outcome == "passes" else outcome
         return f"least margin {text}, by {check.name}: {outcome}"
-    side = f", pushed to the {'right' if sense > 0.0 else 'left'}"
+    side = f", pushed to the {name_side(sense)}"
     differs = any(way != sense and x.ratio > 1.001 * check.ratio for x, way in alike)
     return f"least margin {ratios}, by {check.name}{side * differs}: {check.words}"
 

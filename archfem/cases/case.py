@@ -27,13 +27,13 @@ from archfem.cases.risk_keys import RISK_KEYS, RiskSettings, parse_risk
 from archfem.cases.structure_keys import cached_structure, write_structure
 from archfem.cases.toml_file import (
     Table,
+    apply_change,
     check_table,
     format_tables,
     parse_change,
     read_with_base,
     refuse_unknown,
     remove_key,
-    remove_keys,
     set_value,
 )
 from archfem.cases.verdict_keys import VERDICT_KEYS, parse_verdict
@@ -340,10 +340,7 @@ def read_settings(path: Path, changes: Sequence[str] = ()) -> dict[str, Any]:
     settings = read_with_base(path)
     for text in changes:
         path_of_value, value = parse_change(text)
-        if path_of_value.strip() == "remove":
-            remove_keys(settings, value)
-            continue
-        set_value(settings, complete_path(path_of_value), value)
+        apply_change(settings, complete_path(path_of_value), value)
     return settings
 
 

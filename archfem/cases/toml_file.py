@@ -141,6 +141,14 @@ def set_value(settings: dict[str, Any], path: str, value: Any) -> None:
     table[last] = value
 
 
+def apply_change(settings: dict[str, Any], path: str, value: Any) -> None:
+    """Set the value at "section.key", or remove what the list of "remove" names."""
+    if path.strip() == "remove":
+        remove_keys(settings, value)
+    else:
+        set_value(settings, path, value)
+
+
 def split_key_path(path: str) -> list[str]:
     """Split "section.key" into the names of the tables and the key."""
     # at each dot between names that is not in quotes

@@ -93,9 +93,11 @@ def _say_steps(case: Case, motion: Motion, options: argparse.Namespace) -> str:
     if case.analysis.dt is not None:
         return ""
     text = f"\nvariations take steps of {1e3 * OWN_STEP:g} ms, and a run varies its own"
+    if options.out is None:
+        return text
     alone = case if options.pair is None else case.alone(options.pair)
-    path = Path(options.out or "") / (options.pair or "") / HISTORY_FILE
-    if options.out is None or (run := load_finished_run(path, alone, motion)) is None:
+    run = load_finished_run(Path(options.out, options.pair or "", HISTORY_FILE), alone, motion)
+    if run is None:
         return text
     most, left = (format_mm(run.dataset.attrs[key]) for key in ("displacement", "residual"))
     return f"{text}: in this folder it is displaced by up to {most}, {left} at the end"

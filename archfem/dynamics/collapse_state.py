@@ -16,7 +16,7 @@ from archfem.errors import InvalidInput
 from archfem.masonry.block import rotate
 from archfem.masonry.standing import list_own_stones
 from archfem.masonry.stiffness_ratio import find_soft_blocks, list_stones
-from archfem.masonry.structure import Structure, join_names
+from archfem.masonry.structure import Structure, join_names, list_first
 from archfem.models.model import Doubt
 from archfem.units import format_mm
 
@@ -104,8 +104,7 @@ class CollapseState:
 
 def name_stones(names: Sequence[str], most: int = 3) -> str:
     """Return names of stones in brackets behind a space, many shortened; "" for none."""
-    more = f" and {len(names) - most} more" * (len(names) > most)
-    return f" ({', '.join(names[:most])}{more})" * bool(names)
+    return f" ({list_first(names, most)})" * bool(names)
 
 
 @validate_arguments

@@ -57,7 +57,7 @@ ROCKS_SOFTLY = (
 
 # Displacement up to which a mechanism is too small to matter, over the depth of the shallowest
 # part, a hundredth of a dislocation [-]
-SMALL = 0.001
+SMALL_DISPLACEMENT = 0.001
 
 # What a run without doubts still leaves open
 NO_RANGE = "one motion, one set of properties: range not computed"
@@ -188,7 +188,7 @@ def detect_mechanisms(
 
 def add_larger_mechanism(joints: xr.Dataset, structure: Structure, found: Mechanism) -> Mechanism:
     """Return a verified mechanism, one too small to matter with the first that moves farther."""
-    below = SMALL * shallowest_part(structure)[0]
+    below = SMALL_DISPLACEMENT * shallowest_part(structure)[0]
     if found.opening is None or found.displacement > below:
         return found
     larger = first_verified_mechanism(structure, joints, beyond=below)

@@ -49,6 +49,7 @@ from archfem.masonry.loads import (
     describe_massless,
     find_push,
     list_loads,
+    name_side,
 )
 from archfem.masonry.materials import STONE
 from archfem.masonry.standing import find_bodies
@@ -207,7 +208,7 @@ class Collapse(ResultDisplay):
         """Return the unit of the factor and the kind of the load, in words."""
         points = [action for action in self.live if isinstance(action, PointLoad)]
         if self.push:
-            return f" g, pushed to the {'right' if self.push > 0.0 else 'left'}"
+            return f" g, pushed to the {name_side(self.push)}"
         if points and len(points) == len(self.live):
             sizes = join_names([f"{np.hypot(*point.force) / kN:.4g}" for point in points])
             places = join_names([f"{point.x:.4g}" for point in points])

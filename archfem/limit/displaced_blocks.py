@@ -92,11 +92,6 @@ class PlacedBlocks:
         """Return the blocks at other displacements from rest."""
         return replace(self, displacement=displacement)
 
-    @property
-    def side(self) -> str:
-        """Sense of the horizontal forces in a word."""
-        return "right" if self.direction > 0.0 else "left"
-
     @cached_property
     def centroids(self) -> Array:
         """Present centroids (n_blocks, 2) [m]."""

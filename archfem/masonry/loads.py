@@ -247,6 +247,11 @@ def find_push(live: "Action | Settlement | Sequence[Action | Settlement]") -> fl
     return load.horizontal if isinstance(load, BodyForce) and not load.vertical else 0.0
 
 
+def name_side(direction: float) -> str:
+    """Name the sense of a horizontal push along x."""
+    return "right" if direction > 0.0 else "left"
+
+
 def describe_massless(
     live: "Settlement | Sequence[Action | Settlement]", dead: Sequence[Action]
 ) -> str:

@@ -74,6 +74,12 @@ def join_names(names: Sequence[str], comma: str = ", ") -> str:
     return _shorten_list(names, comma.join, comma)
 
 
+def list_first(names: Sequence[str], most: int, comma: str = ", ") -> str:
+    """Join the first names to a list, and count the others."""
+    more = f" and {len(names) - most} more" * (len(names) > most)
+    return f"{comma.join(names[:most])}{more}"
+
+
 def join_words(words: Sequence[str]) -> str:
     """Join words to "a, b and c"."""
     return " and ".join(filter(None, [", ".join(words[:-1]), *words[-1:]]))

@@ -21,7 +21,7 @@ from archfem.limit.displaced_blocks import (
 from archfem.limit.finite_mechanism import MechanismPath
 from archfem.limit.linear_programme import NoEquilibrium
 from archfem.limit.mechanism_kinematics import find_rigid_regions
-from archfem.masonry.loads import AttachedLoad
+from archfem.masonry.loads import AttachedLoad, name_side
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import Structure, join_names
 from archfem.models.model import Doubt
@@ -128,7 +128,7 @@ def describe_ties(
         size, name = np.hypot(*force) / kN, placed.structure.blocks[block].name
         need = f"{share * size:.4g}" if share > 1e-4 else "none"
         needs.append(f"{need} of the {size:.4g} kN of the tie at {name}")
-    return f"pushed to the {placed.side}, alpha_0 needs {join_names(needs)}"
+    return f"pushed to the {name_side(placed.direction)}, alpha_0 needs {join_names(needs)}"
 
 
 def find_stretches(

@@ -44,7 +44,7 @@ from archfem.limit.fill_range import FillAssumption, vary_fill
 from archfem.limit.fill_strength import Fill, PlasticFill
 from archfem.limit.finite_mechanism import MechanismPath, PathEnd, PathFollower
 from archfem.limit.mechanism_names import name_mechanism
-from archfem.masonry.loads import AttachedLoad, BodyForce
+from archfem.masonry.loads import AttachedLoad, BodyForce, name_side
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import (
     HasStructure,
@@ -205,7 +205,7 @@ class KinematicAssessment(ResultDisplay):
 
     def __str__(self) -> str:
         """Describe mechanism, oscillator, checks and notes, a line each."""
-        side = "right" if self.direction > 0.0 else "left"
+        side = name_side(self.direction)
         lines = [f"kinematic assessment of {self.structure.name}, pushed to the {side}"]
         if self.path is None:
             lines.append("no horizontal force makes it a mechanism")
@@ -616,7 +616,7 @@ class _Oscillator:
                 "pushed to the {}: whatever moves at this alpha_0, its linear ratio is {:.3g} at "
                 "least, that of e* = 1"
             )
-            values = self.placed.side, self.linear.floor, UPPER_BOUND
+            values = name_side(self.placed.direction), self.linear.floor, UPPER_BOUND
             found += [self.searched, Doubt(words, values=values)]
         if self.fill and self.placed.fill is None and self.path is not None:
             words = "the fill counts as weight and mass on the stones, without its pressure on them"

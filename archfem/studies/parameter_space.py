@@ -19,7 +19,7 @@ from archfem._validation import check_choice, check_integer, short_repr
 from archfem.cases.analysis_tables import complete_path
 from archfem.cases.case import Case
 from archfem.cases.provenance import hash_sections
-from archfem.cases.toml_file import check_table, refuse_unknown, remove_keys, set_value
+from archfem.cases.toml_file import apply_change, check_table, refuse_unknown
 from archfem.errors import InvalidInput
 
 # Sections of a case that define its model
@@ -216,10 +216,8 @@ class Point:
         for key, value in self.changes:
             if key == PAIR_KEY:
                 _select_pair(settings, value)
-            elif key == "remove":
-                remove_keys(settings, value)
             else:
-                set_value(settings, key, deepcopy(value))
+                apply_change(settings, key, deepcopy(value))
         return settings
 
     @property

@@ -15,7 +15,7 @@ from archfem._netcdf import read_dataset
 from archfem.cases.result_text import STATED_DOUBTS
 from archfem.dynamics.collapse_state import COLLAPSE_STATES, FALLEN_STATES
 from archfem.errors import InvalidInput
-from archfem.masonry.structure import join_words
+from archfem.masonry.structure import join_words, list_first
 from archfem.models.model import Doubt, merge_doubts, read_doubts
 from archfem.units import format_mm
 from archfem.view.pages.document import Grid
@@ -120,7 +120,7 @@ class StudyFindings:
 
 def _merge_cases(doubts: Sequence[Doubt]) -> Doubt:
     """Return doubts of several cases as one: its numbers are their ends, or those of the first."""
-    places = _list_few([*dict.fromkeys(doubt.place for doubt in doubts)])
+    places = list_first([*dict.fromkeys(doubt.place for doubt in doubts)], MAX_NAMES, "; ")
     if len({doubt.kind for doubt in doubts}) > 1:
         return replace(doubts[0], place=f"{places}, of which the first")
     return merge_doubts(doubts, places)
@@ -236,7 +236,7 @@ def say_what_changes(found: StudyFindings) -> Iterator[str]:
             verb = verbs[len(failing) > 1]
             runs = (f", under {x[count]} of {x['runs']} motions" * (x["runs"] > 1) for x in failing)
             listed = [f"{found.label(x)}{under}" for x, under in zip(failing, runs, strict=True)]
-            counted.append(f"{len(failing)}{of} {verb}: {_list_few(listed)}")
+            counted.append(f"{len(failing)}{of} {verb}: {list_first(listed, MAX_NAMES, '; ')}")
         elif count == "falls" and any(row.get("fall") for row in rows):
             counted.append(f"none of {len(rows)} cases falls")
     then = ", and " if len(others) == len(rows) else "; of the others "
@@ -250,13 +250,7 @@ def say_what_changes(found: StudyFindings) -> Iterator[str]:
     if below:
         listed = [f"{found.label(row)}, at {row[OVER_SITE]:.3g} of it" for row in below]
         count = f"{len(below)} of {len(rows)} cases begin{'s' * (len(below) == 1)} to move"
-        yield f"{count} below the site's acceleration: {_list_few(listed)}"
-
-
-def _list_few(names: list[str]) -> str:
-    """List the first names, and count the others."""
-    more = f" and {len(names) - MAX_NAMES} more" * (len(names) > MAX_NAMES)
-    return "; ".join(names[:MAX_NAMES]) + more
+        yield f"{count} below the site's acceleration: {list_first(listed, MAX_NAMES, '; ')}"
 
 
 def _compare_cases(found: StudyFindings, rows: list[Any], given: Any) -> str:
