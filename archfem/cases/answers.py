@@ -315,10 +315,10 @@ def compare_crushing(case: Case, found: Iterable[KinematicAssessment]) -> list[R
     """Return a remark on stones that crush, which an assessment leaves out: a doubt from 2 % on."""
     if case.limit.strength in (None, np.inf):
         return []
-    least = min(found, key=lambda result: result.checks[-1].least)
+    least = min(found, key=lambda result: find_margin([result]))
     loads = case.assessment.options.get("loads", ())
     share = case.limit.crushing_share(case.structure, least.direction, loads)
-    margin = share * find_margin(found)
+    margin = share * find_margin([least])
     text = (
         f"joints hinge about their edges: crushing at {case.limit.strength / MPa:.3g} MPa lowers "
         f"the push at which the whole begins to move by {100.0 * (1.0 - share):.2g} %, and margins "
