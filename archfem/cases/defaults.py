@@ -10,7 +10,7 @@ from archfem._validation import declared_keys
 from archfem.cases.case import Case
 from archfem.cases.structure_keys import PRESETS, find_table
 from archfem.cases.toml_file import Table, format_key
-from archfem.limit.instability import describe_friction, least_friction
+from archfem.limit.instability import describe_friction, describe_geometric_factor, least_friction
 from archfem.masonry.joint_closing import finish_range
 from archfem.masonry.materials import Contact, Material
 from archfem.masonry.structure import Structure, join_names
@@ -227,14 +227,14 @@ def _has_default_vertical(case: Case) -> bool:
     )
 
 
-def describe_friction_margin(case: Case, structure: Structure) -> list[str]:
-    """Describe from which friction rigid blocks stand, with a note if that is left open."""
+def describe_margins_at_rest(case: Case, structure: Structure) -> list[str]:
+    """Describe from which friction and depth of joints it stands, with a note on friction."""
     if not (sentence := describe_friction(structure)):
         return []
     least = least_friction(structure) or 0.0
     contacts = {joint.contact for joint in structure.joints}
     open_ones = [each.name for each in contacts if "friction" in list_default_keys(case, each)]
-    lines = [f"as rigid blocks {sentence}"]
+    lines = [f"as rigid blocks {sentence}", describe_geometric_factor(structure)]
     if open_ones and least > DRY_FRICTION[0]:
         names = join_names([f'contacts."{name}"' for name in sorted(open_ones)])
         low, high = DRY_FRICTION

@@ -18,7 +18,7 @@ from archfem.cases.case import Case
 from archfem.cases.defaults import (
     describe_defaults,
     describe_fill_defaults,
-    describe_friction_margin,
+    describe_margins_at_rest,
     explain_defaults,
 )
 from archfem.cases.run import DeadLoadResult
@@ -268,7 +268,7 @@ def describe_dead_load(result: DeadLoadResult, *, explain: bool = False) -> str:
         heads = result.dead.joints.isel(joint=structure.heads)
         lines[-1] += f"; of head joints, which do not count, {_describe_largest(heads)}"
     lines += [
-        *describe_friction_margin(result.case, structure),
+        *describe_margins_at_rest(result.case, structure),
         *note_masses(structure, parapets=result.case.parapets),
     ]
     if has_backing(result.case.limit.fill):

@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 
 from archfem.cases.case import Case
-from archfem.cases.defaults import describe_friction_margin
+from archfem.cases.defaults import describe_margins_at_rest
 from archfem.errors import InvalidInput
 from archfem.limit.collapse import describe_crushing
 from archfem.limit.instability import explain_instability
@@ -93,7 +93,7 @@ def describe_thickness(case: Case, ring: Ring) -> tuple[str, float, list[str]]:
     lines = [
         f"least thickness at rest: {words}, the mean depth of its joints as drawn, all stones "
         "scaled alike about the middle line; the ring alone on fixed springings",
-        f"geometric factor of safety: {factor:.3g}; "
+        f"geometric factor of safety of the ring: {factor:.3g}; "
         f"{describe_crushing(limit.strength, case.structure)}",
     ]
     if limit.friction is not None:
@@ -102,6 +102,5 @@ def describe_thickness(case: Case, ring: Ring) -> tuple[str, float, list[str]]:
             moving = explain_instability(build(0.99 * least)) or "joints crush"
             moving = moving.partition(": ")[0]
             lines.append(f"if thinner, {moving}; without sliding {format_mm(rough)} are enough")
-        alone = describe_friction_margin(case, build(ring.thickness))
-        lines += [f"the ring alone, as drawn: {alone[0]}", *alone[1:]] if alone else []
-    return words, factor, lines
+    whole = describe_margins_at_rest(case, case.structure)
+    return words, factor, [*lines, *(["the whole structure as drawn:", *whole] if whole else [])]

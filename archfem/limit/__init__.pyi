@@ -8,6 +8,7 @@ from .fill_strength import Fill as Fill
 from .fill_strength import PlasticFill as PlasticFill
 from .finite_mechanism import MechanismPath as MechanismPath
 from .finite_mechanism import collapse_path as collapse_path
+from .instability import geometric_factor as geometric_factor
 from .mechanism_count import Mechanism as Mechanism
 from .mechanism_count import counted_mechanism as counted_mechanism
 from .mechanism_count import counted_mechanisms as counted_mechanisms

@@ -13,6 +13,7 @@ import numpy as np
 from scipy import sparse
 
 from archfem._typing import Array
+from archfem._validation import check_type
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.limit.linear_programme import Programme, RigidBlocks
 from archfem.limit.self_weight import is_balanced, refuse_bonds, self_weight_programme
@@ -85,6 +86,9 @@ def explain_instability(structure: Structure) -> str | None:
 # Coefficient of friction below which a least one is not sought, as no stone has it
 _LITTLE_FRICTION = 0.05
 
+# Share of the depth of joints below which a least one is not sought: a factor of safety of 20
+_LITTLE_DEPTH = 0.05
+
 
 @lru_cache(maxsize=8)
 def least_friction(structure: Structure) -> float | None:
@@ -92,15 +96,48 @@ def least_friction(structure: Structure) -> float | None:
 
     None where it does not stand with its own, or limit analysis does not apply.
     """
+    most = min(float(structure.friction.max(initial=0.0)), 1e3)
+    return _find_least(structure, "cap", _LITTLE_FRICTION, most, precision=5e-3)
+
+
+@lru_cache(maxsize=8)
+def geometric_factor(structure: Structure) -> float | None:
+    """Find Heyman's geometric factor of safety of a structure at rest: of all joints at once.
+
+    The joints become less deep about their middles, at the same weight, until a thrust line
+    within them exists no more. For a ring of constant thickness that is the factor on its
+    thickness. Piers take part, which `minimum_thickness` of their ring leaves out.
+
+    Args:
+        structure: structure with its friction and cohesion; fill does not press.
+
+    Returns:
+        Depth of the joints over the least one [-], 20 where it is that or more; None where the
+        structure does not stand, or joints with bonds or bodies that yield have no such factor.
+
+    References:
+        Heyman, Int. J. Mech. Sci. 11 (1969) 363-385.
+
+    Example:
+        >>> ring = af.circular_arch(radius=1.0, thickness=0.2, embrace=180.0, voussoirs=17)
+        >>> round(af.limit.geometric_factor(ring), 2)
+        1.89
+    """
+    check_type(structure, Structure, "structure", "give one, e.g. circular_arch(…)")
+    least = _find_least(structure, "depth", _LITTLE_DEPTH, 1.0, precision=1e-3)
+    return None if least is None else 1.0 / least
+
+
+def _find_least(
+    structure: Structure, name: str, low: float, high: float, precision: float
+) -> float | None:
+    """Return the least value of a property with which it stands, from `low` on."""
     try:
         refuse_bonds(structure)
         _, dead = self_weight_programme(structure, "coulomb", np.inf, None)
-        if _stands(dead, cap=_LITTLE_FRICTION):
-            return _LITTLE_FRICTION
-        if not _stands(dead):
-            return None
-        most = min(float(dead.friction.max()), 1e3)
-        return _least_value(dead, "cap", _LITTLE_FRICTION, most, precision=5e-3)
+        if _stands(dead, **{name: low}):
+            return low
+        return _least_value(dead, name, low, high, precision) if _stands(dead) else None
     except (InvalidInput, DidNotConverge):  # soft bodies, bonds
         return None
 
@@ -111,6 +148,16 @@ def describe_friction(structure: Structure) -> str:
         return ""
     less = " or less" if least == _LITTLE_FRICTION else ""
     return f"{_say_friction(least)}{less}"
+
+
+def describe_geometric_factor(structure: Structure) -> str:
+    """Describe the geometric factor of safety at rest, of a structure that stands."""
+    factor = geometric_factor(structure) or 1.0
+    more = " or more" if factor >= 1.0 / _LITTLE_DEPTH else ""
+    return (
+        f"geometric factor of safety at rest: {factor:.3g}{more}, as it stands with all joints "
+        f"{1.0 / factor:.3g} times as deep"
+    )
 
 
 def _say_friction(least: float) -> str:
@@ -214,7 +261,8 @@ def _stands(
     if friction is not None:
         coefficient = np.maximum(coefficient, friction)
     coefficient = np.minimum(coefficient, cap)
-    relaxed = replace(dead, blocks=DeepenedBlocks(blocks.structure, depth), friction=coefficient)
+    deepened, cohesion = DeepenedBlocks(blocks.structure, depth), depth * dead.cohesion
+    relaxed = replace(dead, blocks=deepened, friction=coefficient, cohesion=cohesion)
     return is_balanced(relaxed.minimise_residual(), relaxed)
 
 

@@ -147,7 +147,8 @@ def test_the_least_thickness_of_a_ring_is_printed(tmp_path, capsys):
     assert af.commands.main(["thickness", str(path)]) == 0
     said = capsys.readouterr().out
     assert "least thickness at rest: 107 mm of 200 mm" in said  # Milankovitch: 0.1075 R
-    assert "geometric factor of safety: 1.86;" in said
+    assert "geometric factor of safety of the ring: 1.86;" in said
+    assert "geometric factor of safety at rest: 1.86, as" in said  # of all joints, which are those
     assert af.commands.main(["thickness", str(path), "--part", "dome"]) == 1
     assert "'dome' is no ring" in capsys.readouterr().err
 

@@ -9,12 +9,17 @@ import pytest
 
 import archfem as af
 from archfem.limit import linear_programme
-from archfem.limit.instability import describe_friction, explain_instability, least_friction
+from archfem.limit.instability import (
+    describe_friction,
+    describe_geometric_factor,
+    explain_instability,
+    least_friction,
+)
 
 STONE = af.STONE
 
 
-def on_a_bed(outline, *, friction=0.6, tilt=0.0):
+def on_a_bed(outline, *, friction=0.6, tilt=0.0, cohesion=0.0):
     """A block on a fixed one, 1 m broad and tilted [rad]."""
     c, s = np.cos(tilt), np.sin(tilt)
     turn = np.array([[c, s], [-s, c]])
@@ -23,7 +28,7 @@ def on_a_bed(outline, *, friction=0.6, tilt=0.0):
         af.Block(tuple(map(tuple, bed @ turn)), STONE, "bed", fixed=True),
         af.Block(tuple(map(tuple, np.array(outline) @ turn)), STONE, "stone"),
     ]
-    return af.masonry.assembled(blocks, af.Contact(1e10, 4e9, friction))
+    return af.masonry.assembled(blocks, af.Contact(1e10, 4e9, friction, cohesion=cohesion))
 
 
 def value(pattern, text):
@@ -52,6 +57,43 @@ def test_the_least_friction_of_a_block_on_a_slope(slope, friction, least):
         assert found == pytest.approx(least, rel=0.01)
         assert f"it stands from a coefficient of friction of {least:g}" in words
         assert words.endswith(" or less") == (least == 0.05)
+
+
+@pytest.mark.parametrize(
+    ("slope", "factor"),
+    [
+        # the weight meets the bed 0.25 m times the slope from the middle of its 1 m
+        (0.35, 0.5 / (0.25 * 0.35)),
+        (0.05, 20.0),  # and more, which is not sought
+        (0.7, None),  # it slides
+    ],
+)
+def test_the_geometric_factor_of_a_block_on_a_slope(slope, factor):
+    cube = [[0.0, 0.0], [1.0, 0.0], [1.0, 0.5], [0.0, 0.5]]
+    stone = on_a_bed(cube, friction=0.6, tilt=np.arctan(slope))
+    found = af.limit.geometric_factor(stone)
+    if factor is None:
+        assert found is None
+        return
+    assert found == pytest.approx(factor, rel=2e-3)  # of the bisection
+    assert ("20 or more" in describe_geometric_factor(stone)) == (factor == 20.0)
+
+
+def test_cohesion_of_less_deep_joints_is_less():
+    """A block on a slope of 0.8 slides unless c h = W (sin - mu cos)."""
+    cube = [[0.0, 0.0], [1.0, 0.0], [1.0, 0.5], [0.0, 0.5]]
+    pressure = STONE.unit_weight * 0.5 * np.cos(np.arctan(0.8))
+    cohesion = 2.0 * pressure * (0.8 - 0.6)
+    stone = on_a_bed(cube, friction=0.6, tilt=np.arctan(0.8), cohesion=cohesion)
+    found = af.limit.geometric_factor(stone)
+    assert found == pytest.approx(2.0, rel=2e-3)  # of sliding: 2.5 of turning
+
+
+def test_the_geometric_factor_of_a_ring_is_that_of_its_thickness():
+    """The two weigh a little otherwise, as the corners of a thinner ring are cut less."""
+    ring = af.circular_arch(radius=1.0, thickness=0.2, embrace=180.0, voussoirs=60)
+    least = af.minimum_thickness(af.masonry.find_ring(ring).with_thickness)
+    assert af.limit.geometric_factor(ring) == pytest.approx(0.2 / least, rel=3e-3)
 
 
 @pytest.mark.parametrize("slope", [0.1947, 0.344])

@@ -14,7 +14,7 @@ import xarray as xr
 from archfem._display import DOUBT_MARK, NOTE_MARK
 from archfem._files import read_listed
 from archfem.cases.answers import Ratios, read_numbers
-from archfem.cases.defaults import describe_friction_margin
+from archfem.cases.defaults import describe_margins_at_rest
 from archfem.cases.report.conclusion import build_conclusion
 from archfem.cases.report.doubts import list_elastic_fill, list_ranges, list_varied, spans_run
 from archfem.cases.report.inputs import describe_value, tabulate_inputs
@@ -173,7 +173,7 @@ def build_structure_section(data: ReportData) -> Section:
         _tabulate_parts(structure),
         # tables stand before figures, which leave room where they move to the next page
         *([] if data.dead is None else [_tabulate_dead_load(data.dead)]),
-        *map(TextBlock, map(sentence, describe_friction_margin(case, structure))),
+        *map(TextBlock, map(sentence, describe_margins_at_rest(case, structure))),
     ]
     beside = data.dead is not None and drawn[0] < MAX_SLENDERNESS * drawn[1]
     with limit_width(HALF_WIDTH) if beside else nullcontext():
