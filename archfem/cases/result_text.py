@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from csv import writer
 from io import StringIO
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -80,6 +80,15 @@ def mark_remarks(remarks: Iterable[Remark]) -> list[str]:
 
 # Finding of a study with the doubts of a run, as results keep them
 STATED_DOUBTS = "doubts, stated"
+
+# Finding with the names of those that a search has not proved least
+UPPER_BOUNDS = "upper_bounds"
+
+
+def mark_bound(row: Mapping[str, Any], name: str, text: str) -> str:
+    """Return the text of a finding of a point, behind "≤ " if it is an upper bound."""
+    return f"≤ {text}" if name in str(row.get(UPPER_BOUNDS, "")).split(", ") else text
+
 
 # What a run of a wall in bond checks across its plane
 CHECKED_ACROSS = "across the plane of the drawing a run checks it as one rigid body"

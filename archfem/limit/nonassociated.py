@@ -56,6 +56,9 @@ MAX_FOLLOWED = 3
 # Rise of the factor with the last of the friction that is never a jump [-]
 MAX_SUDDEN_RISE = 0.05
 
+# Rounds in which the bound on all solutions is raised, and change of forces that ends them [-]
+MAX_BOUND_ROUNDS, MIN_BOUND_CHANGE = 50, 1e-5
+
 # Relative gap that counts as zero [-]: programmes are solved to 1e-9
 GAP_TOLERANCE = 1e-7
 
@@ -216,8 +219,8 @@ class NonassociatedBounds:
             bound and the associated factor.
         between: factors of the weakest and of the strongest solution of the search (2,); NaN
             where it has none.
-        starts: number of states from which the search started, and of those that reached a
-            solution.
+        starts: number of states from which the search started, one where it is proved least, and
+            of those that reached a solution.
         path: shares of the friction, and factors of the weakest solution with each of them.
         unbalanced: largest residual of the balance of the returned solution [mean block weights].
         excess: largest |V| - c A - μ N, relative to the largest N [-].
@@ -396,9 +399,17 @@ def _search(
 
 
 def _search_solutions(programme: Programme, start: Optimum | None, found: _SearchState) -> None:
-    """Search from all starts, bound the objective, and descend below the weakest solution."""
-    # the number of starts falls with the joints squared
+    """Bound the objective; unless that proves a solution, search from all starts and descend."""
     joints = len(programme.blocks.structure.depths)
+    known = None if start is None else find_solution(programme, start.forces)
+    if known is not None:
+        found.tried, found.solutions = 1, [known]
+    state = start if known is None else known.state
+    associated = -np.inf if state is None else state.value
+    found.bound = _bound_objective(programme, state)
+    if known and found.bound <= associated + CRUSHING_GAP_TOLERANCE * abs(associated):
+        return  # none is weaker
+    # the number of starts falls with the joints squared
     number = max(2, MAX_START_COUNT * min(joints, MAX_FULL_SEARCH_JOINTS) ** 2 // joints**2)
     with ProgressReport("limit analysis", len(FRICTION_SHARES) + number) as progress:
         followed, found.path = _follow_friction(programme, progress)
@@ -409,14 +420,10 @@ def _search_solutions(programme: Programme, start: Optimum | None, found: _Searc
         except Interrupted as error:
             found.tried, found.solutions = error.last
             raise
-    normal = np.array([normal_forces(forces) for forces in starts])
-    smallest = normal.reshape(-1, joints).min(axis=0, initial=np.inf)
-    found.bound = _bound_objective(programme, smallest)
     first = max(found.solutions, key=lambda iterate: iterate.state.value, default=None)
     least = -np.inf
     if first is not None:
         least = first.state.value + OBJECTIVE_DECREASE * abs(first.state.value)
-    associated = -np.inf if start is None else start.value
     if starts and max(found.bound, associated) > least:  # a weaker solution is possible
         for iterate in descend(programme, first, starts[0], patience=30):
             found.weaker += (iterate,)
@@ -549,28 +556,53 @@ def _random_vertex(
     return replace(loaded, force_cost=cost).solve()
 
 
-def _bound_objective(programme: Programme, smallest: Array) -> float:
-    """Bound the objective of every solution without dilatancy from above."""
-    # A solution's N is at least the least N of any state of equilibrium. A state with
-    # |V| <= c A + μ min N is therefore admissible in the programme whose optimum the solution is.
-    # Where a known state (`smallest`) has no N in a joint, its least N is zero.
-    joints = len(programme.blocks.structure.depths)
-    least = np.zeros(joints)
-    if joints <= MAX_FULL_SEARCH_JOINTS:
-        no_cost = np.zeros_like(programme.unknown_cost)
-        for joint in np.flatnonzero(smallest > RESISTANCE_MARGIN):
-            cost = np.zeros(3 * joints)
-            cost[[joint, joints + joint]] = 1.0
-            normal = _least_objective(replace(programme, force_cost=cost, unknown_cost=no_cost))
-            least[joint] = max(normal - RESISTANCE_MARGIN, 0.0)
+def _bound_objective(programme: Programme, known: Optimum | None) -> float:
+    """Bound the objective of every solution without dilatancy weaker than a known state."""
+    # A solution's N is at least the least N of any state of equilibrium that is as strong as the
+    # bounds let it be. A state with |V| <= c A + μ min N is therefore admissible in the programme
+    # whose optimum the solution is. There the joints that slide limit the bound: their least N is
+    # sought again, between closer bounds. Where the known state has no N, the least is zero.
     negated = None if programme.force_cost is None else -programme.force_cost
     opposite = replace(programme, force_cost=negated, unknown_cost=-programme.unknown_cost)
-    highest = -_least_objective(opposite)
-    try:
-        safe = with_shear_limits(programme, shear_resistance(programme, least)).solve()
-    except DidNotConverge:  # no equilibrium with so little friction
-        return highest
-    return -np.inf if safe is None else min(highest, safe.value)
+    bound, least = -_least_objective(opposite), np.zeros(len(programme.friction))
+    carries = np.ones(len(least)) if known is None else normal_forces(known.forces)
+    sought = (carries > RESISTANCE_MARGIN) & (len(least) <= MAX_FULL_SEARCH_JOINTS)
+    for number in range(MAX_BOUND_ROUNDS):
+        between, last = _limit_objective(programme, known, bound), least.copy()
+        for joint in np.flatnonzero(sought):
+            least[joint] = max(least[joint], _least_normal_force(between, joint))
+        if number and not np.any(least > last + MIN_BOUND_CHANGE * least.max()):
+            return bound
+        try:
+            safe = with_shear_limits(programme, shear_resistance(programme, least)).solve()
+        except DidNotConverge:  # no equilibrium with so little friction
+            return bound
+        if safe is None:
+            return -np.inf
+        bound = min(bound, safe.value)
+        if known and bound <= known.value + CRUSHING_GAP_TOLERANCE * abs(known.value):
+            return bound
+        slips = np.abs(mechanism_gaps(programme, safe.multipliers).reshape(3, -1)[2])
+        sought = slips > GAP_TOLERANCE * slips.max()
+    return bound
+
+
+def _limit_objective(programme: Programme, known: Optimum | None, bound: float) -> Programme:
+    """Return the programme of states between a known one and a bound, if a load grows."""
+    if known is None or programme.columns is None or programme.force_cost is not None:
+        return programme
+    rise = max(bound - known.value, 0.0) + GAP_TOLERANCE * abs(known.value)
+    load = programme.load + programme.columns[:, :1] @ np.array([bound])
+    upper_bounds = np.concatenate([[rise], programme.upper_bounds[1:]])
+    return replace(programme, load=load, upper_bounds=upper_bounds)
+
+
+def _least_normal_force(programme: Programme, joint: int) -> float:
+    """Return the least N of a joint in any state of equilibrium, less round-off."""
+    cost, no_cost = np.zeros((3, len(programme.friction))), np.zeros_like(programme.unknown_cost)
+    cost[:2, joint] = 1.0
+    least = _least_objective(replace(programme, force_cost=cost.ravel(), unknown_cost=no_cost))
+    return least - RESISTANCE_MARGIN
 
 
 def _least_objective(programme: Programme) -> float:

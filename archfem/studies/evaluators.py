@@ -15,7 +15,13 @@ from archfem.cases.analysis_keys import rate_case
 from archfem.cases.answers import compare_crushing, find_margin
 from archfem.cases.case import Case
 from archfem.cases.provenance import hash_inputs, remove_presentation
-from archfem.cases.result_text import STATED_DOUBTS, doubt_rating, record_doubts, site_acceleration
+from archfem.cases.result_text import (
+    STATED_DOUBTS,
+    UPPER_BOUNDS,
+    doubt_rating,
+    record_doubts,
+    site_acceleration,
+)
 from archfem.cases.run import DeadLoadResult, log_prefix
 from archfem.dynamics.analysis import Analysis
 from archfem.dynamics.history import (
@@ -149,6 +155,11 @@ def _state_doubts(doubts: Sequence[Doubt]) -> Findings:
     return {"doubts": float(len(doubts)), STATED_DOUBTS: write_doubts(doubts)}
 
 
+def _name_bounds(bounds: Sequence[str]) -> Findings:
+    """Return the finding that names those which are upper bounds, if there are any."""
+    return {UPPER_BOUNDS: ", ".join(bounds)} if bounds else {}
+
+
 def largest_values(run: History) -> dict[str, float]:
     """Return the largest values and displacements of `of_history`."""
     attributes = run.dataset.attrs
@@ -198,7 +209,7 @@ def evaluate_limit(case: Case) -> Findings:
 
     `least_push` is over both senses and the states of the fill. An infinite factor never makes a
     mechanism; NaN is that of a case which does not stand, or of one without a state without
-    dilatancy, which `factor_at_most` bounds.
+    dilatancy, which `factor_at_most` bounds. `upper_bounds` names findings not proved least.
     """
     with record_doubts(case.structure) as doubts:
         collapse = case.limit.solve(case.structure)
@@ -209,14 +220,17 @@ def evaluate_limit(case: Case) -> Findings:
         "hinges": len(collapse.hinges),
         "slides": len(collapse.sliding),
     }
-    if collapse.solutions is not None:
+    if collapse.outcome is Outcome.BRACKETED:
         findings["factor_at_most"] = float(collapse.upper)
+    searched = [bool(each.solutions and each.solutions.may_be_less) for each in senses]
+    bounds = ["factor"] * searched[0]
     if push := abs(collapse.push):
         factors = [x.factor if x.over_fill is None else x.range[0] for x in senses]
         least, site = push * float(np.min(factors)), site_acceleration(case)
         findings |= {"push": push * float(collapse.factor), "least_push": least}
         findings |= {"least_push_over_site": least / site} if site > 0.0 else {}
-    return findings | _state_doubts(doubts)
+        bounds += ["push"] * searched[0] + ["least_push", "least_push_over_site"] * any(searched)
+    return findings | _name_bounds(bounds) | _state_doubts(doubts)
 
 
 def evaluate_assessment(case: Case) -> Findings:
@@ -229,8 +243,10 @@ def evaluate_assessment(case: Case) -> Findings:
     with keep_warnings():  # which are those of the assessment
         doubts += [each for each in compare_crushing(case, found) if isinstance(each, Doubt)]
     doubts += [doubt for each in found for doubt in each.doubts]
-    least = min(float(each.alpha_0) for each in found)
-    return {"least_margin": find_margin(found), "alpha_0": least} | _state_doubts(doubts)
+    least = {"least_margin": find_margin(found), "alpha_0": min(float(x.alpha_0) for x in found)}
+    bounds = ["least_margin"] * any(check.bounded for each in found for check in each.checks)
+    bounds += ["alpha_0"] * any(each.linear.bounded for each in found)
+    return least | _name_bounds(bounds) | _state_doubts(doubts)
 
 
 def evaluate_rating(case: Case) -> Findings:

@@ -26,7 +26,7 @@ from archfem._display import PROGRESS_INTERVAL, write_progress_line
 from archfem._netcdf import read_dataset, write_dataset
 from archfem._validation import validate_arguments
 from archfem.cases.provenance import describe_version
-from archfem.cases.result_text import STATED_DOUBTS
+from archfem.cases.result_text import STATED_DOUBTS, UPPER_BOUNDS, mark_bound
 from archfem.errors import InvalidInput, StudyStopped, logger
 from archfem.studies.evaluators import Evaluator
 from archfem.studies.parameter_space import PAIR_KEY, Axis, StudyPoint
@@ -414,15 +414,15 @@ def _to_cell(value: Any) -> Any:
 def format_table(table: xr.Dataset, max_rows: int = 50) -> str:
     """Return the table of a study as text: keys, and the findings in which points differ."""
     frame = _flatten(table).drop(columns=["error", STATED_DOUBTS], errors="ignore")
-    differs = {name: frame[name].nunique(dropna=False) > 1 for name in frame}
-    names = [name for name in frame if name in table.coords]
-    names += [name for name in frame if differs[name] and name not in names]
+    points, shown = frame.to_dict("records"), frame.drop(columns=UPPER_BOUNDS, errors="ignore")
+    cells = {x: [mark_bound(each, x, _format_cell(each[x])) for each in points] for x in shown}
+    same = {x: each[0] for x, each in cells.items() if x not in table.coords and len({*each}) == 1}
+    names = sorted((x for x in cells if x not in same), key=lambda name: name not in table.coords)
     units = {name: table[name].attrs.get("units") if name in table else None for name in names}
     head = [f"{name} [{units[name]}]" if units[name] else str(name) for name in names]
-    shown = frame[names].head(max_rows).to_numpy(dtype=object)
-    text = [_files.align_columns(head, [[_format_cell(value) for value in row] for row in shown])]
+    rows = zip(*(cells[name][:max_rows] for name in names), strict=True)
+    text = [_files.align_columns(head, [*rows])]
     text += [f"… {len(frame) - max_rows} more points"] if len(frame) > max_rows else []
-    same = {name: _format_cell(frame[name].iloc[0]) for name in frame if name not in names}
     shared = "; ".join(f"{name} = {text}" for name, text in same.items() if text)
     return "\n".join([*text, *([f"the same at all points: {shared}"] if shared else [])])
 

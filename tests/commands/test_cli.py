@@ -371,7 +371,7 @@ def test_an_interrupted_search_without_dilatancy_keeps_or_says_its_bound(
         raise KeyboardInterrupt
 
     searched, out, sliding = [], tmp_path / "out", "contacts.'stone to stone'.friction=0.3"
-    monkeypatch.setattr("archfem.limit.nonassociated._follow_friction", stop)
+    monkeypatch.setattr("archfem.limit.nonassociated.find_solution", stop)
     changes = ["limit.horizontal=1", "limit.friction=nonassociated", sliding]
     changes += ["assessment.spectrum={ code = 'EC8', ag = 0.3, ground = 'B' }"]
     given = [part for change in changes for part in ("--set", change)]

@@ -189,6 +189,7 @@ def test_sliding_without_dilatancy_changes_nothing_where_nothing_slides():
     low, high = without.solutions.bracket
     words = f"proved: none is below {low:.4g}, nor above {high:.4g}; the least found is "
     assert str(without.solutions).endswith(f"{words}the factor of 'coulomb' too")
+    assert without.solutions.starts == (1, 1)  # a proven factor needs no others
 
 
 @pytest.mark.parametrize("number", [pytest.param(k, marks=pytest.mark.slow) for k in (1, 2, 3, 4)])
@@ -402,21 +403,22 @@ HALVES = [[0.5, 0.5], [1.0]]
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("structure", "drop"),
+    ("structure", "drop", "proven"),
     [
-        (wall(HALVES * 2, 0.5), 0.01),
-        (wall([[1.0, 0.5], [0.5, 1.0], [1.0, 0.5]], 0.7), 0.0),
-        (ring(voussoirs=7, thickness=0.8, contact=rough(0.35)), 0.0),
-        (ring(voussoirs=7, thickness=0.8, contact=rough(0.3, 1e3)), 0.0),
+        (wall(HALVES * 2, 0.5), 0.01, 0.0),
+        (wall([[1.0, 0.5], [0.5, 1.0], [1.0, 0.5]], 0.7), 0.0, 0.0),
+        (ring(voussoirs=7, thickness=0.8, contact=rough(0.35)), 0.0, 0.9999),
+        (ring(voussoirs=7, thickness=0.8, contact=rough(0.3, 1e3)), 0.0, 0.9999),
     ],
     ids=["pile", "corner", "ring", "glued ring"],
 )
-def test_a_mixed_integer_programme_finds_nothing_weaker(structure, drop, verified):
+def test_a_mixed_integer_programme_finds_nothing_weaker(structure, drop, proven, verified):
     """To a dozen joints it ends in seconds; at sixteen it proved nothing in a minute."""
     found = af.collapse_factor(structure, live=SIDEWAYS, friction="nonassociated")
     assert len(structure.joints) <= 12
     known = least_by_integers(structure, SIDEWAYS)
     assert found.factor == pytest.approx(known, rel=1e-5)
+    assert proven * known <= found.solutions.bracket[0] <= known * (1.0 + EXACT)
     what = f"{len(structure.joints)} joints, cohesion up to {glue(structure).max():g} N"
     case = f"sliding without dilatancy, {what}: factor"
     verified(case, known, "mixed-integer programme", found.factor)
@@ -629,7 +631,7 @@ def test_an_interrupted_search_leaves_the_least_factor_so_far(monkeypatch, caplo
     def stop(programme, forces):
         if programme.friction[0] == 0.5:  # none on the way to all of the friction
             made.append(forces)
-            if len(made) > (solved or 0):
+            if len(made) > (solved + 1 if solved else 0):  # the first is for the bound
                 raise KeyboardInterrupt
         return find(programme, forces)
 
@@ -775,6 +777,7 @@ def test_bounds_are_those_of_the_weakest_and_the_strongest_solution(monkeypatch)
         for value in (-0.4, -0.3, -0.5, -0.3001)
     ]
     monkeypatch.setattr(nonassociated, "_find_solutions", lambda *given: list(found))
+    monkeypatch.setattr(nonassociated, "find_solution", lambda *given: None)  # for the bound
     monkeypatch.setattr(nonassociated, "descend", lambda *given, **options: iter([]))
     state, bounds = nonassociated.search_nonassociated(programme, optimum, -1.0)
     assert state.value == -0.3

@@ -19,6 +19,7 @@ from study_tables import equal_tables
 
 import archfem as af
 from archfem.cases import provenance
+from archfem.cases.report.study_findings import collect_findings, tabulate_study
 from archfem.studies import parameter_axes, process_pool, result_store
 from archfem.studies.evaluators import Evaluator, evaluate_rating
 from archfem.studies.parameter_space import group_by_model
@@ -673,8 +674,8 @@ def test_a_state_that_was_not_found_is_no_number(ring_file, tmp_path, capsys, mo
         '[vary]\nlimit.friction = ["nonassociated", "coulomb"]\n'
     )
     assert af.commands.main(["study", str(path), "--out", str(folder), "--workers", "1"]) == 3
-    words = "limit.friction = nonassociated: no state without dilatancy was found; it is between"
-    assert f"in doubt: {words} 0.4432 and 0.6713 g" in capsys.readouterr().out
+    words = "limit.friction = nonassociated: no state without dilatancy was found; it is at most"
+    assert f"in doubt: {words} 0.6713 g" in capsys.readouterr().out
     table = af.studies.read_table(folder / "results.nc")
     assert all(table["doubts"] == 2)  # in either sense; with dilatancy a joint slides
     case = af.Case.read(ring_file, [push])
@@ -682,6 +683,36 @@ def test_a_state_that_was_not_found_is_no_number(ring_file, tmp_path, capsys, mo
     assert table["factor"].values == pytest.approx([np.nan, bound], nan_ok=True)
     assert table["push"].values == pytest.approx([np.nan, bound], nan_ok=True)
     assert table["factor_at_most"].values[0] == pytest.approx(bound)
+
+
+def test_what_is_not_proved_least_is_marked(tmp_path, capsys):
+    """As the command marks each case: a stack of stones is proved, a bond is not."""
+    limit = '[limit]\nhorizontal = 1.0\nfriction = "nonassociated"\ndemand = "1 g"\n'
+    shapes = {
+        "stack": 'shape = "column"\nbreadth = 1.0\nheights = [1.0, 1.0]\n',
+        "bond": 'shape = "wall"\nbreadth = 0.5\nheight = 0.6\nstone = 0.5\n'
+        "course = 0.3\nwidth = 1.0\n",
+    }
+    path, folder, cases = tmp_path / "study.toml", tmp_path / "out", ""
+    for name, keys in shapes.items():
+        (tmp_path / f"{name}.toml").write_text(f"[structure]\n{keys}{limit}")
+        cases += f'{name} = {{ case = "{name}.toml" }}\n'
+    path.write_text(f'compute = "limit"\n[cases]\n{cases}')
+    af.commands.main(["study", str(path), "--out", str(folder), "--workers", "1"])
+    text = capsys.readouterr().out
+    read = [af.Case.read(tmp_path / f"{name}.toml") for name in shapes]
+    said = [case.limit.solve(case.structure).sentence for case in read]
+    assert ["≤" in each for each in said] == [False, True]
+    table = af.studies.read_table(folder / "results.nc")
+    assert table["factor"].dtype.kind == "f"
+    stack, bond = (float(each) for each in table["push"])
+    rows = [re.split(r"\s{2,}", line) for line in text.splitlines()[2:5]]
+    shown = [dict(zip(rows[0], row, strict=True)) for row in rows[1:]]
+    for name in ("factor", "push [g]", "least_push [g]", "least_push_over_site"):
+        assert [row[name] for row in shown] == [f"{stack:.5g}", f"≤ {bond:.5g}"]
+    assert f"; 'bond', at ≤ {bond:.4g} of it" in text
+    found = collect_findings("", "", table)
+    assert [row[1] for row in tabulate_study(found).rows] == [f"{stack:.4g}", f"≤ {bond:.4g}"]
 
 
 def test_a_case_above_the_tables_is_that_of_those_that_name_none(tmp_path):

@@ -12,7 +12,7 @@ import xarray as xr
 
 from archfem._files import read_listed
 from archfem._netcdf import read_dataset
-from archfem.cases.result_text import STATED_DOUBTS
+from archfem.cases.result_text import STATED_DOUBTS, UPPER_BOUNDS, mark_bound
 from archfem.dynamics.collapse_state import COLLAPSE_STATES, FALLEN_STATES
 from archfem.errors import InvalidInput
 from archfem.masonry.structure import join_words, list_first
@@ -150,6 +150,9 @@ def collect_findings(title: str, text: str, table: xr.Dataset) -> StudyFindings:
     table = table.drop_dims("entry", errors="ignore")
     if "least_push_over_site" in table:
         table = table.rename(least_push_over_site=OVER_SITE)
+        if UPPER_BOUNDS in table:
+            renamed = table[UPPER_BOUNDS].str.replace("least_push_over_site", OVER_SITE)
+            table = table.assign({UPPER_BOUNDS: renamed})
     frame = table.to_dataframe().reset_index()
     differing = [str(name) for name in table.coords if frame[name].nunique() > 1]
     keys = [name for name in differing if name not in _NO_CASE] or differing
@@ -210,7 +213,7 @@ def _label_finding(table: xr.Dataset, name: str) -> str:
 def _format_finding(row: Any, name: str) -> str:
     """Return a finding of a row; a fall has no displacement but that to the ground."""
     if name not in _SIZES:
-        return _format(row[name])
+        return mark_bound(row, name, _format(row[name]))
     return "-" if row["fall"] in FALLEN_STATES else format_mm(row[name])
 
 
@@ -248,7 +251,7 @@ def say_what_changes(found: StudyFindings) -> Iterator[str]:
     # undefined without a demand
     below = [row for row in rows if row.get(OVER_SITE, np.nan) < 1.0]
     if below:
-        listed = [f"{found.label(row)}, at {row[OVER_SITE]:.3g} of it" for row in below]
+        listed = [f"{found.label(x)}, at {_format_finding(x, OVER_SITE)} of it" for x in below]
         count = f"{len(below)} of {len(rows)} cases begin{'s' * (len(below) == 1)} to move"
         yield f"{count} below the site's acceleration: {list_first(listed, MAX_NAMES, '; ')}"
 
@@ -259,16 +262,20 @@ def _compare_cases(found: StudyFindings, rows: list[Any], given: Any) -> str:
     least, words = name in _FACTORS, name.replace("_", " ")
     extreme = (min if least else max)(rows, key=lambda row: row[name])
     unit = found.table[name].attrs.get("units", "")
-    show = format_mm if unit == "m" else lambda value: f"{value:.3g} {unit}".strip()
+
+    def show(row: Any) -> str:
+        size = format_mm(row[name]) if unit == "m" else f"{row[name]:.3g} {unit}".strip()
+        return mark_bound(row, name, size)
+
     if found.keys != ("case",) or first is not given:  # none of them is the given one
         end = "least" if least else "largest"
-        return f"the {words} is {end}, {show(extreme[name])}, at {found.label(extreme)}"
+        return f"the {words} is {end}, {show(extreme)}, at {found.label(extreme)}"
     verb = "lowers" if least else "raises"
     if extreme is first:
-        return f"none {verb} the {words} of {found.label(first)}, {show(first[name])}"
+        return f"none {verb} the {words} of {found.label(first)}, {show(first)}"
     if abs(extreme[name] - first[name]) < MIN_CHANGE * abs(first[name]):
         return ""
-    change = f"from {show(first[name])} to {show(extreme[name])}"
+    change = f"from {show(first)} to {show(extreme)}"
     return f"{found.label(extreme)} {verb} the {words} most, {change}"
 
 
