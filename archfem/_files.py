@@ -23,7 +23,7 @@ from dataclasses import fields, is_dataclass
 from importlib import import_module
 from numbers import Real
 from pathlib import Path, PurePath
-from time import sleep
+from time import monotonic, sleep
 from typing import IO, Any, NamedTuple
 
 from archfem._validation import short_repr
@@ -38,6 +38,9 @@ LIST_FILE = "archfem.json"
 # Folders in a result folder: drafts of commands, and the draft whose files are being moved
 DRAFT_PREFIX = ".unfinished-"
 FINISHED_FOLDER = ".finished"
+
+# How long finished results wait for a command that writes to their folder, as several end at once
+WRITING_PATIENCE = 60.0  # s
 
 # Flags by which a system opens no link and waits for no pipe; where it has none, only the check of
 # `path_inside` remains
@@ -287,8 +290,9 @@ def _lock_byte(file: IO[bytes], wait: bool) -> None:
 
 
 @contextmanager
-def lock_folder(folder: Path) -> Iterator[None]:
-    """Refuse other commands that write to a folder while this one does."""
+def lock_folder(folder: Path, patience: float = 0.0) -> Iterator[None]:
+    """Refuse other commands that write to a folder while this one does; wait for them first [s]."""
+    refusal = monotonic() + patience
     path = create_result_folder(folder) / ".lock"
     while True:
         try:
@@ -300,8 +304,11 @@ def lock_folder(folder: Path) -> Iterator[None]:
         try:
             lock_file(lock, wait=False)
         except BlockingIOError as error:
-            lock.seek(0)
             with lock:
+                if monotonic() < refusal:
+                    sleep(0.1)
+                    continue
+                lock.seek(0)
                 raise InvalidInput(
                     f"another command runs in {folder} ({lock.read().decode()}): wait for it to "
                     "end, or name another folder"
@@ -480,7 +487,10 @@ def _find_digests(path: Path) -> Iterator[str]:
 @contextmanager
 def replace_results(folder: Path, command: str, inputs: str) -> Iterator[Path]:
     """Yield a draft folder whose files replace those of a command when the block ends."""
-    with lock_folder(folder), stage_results(folder, command, inputs) as draft:
+    with (
+        lock_folder(folder, WRITING_PATIENCE),
+        stage_results(folder, command, inputs) as draft,
+    ):
         yield draft
 
 

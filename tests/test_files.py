@@ -6,7 +6,8 @@ import os
 import subprocess
 import sys
 import traceback
-from contextlib import nullcontext
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack, nullcontext
 from pathlib import Path
 
 import pytest
@@ -297,6 +298,22 @@ def test_a_folder_has_one_writer(tmp_path):
         assert _files.is_locked(tmp_path)
     assert not _files.is_locked(tmp_path)
     assert not list(tmp_path.iterdir())
+
+
+def test_finished_results_wait_for_the_command_that_writes_to_their_folder(tmp_path, monkeypatch):
+    with ThreadPoolExecutor() as pool, ExitStack() as first:
+        first.enter_context(_files.lock_folder(tmp_path))
+        waiting = pool.submit(write, tmp_path, "scale --pair b", "x", b="2")
+        with pytest.raises(TimeoutError):
+            waiting.result(0.3)
+        first.close()
+        waiting.result(10.0)
+    assert (tmp_path / "b").read_text() == "2"
+    monkeypatch.setattr(_files, "WRITING_PATIENCE", 0.2)
+    refused = pytest.raises(af.InvalidInput, match="another command runs in")
+    with _files.lock_folder(tmp_path), refused:
+        write(tmp_path, "scale --pair b", "x", b="3")
+    assert (tmp_path / "b").read_text() == "2"
 
 
 def test_a_lock_whose_file_its_owner_deletes_is_taken_anew(tmp_path, monkeypatch):

@@ -134,8 +134,8 @@ def write_results(
     # a reader of the text, such as `head`, may leave before its end
     with _print_at_end(Path(out), name, text):
         folder = create_result_folder(out)
-        run = intact_file_list(folder).get("run")
         with replace_results(folder, name, inputs) as draft:
+            run = intact_file_list(folder).get("run")
             files: Files = {str(place / key): content for key, content in draw().items()}
             # a run has the case of the folder, in which [report] may have changed
             if run is None or run.inputs == inputs:
