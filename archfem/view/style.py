@@ -77,6 +77,10 @@ class Page(Figure):
         if not isinstance(self.get_layout_engine(), PlaceHolderLayoutEngine):
             letter_panels(self)
             disable_math(self)
+            # axes true to scale shrink within their place: the next layout has room for their texts
+            engine = self.get_layout_engine()
+            if engine is not None and any(axes.get_aspect() != "auto" for axes in self.axes):
+                engine.execute(self)
         super().draw(renderer)
 
 
@@ -208,7 +212,8 @@ def style_axes(axes: Axes, x: str = "", y: str = "", size: float = Size.LABEL) -
 def style_length_axes(axes: Axes) -> None:
     """Style axes that show lengths [m] true to scale."""
     style_axes(axes, "x [m]", "y [m]")
-    axes.set_aspect("equal")
+    # below the title, for which a layout leaves room at the top of the place of the axes
+    axes.set_aspect("equal", anchor="N")
 
 
 def new_axes(width: float, height: float, x: str = "", y: str = "") -> tuple[Figure, Axes]:

@@ -15,7 +15,14 @@ from pictures import history
 
 import archfem as af
 from archfem.view import save
-from archfem.view.style import Colour, Page, new_figure, set_title, structure_figure
+from archfem.view.style import (
+    Colour,
+    Page,
+    add_legend,
+    new_figure,
+    set_title,
+    structure_figure,
+)
 
 
 @pytest.mark.parametrize(("suffix", "start"), [(".png", b"\x89PNG"), (".pdf", b"%PDF")])
@@ -82,6 +89,22 @@ def test_titles_of_capitals_fit_the_figure():
     figure.draw_without_rendering()
     box = axes.title.get_window_extent()
     assert 0.0 <= box.x0 < box.x1 <= figure.bbox.x1
+
+
+@pytest.mark.parametrize("breadth", [5.0, 5.7, 6.4, 7.1, 8.2])  # of higher and of wider figures
+def test_a_title_of_two_lines_and_a_legend_fit_a_drawing_true_to_scale(breadth):
+    page = af.column(breadth=breadth, heights=[1.0] * 4).plot()
+    axes = page.axes[0]
+    axes.plot([], [], label="thrust line")
+    add_legend(axes)
+    set_title(
+        axes, "a drawing " + "of which the title takes two lines " * 2 + "since its words are many"
+    )
+    page.draw_without_rendering()
+    title, label = (text.get_window_extent() for text in (axes.title, axes.xaxis.label))
+    assert axes.get_title().count("\n") == 1
+    assert title.y1 <= page.bbox.y1
+    assert page.legends[0].get_window_extent().y1 <= label.y0
 
 
 def drawings(bridge, run, runs):
