@@ -140,6 +140,7 @@ def find_misplaced(
     found = _find_strays(blocks, pairs, normals, depths)
     found |= _find_voussoirs(blocks, owners, pairs, normals, depths)
     found |= _find_courses(blocks, pairs, normals, depths)
+    found |= _find_pier_tops(blocks, pairs, normals, depths)
     return {
         number: f"'{blocks[number].name}' at {say_place(as_point(blocks[number].centroid))} m is a "
         f"stone of '{blocks[number].part}', {why}: it may be one of {part}"
@@ -250,6 +251,23 @@ def _find_courses(
         for number, pier in piers.items()
         if blocks[number].part in projecting
     }
+
+
+def _find_pier_tops(
+    blocks: Sequence[Block], pairs: Numbers, normals: Array, depths: Array
+) -> dict[int, tuple[str, str]]:
+    """Find stones of rings that are broad on a level bed, and narrow towards the ring."""
+    found = {}
+    for pair, normal, depth in zip(pairs.tolist(), normals, depths, strict=True):
+        below, above = pair if normal[1] > 0.0 else pair[::-1]
+        low, high, least = blocks[below], blocks[above], depths[(pairs == above).any(axis=1)].min()
+        one_ring = low.part == high.part and high.role == "ring" and not low.fixed
+        if one_ring and abs(normal[1]) > 0.999 and depth > 1.3 * least:
+            why = (
+                f"{format_mm(depth)} broad on '{low.name}' and {format_mm(least)} at its other end"
+            )
+            found[above] = why, "a pier below the ring, which needs a part of its own"
+    return found
 
 
 def find_undivided(

@@ -164,8 +164,8 @@ def _scale_stone(
         raise InvalidInput(
             f"'{block.name}' has no four corners at its two joints: draw it from joint to joint"
         )
-    inner = _walk(len(points), first_in, last_in, {first_out, last_out})
-    outer = _walk(len(points), first_out, last_out, {first_in, last_in})
+    inner = _walk(block, first_in, last_in, {first_out, last_out})
+    outer = _walk(block, first_out, last_out, {first_in, last_in})
     new = points.copy()
     for here, there in ((inner, outer), (outer, inner)):
         opposite = np.column_stack(
@@ -176,22 +176,24 @@ def _scale_stone(
         )
         new[here] = points[here] + 0.5 * (1.0 - factor) * (opposite - points[here])
     for start, end in corners:
-        between = _walk(len(points), start, end, {*inner, *outer} - {start, end})[1:-1]
+        between = _walk(block, start, end, {*inner, *outer} - {start, end})[1:-1]
         middle = points[[start, end]].mean(axis=0)
         new[between] = middle + factor * (points[between] - middle)
     scaled = replace(block, outline=tuple(map(as_point, new)))
     return scaled, (new[corners[0]], new[corners[1]])
 
 
-def _walk(count: int, start: int, end: int, forbidden: set[int]) -> Numbers:
+def _walk(block: Block, start: int, end: int, forbidden: set[int]) -> Numbers:
     """Return the vertices of an outline from one to another that avoid forbidden ones."""
+    count = len(block.points)
     for step in (1, -1):
         length = (end - start) * step % count
         walk = (start + step * np.arange(length + 1)) % count
         if not forbidden & {*walk.tolist()}:
             return walk
     raise InvalidInput(
-        "the joints of a stone of the ring do not lie on two opposite sides: draw both across it"
+        f"the joints of '{block.name}' do not cross it from the intrados to the extrados: draw "
+        "both across it, or give stones of piers a part of their own, in a drawing by their layer"
     )
 
 

@@ -1,5 +1,7 @@
 """Drawn rings with another thickness: Milankovitch's semicircle, faces, and what is no ring."""
 
+import re
+
 import ezdxf
 import numpy as np
 import pytest
@@ -194,6 +196,29 @@ def test_a_missing_voussoir_is_named_as_a_cause(tmp_path):
     case = draw_portal(tmp_path, change=lambda stones: stones.pop("RING 6"))
     with pytest.raises(af.InvalidInput, match=r"'RING \d' has 1 joints .* of stones, none missing"):
         find_ring(af.Case.read(case).structure)
+
+
+@pytest.mark.parametrize("longer", [0.0, 2500.0])  # mm, of the lowest courses
+def test_piers_on_the_layer_of_the_ring_are_named(tmp_path, longer):
+    """In the part of the ring they would be thinned as it is."""
+
+    def lengthen(stones):
+        low = stones["SLAB 1"][:, 1].max() + 10.0
+        for outline in stones.values():
+            outline[outline[:, 1] < low, 1] -= longer
+
+    courses = [f"{side} {k}" for side in ("WEST", "EAST") for k in (1, 2, 3)]
+    case = draw_portal(tmp_path, dict.fromkeys(courses, "RING"), lengthen)
+    case.write_text(re.sub("(WEST|EAST) = .*\n", "", case.read_text()))
+    structure = af.Case.read(case).structure
+    west, east = structure.misplaced.values()  # stones from left to right, down the right pier
+    sizes = r"45\d mm broad on 'RING {}' and (299|30\d) mm at its other end: .* one of a pier"
+    assert re.match(rf"'RING 3' at .*, {sizes.format(2)}", west)
+    assert re.match(rf"'RING 15' at .*, {sizes.format(16)}", east)
+    if longer:  # beside such a pier the middle of the ring is on the other side
+        named = r"joints of 'RING 1' do not cross it .* give stones of piers a part of their own"
+        with pytest.raises(af.InvalidInput, match=named):
+            find_ring(structure).with_thickness(0.2)
 
 
 def ring_of_seven():
