@@ -10,7 +10,7 @@ tables are read once and compared, so that a file has every bit of it.
 import inspect
 import json
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from itertools import product
 from math import inf
@@ -22,7 +22,7 @@ import numpy as np
 from archfem._recent import RecentResults
 from archfem._validation import check_choice, declared_keys, given_fields
 from archfem.cases.provenance import hash_file, list_input_files
-from archfem.cases.toml_file import Table, check_table
+from archfem.cases.toml_file import Table, check_table, format_key
 from archfem.errors import ArchfemError, InvalidInput
 from archfem.joints.own_law import JointLaw, build_registered_law, registered_laws
 from archfem.masonry.assembly import assembled
@@ -39,7 +39,7 @@ from archfem.masonry.materials import CONTACT_PRESETS, MATERIAL_PRESETS, STONE, 
 from archfem.masonry.shapes import bridges, rings, walls
 from archfem.masonry.shapes.bridge_parts import Arch, Backfill, Paving, Pier, Sidewall
 from archfem.masonry.standing import StandingBody, carrying
-from archfem.masonry.structure import Joint, Structure, join_names
+from archfem.masonry.structure import Joint, Structure, join_names, suggest_name
 from archfem.masonry.survey.outlines import Layer, Survey, read_outlines, surveyed
 
 Described = TypeVar("Described")
@@ -64,6 +64,9 @@ PRESETS: Mapping[str, Mapping[str, Any]] = {
     "materials": MATERIAL_PRESETS,
     "contacts": CONTACT_PRESETS,
 }
+
+# What has a material or a contact
+_BEARERS = {"materials": "block", "contacts": "joint"}
 
 # Joint.contact and Block.material of most parts stand once, above the lists
 _SHARED = ("material", "contact")
@@ -112,6 +115,10 @@ def shape_keys(name: str) -> dict[str, Any]:
 
 def build_structure(settings: Table, folder: Path = Path()) -> Structure:
     """Build the structure of a case; joints by a finish follow from their stones."""
+    # every table is read: a misspelt name of a preset is an error then
+    for section in PRESETS:
+        for key in settings.get(section, {}):
+            _resolve_preset(settings, section, key)
     structure = _build_shape(settings, folder)
     if (standing := settings["structure"].get("standing")) is not None:
         bodies = _build_parts(StandingBody, standing, "structure.standing", settings)
@@ -120,7 +127,31 @@ def build_structure(settings: Table, folder: Path = Path()) -> Structure:
         if "finish" in table:
             contact = _resolve_preset(settings, "contacts", name)
             structure = with_finish(structure, table["finish"], contact)
+    for section, name, used in list_unused_tables(settings, structure):
+        if name not in PRESETS[section]:
+            word, path = section[:-1], f"{section}.{format_key(name)}"
+            raise InvalidInput(
+                f"[{path}] counts for nothing: no {_BEARERS[section]} has the {word} '{name}', and "
+                f"those of this structure are {used}: {suggest_name(name, used)} Rename the table, "
+                f'name it in [structure], as in {word} = "{name}", or leave it out '
+                f"(remove = ['{path}'] leaves out that of a base)"
+            )
     return structure
+
+
+def list_unused_tables(
+    settings: Table, structure: Structure
+) -> Iterator[tuple[str, str, list[str]]]:
+    """Yield section and name of tables that no block or joint has, and the names of those had."""
+    had: Mapping[str, set[str]] = {
+        "materials": {block.material.name for block in structure.blocks},
+        "contacts": {joint.contact.name for joint in structure.joints},
+    }
+    text = json.dumps(settings["structure"], default=repr)
+    for section, used in had.items():
+        for name, table in settings.get(section, {}).items():
+            if table.get("name", name) not in used and f": {json.dumps(name)}" not in text:
+                yield section, name, sorted(used)
 
 
 def _build_shape(settings: Table, folder: Path) -> Structure:
@@ -134,10 +165,6 @@ def _build_shape(settings: Table, folder: Path) -> Structure:
     for key in ("shape", "standing"):
         values.pop(key, None)
     values = _resolve_names(functions[name], values, settings)
-    # All tables are read, also unused ones: a misspelt name of a preset is an error then.
-    for section in PRESETS:
-        for key in settings.get(section, {}):
-            _resolve_preset(settings, section, key)
     values = _shape_parts(name, values, settings)
     if name == "outlines":
         values = _outline_arguments(values, settings, folder)
@@ -295,7 +322,7 @@ def _call(function: Callable[..., Described], section: str, **values: Any) -> De
     if missing := [key for key in required if key not in values]:
         known = sorted(PRESETS.get(section.partition(".")[0], ()))
         take = f", take them from preset = '{known[-1]}'" if known else ""
-        names = f"; tables of these names change what is there: {known}" if known else ""
+        names = f"; [structure] must name it, or it changes one of {known}" if known else ""
         stiff = " (rigid models take E and ν too, to find blocks that are softer than their joints)"
         raise InvalidInput(
             f"{section} lacks {', '.join(missing)}{stiff * ('poisson' in missing)}: give "

@@ -16,14 +16,14 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from archfem import _numba, _optional
-from archfem._display import write_progress_line
+from archfem._display import NOTE_MARK, write_progress_line
 from archfem._files import path_inside, read_listed
 from archfem.cases import result_text, structure_text
 from archfem.cases.case import Case, read_settings
 from archfem.cases.examples import copy_example, list_example_titles, read_example, write_new_case
 from archfem.cases.run import HISTORY_FILE, DeadLoadResult, dead_load_of_case
-from archfem.cases.structure_keys import find_drawing, read_survey
-from archfem.cases.toml_file import parse_tables
+from archfem.cases.structure_keys import find_drawing, list_unused_tables, read_survey
+from archfem.cases.toml_file import format_key, parse_tables
 from archfem.commands.cli import ExitCode
 from archfem.dynamics.history import History
 from archfem.errors import ArchfemError, InvalidInput, NotInstalled
@@ -67,6 +67,10 @@ def _check_case(options: argparse.Namespace) -> int:
         print(survey)
     print(structure_text.describe_supports(case.structure))
     print(structure_text.describe_depths(case.structure))
+    for section, name, used in list_unused_tables(case.settings, case.structure):
+        print(
+            f"{NOTE_MARK}[{section}.{format_key(name)}] counts for nothing: there are {used} alone"
+        )
     case.limit.check(case.structure)
     if case.pushover is not None:
         case.pushover.check(case.structure)

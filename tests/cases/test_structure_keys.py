@@ -12,6 +12,7 @@ from archfem.cases.defaults import list_defaults
 from archfem.cases.report.inputs import tabulate_inputs
 from archfem.cases.report.report_data import ReportData
 from archfem.cases.structure_keys import build_structure, write_structure
+from archfem.cases.toml_file import format_tables
 from archfem.masonry import with_finish
 
 RING = Path(__file__).parents[2] / "meshes" / "ring.toml"
@@ -41,6 +42,41 @@ EACH_FILL = ("prusias", "prusias_paving", "prusias_restored")
 def test_refusals_name_the_key_in_tables_of_a_bridge(change, says):
     with pytest.raises((af.InvalidInput, af.InvalidStructure), match=says):
         af.Case.read(RING.with_name("prusias.toml"), [change])
+
+
+WALL = {"shape": "wall", "breadth": 2.0, "height": 1.0, "width": 0.4, "course": 0.5}
+
+
+@pytest.mark.parametrize(
+    ("section", "name", "key", "values"),
+    [
+        ("contacts", "stone-to-stone", "contact", {"friction": 0.3}),
+        ("materials", "sandstone", "material", {"preset": "stone", "unit_weight": 22e3}),
+    ],
+)
+def test_a_table_that_no_stone_has_is_refused(section, name, key, values):
+    """Such as of a misspelt name: the preset would count in its place."""
+    if section == "contacts":
+        values |= {"normal_stiffness": 1.48e9, "shear_stiffness": 0.3e9}
+    tables = {section: {name: values}}
+    says = rf"\[{section}.{name}\] counts for nothing: .* has the {key} '{name}', .* did you mean"
+    with pytest.raises(af.InvalidInput, match=says):
+        af.Case.of({"structure": WALL, "model": {"fidelity": "rigid"}, **tables})
+    # named as the message says, and under another name than that of its table
+    for more in ({}, {"name": "of the signer"}):
+        named = {"structure": {**WALL, key: name}, section: {name: values | more}}
+        built = build_structure(named)
+        assert built.weight / 2.0 / 0.4 == pytest.approx(values.get("unit_weight", 20e3))
+        assert set(built.friction) == {values.get("friction", 0.6)}
+
+
+def test_a_table_of_a_preset_that_no_joint_has_is_noted_by_a_check(tmp_path, capsys):
+    """A base may have it for other shapes, and the ground below a wall is no soil by its name."""
+    path = tmp_path / "wall.toml"
+    tables = {"structure": WALL, "contacts": {"soil to stone": {"friction": 0.3}}}
+    path.write_text(format_tables({**tables, "model": {"fidelity": "rigid"}}), encoding="utf-8")
+    af.commands.main(["check", str(path)])
+    assert '[contacts."soil to stone"] counts for nothing: there' in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(
