@@ -68,7 +68,7 @@ class Ratios(NamedTuple):
     moved: float | None = None  # by displacements, of what passes at rest
     bodies: float | None = None  # with one weight a body, where it is less
     bounded: bool = False  # whether they are upper bounds, by which it fails and does not pass
-    floor: float | None = None  # of another mechanism that may move at the same push
+    floor: float | None = None  # with e* = 1, whatever moves at the same push
 
     @property
     def name(self) -> str:
@@ -78,8 +78,8 @@ class Ratios(NamedTuple):
 
     @property
     def decisive(self) -> float:
-        """The least ratio, by either split of weights [-]."""
-        return self.least if self.bodies is None else self.bodies
+        """The least ratio: with e* = 1, or by either split of weights [-]."""
+        return min(x for x in (self.least, self.bodies, self.floor) if x is not None)
 
     @property
     def ends(self) -> Ends:
@@ -93,14 +93,15 @@ class Ratios(NamedTuple):
 
     @property
     def beside(self) -> str:
-        """The other ratios, in brackets."""
+        """What the least ratio is of, and the other ratios, in brackets."""
         apart = None if self.bodies is None else self.least
-        texts = {"by displacements": self.moved, "with the weights apart": apart}
-        texts |= {"with e* = 1": self.floor}
+        found = None if self.floor is None else self.bodies or self.least
+        texts = {"by displacements": self.moved, "of the mechanism found": found}
+        texts |= {"with the weights apart": apart}
         each = "; ".join(
             f"{format_ratio(x)} {words}" for words, x in texts.items() if x is not None
         )
-        return f" ({each})" if each else ""
+        return " with e* = 1" * bool(found) + (f" ({each})" if each else "")
 
     def __str__(self) -> str:
         """Return all ratios in words."""

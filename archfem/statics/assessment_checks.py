@@ -30,6 +30,9 @@ from archfem.units import STANDARD_GRAVITY, format_ratio
 # Outcome of a check that passes with the weights of single blocks alone
 BY_SPLIT = "passes or fails by the split of weights"
 
+# Outcome of a check that passes with the e* of the mechanism found, and fails with e* = 1
+BY_MECHANISM = "passes or fails by which mechanism moves at this alpha_0"
+
 # Distance of an attached force, as at an anchor plate, from its block over the block's size [-]
 MAX_OFFSET = 0.1
 
@@ -138,17 +141,19 @@ class AssessmentCheck:
 
     @property
     def passes(self) -> bool:
-        """Whether the spectrum is withstood under every assumption on a fill, and by any split."""
+        """Whether it is withstood under every assumption on a fill, by any split, with e* = 1."""
         return self.outcome == "passes"
 
     @property
     def outcome(self) -> str:
-        """Whether it "passes" or "fails", or that assumptions on a fill or on weights decide."""
+        """Whether it "passes" or "fails", or that fill, split of weights or mechanism decide."""
         found = "passes" if self.ratio >= 1.0 else "fails"
         if self.over_fill is not None:
             found = self.over_fill.outcome
-        is_split = self.bodies is not None and self.bodies < 1.0
-        return BY_SPLIT if found == "passes" and is_split else found
+        for least, doubtful in ((self.bodies, BY_SPLIT), (self.floor, BY_MECHANISM)):
+            if found == "passes" and least is not None and least < 1.0:
+                return doubtful
+        return found
 
     @property
     def words(self) -> str:
@@ -166,9 +171,13 @@ class AssessmentCheck:
 
     @property
     def ratios(self) -> str:
-        """The ratio as text, or its range over all assumptions on a fill."""
-        over = self.over_fill
-        return format_ratio(self.ratio) if over is None else over.format_ends(digits=3)
+        """The ratio as text, or its range over all assumptions on a fill, or from e* = 1 on."""
+        if self.over_fill is not None:
+            return self.over_fill.format_ends(digits=3)
+        own = format_ratio(self.ratio)
+        if self.floor is None:
+            return own
+        return f"{format_ratio(self.floor)} (e* = 1, whatever moves at this alpha_0) to {own}"
 
     @property
     def least(self) -> float:

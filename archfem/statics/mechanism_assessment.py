@@ -163,7 +163,7 @@ class KinematicAssessment(ResultDisplay):
         """Whether the displacement check passes, or without it the linear one.
 
         It must pass under every assumption on a fill, `checks[-1].over_fill` having the range, and
-        with one weight for each body too.
+        with one weight for each body, and, where alpha_0 is searched, with e* = 1.
         """
         return self.checks[-1].passes
 
@@ -612,12 +612,7 @@ class _Oscillator:
         """Why a ratio may be too high: another code's spectrum, a fill left out, other joints."""
         found = self.given.rules.doubt(self.given.spectrum)
         if self.searched:
-            words = (
-                "pushed to the {}: whatever moves at this alpha_0, its linear ratio is {:.3g} at "
-                "least, that of e* = 1"
-            )
-            values = name_side(self.placed.direction), self.linear.floor, UPPER_BOUND
-            found += [self.searched, Doubt(words, values=values)]
+            found.append(self.searched)
         if self.fill and self.placed.fill is None and self.path is not None:
             words = "the fill counts as weight and mass on the stones, without its pressure on them"
             found.append(Doubt(words, "give fill for it"))

@@ -520,6 +520,13 @@ def test_a_matched_suite_is_the_test_of_an_upper_bound_on_its_spectrum(change, o
     (said,) = say_margin(data, assessment=state("assessment", ratios))
     assert f"an upper bound: {says}" in said
     assert says in dict(conclusion.list_facts(data))["verdict"]
+    # with e* = 1, less than 1 or not, it is the ratio in doubt
+    for floor in (1.2, 0.8):
+        stated = {"assessment": state("assessment", ratios._replace(floor=floor))}
+        said = f"margin is {floor:.3g} with e* = 1 (1.5 of the mechanism found), on the EC8"
+        assert said in say_margin(data, **stated)[0]
+        verdict = dict(conclusion.list_facts(data))["verdict"]
+        assert f"its ratio, {floor:.3g}, is an upper bound: {says}" in verdict
     vars(data)["runs"] = {}
     tests = "an upper bound: time histories with large displacements under motions of this spec"
     assert tests in say_margin(data, assessment=state("assessment", ratios))[0]

@@ -12,9 +12,14 @@ from bonded import bonded_wall
 from scipy.optimize import brentq
 
 import archfem as af
-from archfem.cases.answers import describe_margin, list_ratios
+from archfem.cases.answers import describe_margin, find_margin, list_ratios
 from archfem.statics import LIMIT_STATES, AssessmentCheck, LimitState, mechanism_assessment
-from archfem.statics.assessment_checks import BY_SPLIT, UPPER_BOUND, spectral_acceleration
+from archfem.statics.assessment_checks import (
+    BY_MECHANISM,
+    BY_SPLIT,
+    UPPER_BOUND,
+    spectral_acceleration,
+)
 
 G = 9.81
 SPECTRUM = af.motion.Ntc2018(ag=0.25, f0=2.4, tc_star=0.32, site="B")
@@ -519,14 +524,22 @@ def test_a_wedge_of_a_wall_in_bond_has_the_linear_check_alone(wedge, verified):
     assert found.checks == [found.linear]
     assert found.linear.ratio == pytest.approx(2.0 * acceleration / 1.35 / found.linear.demand)
     assert "there is no displacement check" in found.notes[0]
-    first, second = (doubt.cause for doubt in found.doubts)
-    assert first.startswith("alpha_0 is an upper bound, the least that a search")
+    (doubt,) = (doubt.cause for doubt in found.doubts)
+    assert doubt.startswith("alpha_0 is an upper bound, the least that a search")
     # of e* = 1, as a_0* = alpha_0 g / e*
     least = 2.0 * factor * G / 1.35 / found.linear.demand
-    assert second.startswith("pushed to the right: ")
-    assert f"whatever moves at this alpha_0, its linear ratio is {least:.3g} at least" in second
+    ends = f"{least:.3g} (e* = 1, whatever moves at this alpha_0) to {found.linear.ratio:.3g}"
+    assert f"the spectrum may be {ends} times as strong" in str(found)
     assert found.linear.floor == pytest.approx(least, rel=1e-6)
-    assert f"; {least:.3g} with e* = 1), by linear" in describe_margin([found])
+    assert find_margin([found]) == pytest.approx(least, rel=1e-6)
+    apart = found.linear.bodies and f"; {found.linear.ratio:.3g} with the weights apart"
+    own = f"{found.linear.bodies or found.linear.ratio:.3g} of the mechanism found{apart or ''}"
+    assert describe_margin([found]).startswith(f"least margin {least:.3g} with e* = 1 ({own}), by")
+    # between the ratio of e* = 1 and that of the mechanism another one decides
+    for scale, outcome in ((0.99, "passes"), (1.01, BY_MECHANISM)):
+        ratios = {k: getattr(found.linear, k) / (scale * least) for k in ("ratio", "floor")}
+        check = replace(found.linear, bodies=None, **ratios)
+        assert (check.outcome, check.passes) == (outcome, scale < 1.0)
     assert f"e* = {share:.3f} of the {weights[moves].sum() / 1e3:.4g} kN that move" in str(found)
     assert all(UPPER_BOUND in doubt.values for doubt in found.doubts)
     assert found.linear.bounded
