@@ -311,12 +311,11 @@ def describe_collapse(
     lines += [f"hinges, by the face in contact: {list_or_count(hinges)}"] if hinges else []
     lines += [f"sliding: {list_or_count(sliding)}"] if sliding else []
     lines += [str(collapse.solutions)] if collapse.solutions else []
-    over = collapse.describe_range()
-    if over:
-        least = "; all else is of the least" * (
-            collapse.factor == collapse.range[0] != collapse.range[1]
-        )
-        lines.append(f"over what is assumed of the fill: {over}{least}")
+    if collapse.over_fill:
+        low, high = collapse.range
+        unit, name = abs(collapse.push) or 1.0, " g" * bool(collapse.push)
+        over = collapse.over_fill.describe_states(unit, name=name)
+        lines.append(over + "; all else is of the least" * (collapse.factor == low != high))
     crushing = limit.describe_crushing(structure)
     lines += filter(None, [crushing, describe_fill(limit.fill, structure)])
     lines += note_lower_crowns(structure, limit.fill)

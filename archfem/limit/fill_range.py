@@ -25,6 +25,7 @@ WEAKER_FILLS: Mapping[str, Sequence[str]] = {
 }
 
 _NONE = "no backing"
+_FALLS = "; it does not stand"
 
 
 class FillAssumption(NamedTuple):
@@ -130,9 +131,30 @@ class FillRange:
             return f"{both}{name} whatever is assumed of the fill"
         texts = []
         for key in (choose(self.values, key=self.values.__getitem__) for choose in (min, max)):
-            falls = "" if self.values[key] else "; it does not stand"
+            falls = _FALLS * (self.values[key] == 0.0)
             texts.append(f"{self.values[key] * unit:.{digits}g}{name} ({key}{falls})")
         return " to ".join(texts)
+
+    def describe_states(self, unit: float = 1.0, digits: int = 4, name: str = "") -> str:
+        """Return both ends in each state of pressure and backing, the least first, as a line.
+
+        Args:
+            unit: unit by which the values are multiplied, such as a push in g.
+            digits: significant ones.
+            name: name of the unit, behind the values.
+        """
+        begin, states = "over what is assumed of the fill", dict[str, FillRange]()
+        for key, value in self.values.items():
+            state = str(key._replace(inertia=""))
+            own = states[state].values if state in states else {}
+            states[state] = FillRange({**own, key: value})
+        if len(states) == 1 or " to " not in self.format_ends(unit, digits):
+            return f"{begin}: {self.describe(unit, digits, name)}"
+        texts = [
+            f"{own.format_ends(unit, digits)}{name} ({state}{_FALLS * (own.ends[0] == 0.0)})"
+            for state, own in sorted(states.items(), key=lambda each: each[1].ends)
+        ]
+        return f"{begin}, each by the place of its inertia, feet or centroids: {'; '.join(texts)}"
 
     @property
     def outcome(self) -> str:

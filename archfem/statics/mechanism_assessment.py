@@ -234,8 +234,7 @@ class KinematicAssessment(ResultDisplay):
             lines += [self.path.end.sentence] if self.displacement else []
             lines += map(str, self.checks)
             if (over_fill := self.checks[-1].over_fill) is not None:
-                over = over_fill.describe(digits=3)
-                lines.append(f"over what is assumed of the fill: {over} times as strong")
+                lines.append(over_fill.describe_states(digits=3, name=" times the spectrum"))
                 own = (k for k, x in over_fill.values.items() if x == self.checks[-1].ratio)
                 lines += [f"all else is under one assumption: {key}" for key in [*own][:1]]
         lines += [f"{NOTE_MARK}{note}" for note in [*self.notes, *self._split_note]]

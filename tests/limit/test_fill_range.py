@@ -9,6 +9,7 @@ from backfilled import SOIL, rectangle
 
 import archfem as af
 from archfem.cases.analysis_keys import LimitAnalysis
+from archfem.cases.result_text import describe_collapse
 from archfem.limit import collapse
 from archfem.limit.fill_range import FillAssumption, FillRange, vary_fill
 
@@ -133,6 +134,11 @@ def test_a_stone_turns_into_a_fill_with_and_without_its_backing(verified):
     assert f"({FEET}, {THIRD}, the backing)" in str(found)
     settings = LimitAnalysis((af.BodyForce(1.0),), None, fill=fill)
     assert settings.solve_least(settings.solve(buried_stone())).factor == pytest.approx(least)
+    # a reader takes the state that is known, at the worse place of the inertia
+    line = describe_collapse(buried_stone(), found, settings).splitlines()[2]
+    for state in product((THIRD, NONE), ("the backing", "no backing")):
+        low, high = (expected[FillAssumption(place, *state)] for place in (CENTROIDS, FEET))
+        assert f" {low:.4g} to {high:.4g} g ({', '.join(state)})" in line
 
 
 @pytest.mark.slow
@@ -227,7 +233,9 @@ def test_outcomes_hold_over_the_range(values, words):
     low, high = min(values), max(values)
     assert found.ends == (low, high)
     assert found.format_ends(digits=2) == f"{low:.2g} to {high:.2g}"
-    assert FillRange(dict.fromkeys(found.values, 1.0)).describe().startswith("1 whatever is")
+    alike = FillRange(dict.fromkeys(found.values, 1.0))
+    assert alike.describe().startswith("1 whatever is")
+    assert alike.describe_states() == f"over what is assumed of the fill: {alike.describe()}"
     halved = FillRange({key: value / 2.0 for key, value in found.values.items()})
     assert FillRange.least_of([found, halved]) == halved
 
