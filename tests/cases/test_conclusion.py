@@ -13,7 +13,9 @@ from loose_blocks import BREADTH, HEIGHT, G, overturns, sine
 import archfem as af
 from archfem.cases import answers
 from archfem.cases.report import conclusion, demands, doubts, report_data, sections
+from archfem.cases.report.outcomes import sentence
 from archfem.cases.report.report_data import ReportData
+from archfem.cases.report.study_findings import collect_findings
 from archfem.cases.result_text import PushFactors, site_acceleration
 from archfem.cases.run import MOTION_VARIABLE
 from archfem.cases.toml_file import format_tables
@@ -718,6 +720,34 @@ def test_the_head_of_a_push_says_when_it_begins_to_move(case):
     )
     unchecked = "Across the plane of the drawing it was not checked."
     assert dict(conclusion.list_facts(data))["verdict"] == f"{begins} {unchecked}"
+
+
+@pytest.mark.parametrize(("least", "place"), [(0.6, ""), (0.4, "x = 2")])
+@pytest.mark.parametrize(
+    ("result", "finding", "words"),
+    [
+        ("limit", "least_push_over_site", "push is 0.4 times the site's acceleration"),
+        ("assessment", "least_margin", "margin is 0.4"),
+    ],
+)
+def test_a_study_that_finds_less_is_named_beside_the_result(
+    case, result, finding, words, least, place
+):
+    """The margin of a result is that of its case alone."""
+    push, check = (
+        PushFactors(0.5, 0.7, "the site's 0.2 g"),
+        answers.Ratios("SLV", ["right"], 0.5, 0.7),
+    )
+    stated = state(result, {"limit": push, "assessment": check}[result])
+    data = data_of(case)
+    vars(data)["case"] = af.Case.of({**case.settings, "assessment": SPECTRUM})
+    table = xr.Dataset({finding: ("x", [0.7, least, np.nan])}, {"x": [1.0, 2.0, 3.0]})
+    vars(data)["studies"] = [collect_findings("", "", table)]
+    margin = say_margin(data, **{result: stated})
+    (verdict,) = [text for name, text in conclusion.list_facts(data) if name == "verdict"]
+    lower = f"in the study the least {words}, at {place}"
+    assert [x for x in margin if "study" in x] == [lower] * bool(place)
+    assert (sentence(lower) in verdict) == ("study" in verdict) == bool(place)
 
 
 @pytest.mark.parametrize(

@@ -222,6 +222,43 @@ def test_of_factors_the_least_is_the_worst():
     assert text == "in the study the factor is least, 0.4, at friction = 0.4, width = 2"
 
 
+@pytest.mark.parametrize(
+    ("values", "said"),
+    [
+        ([0.6, 0.4, 0.5], "at x = 2"),
+        ([0.4, 0.6, 0.5], "at x = 1, where the sweep ends: less may lie beyond"),
+        ([0.6, 0.5, 0.4], "at x = 4, where the sweep ends: less may lie beyond"),
+    ],
+)
+def test_the_least_at_an_end_of_a_sweep_may_not_be_the_least(values, said):
+    swept = xr.Dataset({"factor": ("x", values)}, {"x": [1.0, 2.0, 4.0]})
+    found = study_findings.collect_findings("", "", swept)
+    assert [*study_findings.say_what_changes(found)] == [
+        f"in the study the factor is least, 0.4, {said}"
+    ]
+    # of two values each is an end, and samples have none
+    (text,) = study_findings.say_what_changes(
+        study_findings.collect_findings("", "", swept.isel(x=[0, 2]))
+    )
+    assert text.endswith(f"at x = {1 if values[0] < values[2] else 4}")
+    drawn = study_findings.collect_findings("", "", swept.swap_dims(x="sample"))
+    assert "beyond" not in next(study_findings.say_what_changes(drawn))
+    wide = swept.expand_dims(y=[1.0, 2.0, 3.0]) + xr.DataArray(
+        [0.0, -0.1, 0.0], {"y": [1, 2, 3]}, "y"
+    )
+    (text,) = study_findings.say_what_changes(study_findings.collect_findings("", "", wide))
+    assert ("where the sweep of x ends" in text) == ("ends" in said)
+
+
+def test_the_largest_displacement_at_an_end_of_a_sweep_may_not_be_the_largest():
+    swept = xr.Dataset(
+        {"largest_displacement": ("scale", [0.01, 0.02, 0.04], {"units": "m"})},
+        {"scale": [1.0, 1.5, 2.0]},
+    )
+    (text,) = study_findings.say_what_changes(study_findings.collect_findings("", "", swept))
+    assert text.endswith("at scale = 2, where the sweep ends: more may lie beyond")
+
+
 def test_words_and_states_of_the_users_own_function_are_no_findings():
     """It may give any names, and the command states findings of each study."""
     cases = {"case": [*"ab"]}

@@ -37,7 +37,7 @@ from archfem.cases.report.outcomes import (
 )
 from archfem.cases.report.report_data import SHOWN_RESULTS, ReportData
 from archfem.cases.report.scales import describe_scales, find_first_failures, say_fragile
-from archfem.cases.report.study_findings import say_what_changes
+from archfem.cases.report.study_findings import OVER_SITE, find_least, say_what_changes
 from archfem.cases.result_text import PushFactors, peak_of_spectrum, site_acceleration
 from archfem.cases.run import CASE_FILE
 from archfem.dynamics.collapse_state import (
@@ -130,6 +130,7 @@ def _say_plainly(data: ReportData, doubtful: Sequence[str]) -> Iterator[str]:
             for row in stated.rows[:1]:
                 times = f", at {row.factor} times {row.demand}"
                 yield f"{row.result}: {row.outcome}{times * (name != 'risk' and row.factor != '-')}"
+    yield from (words for least, words in _say_less(data) if least < 1.0 or not data.runs)
     if not data.across[0] and _build_transverse(data):
         push, demand = data.case.structure.transverse_push[0], find_largest_demand(data)
         falls = f", where it may overturn from {push:.3g} g on" * (push < demand)
@@ -155,6 +156,20 @@ def _say_pushes(data: ReportData, name: str, stated: Statement) -> Iterator[str]
             yield next(_describe_push(data, name, push))
         elif push.site and push.least < 1.0:
             yield f"pushed steadily it may begin to move at {push.least:.2g} times {push.site}"
+
+
+def _say_less(data: ReportData) -> Iterator[tuple[float, str]]:
+    """Yield the least margin and the least push of studies where they are below the result's."""
+    margins = [x.decisive for x in read_numbers(Ratios, data.statements.get("assessment"))]
+    pushes = [x.least for x in read_numbers(PushFactors, data.statements.get("limit")) if x.site]
+    site = "the least push is {:.3g} times the site's acceleration"
+    for name, words, own in (
+        ("least_margin", "the least margin is {:.3g}", margins),
+        (OVER_SITE, site, pushes),
+    ):
+        least, place, study = find_least(data.studies, name)
+        if least < 0.999 * min(own, default=-np.inf):
+            yield least, f"in {study} {words.format(least)}, at {place}"
 
 
 def _say_ratings(data: ReportData, stated: Statement) -> Iterator[str]:
@@ -425,6 +440,7 @@ def _describe_margin(data: ReportData) -> Iterator[str]:
     for name in (x for x in ("limit", "pushover") if x in data.statements):
         for push in read_numbers(PushFactors, data.statements[name]):
             yield from _describe_push(data, name, push) if push.site else ()
+    yield from (words for _, words in _say_less(data))
 
 
 def _say_across(data: ReportData) -> Iterator[tuple[float, str, str, str]]:

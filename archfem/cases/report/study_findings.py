@@ -256,6 +256,17 @@ def say_what_changes(found: StudyFindings) -> Iterator[str]:
         yield f"{count} below the site's acceleration: {list_first(listed, MAX_NAMES, '; ')}"
 
 
+def find_least(studies: Sequence[StudyFindings], name: str) -> tuple[float, str, str]:
+    """Return the least value of a finding in studies, infinite without one, its case and study."""
+    rows = [
+        (row[name], found.label(row), found.name)
+        for found in studies
+        if name in found.names
+        for row in found.worst.to_dict("records")
+    ]
+    return min((row for row in rows if row[0] == row[0]), default=(np.inf, "", ""))
+
+
 def _compare_cases(found: StudyFindings, rows: list[Any], given: Any) -> str:
     """Say which of some cases changes the finding that decides most; "" if none does by much."""
     name, first = found.decides, rows[0]
@@ -268,8 +279,19 @@ def _compare_cases(found: StudyFindings, rows: list[Any], given: Any) -> str:
         return mark_bound(row, name, size)
 
     if found.keys != ("case",) or first is not given:  # none of them is the given one
-        end = "least" if least else "largest"
-        return f"the {words} is {end}, {show(extreme)}, at {found.label(extreme)}"
+        end, beyond = ("least", "less") if least else ("largest", "more")
+        swept = {key: found.table[key].values for key in found.keys if key in found.table.dims}
+        ends = [
+            key
+            for key, values in swept.items()
+            if values.dtype.kind in "if"
+            and len(values) > 2
+            and extreme[key] in (min(values), max(values))
+        ]
+        of = f" of {join_words(ends)}" * (len(found.keys) > 1)
+        place = found.label(extreme)
+        place += f", where the sweep{of} ends: {beyond} may lie beyond" * bool(ends)
+        return f"the {words} is {end}, {show(extreme)}, at {place}"
     verb = "lowers" if least else "raises"
     if extreme is first:
         return f"none {verb} the {words} of {found.label(first)}, {show(first)}"
