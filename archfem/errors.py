@@ -32,7 +32,7 @@ def keep_warnings() -> Iterator[list[str]]:
             warnings.append(record.getMessage())
         return not is_warning
 
-    with filter_log(keep):
+    with filter_log(keep, first=True):
         yield warnings
 
 

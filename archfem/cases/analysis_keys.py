@@ -12,7 +12,7 @@ from archfem.cases.structure_keys import find_table
 from archfem.cases.toml_file import Table, check_table, read_object
 from archfem.errors import Interrupted, InvalidInput
 from archfem.joints.criteria import Criteria
-from archfem.limit.collapse import Collapse, collapse_factor, describe_crushing, solve_least
+from archfem.limit.collapse import Collapse, collapse_factor, describe_crushing
 from archfem.limit.fill_strength import Fill, PlasticFill
 from archfem.limit.rating import ASSUMED_STRENGTH, Rating, rate
 from archfem.limit.self_weight import check_options, self_weight_programme
@@ -125,16 +125,6 @@ class LimitAnalysis:
         except Interrupted as error:
             found: Collapse = error.last
             return found
-
-    def solve_least(self, found: Collapse) -> Collapse:
-        """Return a result, with its range, under the assumption on a fill with the least factor.
-
-        Args:
-            found: result under the assumption that is given; it is returned where it is the least,
-                or where nothing stands under the least.
-        """
-        fill = None if isinstance(self.fill, PlasticFill) else self.fill  # that has no range
-        return solve_least(found, self.friction, self.strength, fill)
 
     def describe_crushing(self, structure: Structure) -> str:
         """Describe at which strength joints crush; of point loads without any, by an assumed one.

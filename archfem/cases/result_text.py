@@ -320,6 +320,7 @@ def describe_collapse(
     lines += filter(None, [crushing, describe_fill(limit.fill, structure)])
     lines += note_lower_crowns(structure, limit.fill)
     lines += note_masses(structure, collapse.live, collapse.dead, parapets)
+    lines += [f"{NOTE_MARK}{note}" for note in collapse.notes]
     if structure.heads.any() and collapse.outcome is Outcome.COLLAPSES:
         lines.append(
             "blocks are rigid, and elastic joints may bear less: hold a motion a tenth below"

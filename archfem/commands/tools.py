@@ -188,11 +188,12 @@ def show_both_senses(
     try:
         if first.solutions and first.solutions.interrupted:
             raise KeyboardInterrupt
-        first = case.limit.solve_least(first)
+        first = first.least or first
         if other is not None:
             # a search in walls takes minutes in each sense
             write_progress_line("limit analysis", f"{first.sentence}; the other sense follows")
-            opposite = case.limit.solve_least(other.solve(case.structure))
+            opposite = other.solve(case.structure)
+            opposite = opposite.least or opposite
             left = ""
     finally:
         found, text = result_text.describe_limit(case, first, opposite)

@@ -12,6 +12,7 @@ how much of it remains depends on where the thrust of the state is.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -19,7 +20,7 @@ import xarray as xr
 from archfem._display import ExplainedWord, ResultDisplay
 from archfem._typing import Array, CrushingStrength
 from archfem._validation import validate_arguments
-from archfem.errors import Interrupted, InvalidInput, logger
+from archfem.errors import Interrupted, InvalidInput, keep_warnings, logger
 from archfem.joints.resultants import check_instant, joint_dataset
 from archfem.limit.backfill import BlocksWithFill, sum_body_forces
 from archfem.limit.collapse_warnings import (
@@ -105,6 +106,9 @@ class Collapse(ResultDisplay):
         upper: bound that no state of equilibrium exceeds: the factor itself, with a `PlasticFill`
             the bound from above. `factor` is the bound from below then, as `lower` is.
         over_fill: factors over all assumptions on a `Fill` that is pushed sideways; else None.
+        least: the result under the assumption with the least factor; None where it is this one, or
+            where nothing stands under the least.
+        notes: what is in doubt about this factor, and not about the least.
         strength: compressive strength at which joints crush [Pa]; infinite where they do not.
         live: the growing actions, or the settlement.
         dead: the actions beside self-weight that do not grow.
@@ -122,6 +126,8 @@ class Collapse(ResultDisplay):
     fill_motion: xr.Dataset | None = None
     upper: float = np.nan
     over_fill: FillRange | None = None
+    least: "Collapse | None" = None
+    notes: tuple[str, ...] = ()
     strength: float = np.inf
     live: tuple[Action | Settlement, ...] = ()
     dead: tuple[Action, ...] = ()
@@ -332,25 +338,30 @@ def collapse_factor(
     else:
         warn_lift(loads)
     stays = tuple(list_loads(dead)) if dead else ()
-    result = _solve_loads(structure, loads, stays, friction, strength, fill)
-    if isinstance(fill, Fill) and not np.isnan(result.factor):
-        result = replace(result, over_fill=_vary_assumptions(result, friction, strength, fill))
-    return result
+    given = structure, loads, stays, friction, strength
+    return _solve_range(given, fill) if isinstance(fill, Fill) else _solve_loads(*given, fill)
 
 
-def solve_least(
-    found: Collapse, friction: str | None, strength: float | None, fill: Fill | None
-) -> Collapse:
-    """Return a result, with its range, under the assumption on a fill with the least factor.
-
-    The result itself is returned where it is the least, or where nothing stands under the least.
-    """
-    structure, over = found.structure, found.over_fill
-    if structure is None or over is None or over.ends[0] in (0.0, found.factor):
-        return found
-    _, assumed = vary_fill(fill)[min(over.values, key=over.values.__getitem__)]
-    given = structure, found._loads, found.dead, friction, strength, assumed
-    return replace(_solve_loads(*given), over_fill=over)
+def _solve_range(given: tuple[Any, Any, Any, Any, Any], fill: Fill) -> Collapse:
+    """Return a result with its range over a fill; what it warns of is that of the least."""
+    said = list[str]()
+    try:
+        with keep_warnings() as said:
+            result = _solve_loads(*given, fill)
+        over = None if np.isnan(result.factor) else _vary_assumptions(result, *given[3:], fill)
+        result = replace(result, over_fill=over)
+        if over is None or over.ends[0] in (0.0, result.factor):
+            return result
+        _, assumed = vary_fill(fill)[min(over.values, key=over.values.__getitem__)]
+        of_given = said
+        with keep_warnings() as said:
+            least = replace(_solve_loads(*given, assumed), over_fill=over)
+        # what is in doubt at a larger factor alone
+        notes = tuple(x for x in of_given if x not in said)
+        return replace(result, notes=notes, least=replace(least, notes=notes))
+    finally:
+        for warning in said:
+            logger.warning("%s", warning)
 
 
 def _solve_loads(

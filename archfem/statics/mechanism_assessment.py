@@ -347,11 +347,12 @@ def kinematic_assessment(  # noqa: PLR0913  (the factors of the codes are argume
     )
     lever = fill.lever if isinstance(fill, Fill) else 0.0
     found = search.assess(lever, fill)
-    if fill is not None and found.path is not None:
-        filled = attach_fill(structure, fill)
+    found = add_fill_ranges(found, search.vary(lever, fill, found))
+    least = (found.least or found).path
+    if fill is not None and least is not None:
         push = [BodyForce(search.direction)]
-        filled.warn_of_lost_loads(push, (), found.path.mechanisms[0].factor)
-    return add_fill_ranges(found, search.vary(lever, fill, found))
+        attach_fill(structure, fill).warn_of_lost_loads(push, (), least.mechanisms[0].factor)
+    return found
 
 
 @dataclass(frozen=True, eq=False)

@@ -100,11 +100,33 @@ def test_a_stone_turns_into_a_fill_at_a_factor_by_each_assumption(verified):
     )
     # what is drawn is the lower end
     settings = LimitAnalysis((live,), None, fill=fill)
-    least = settings.solve_least(settings.solve(buried_stone()))
+    least = settings.solve(buried_stone()).least
     assert (least.factor, *least.range) == pytest.approx((low, low, high))
-    assert settings.solve_least(least) is least
+    assert least.least is None
     down = af.collapse_factor(buried_stone(), live=af.BodyForce(0.0, 1.0), fill=fill)
     assert down.over_fill is None
+
+
+@pytest.mark.parametrize(("angle", "doubtful"), [(35.0, False), (25.0, True)])
+def test_what_happens_at_the_upper_end_of_a_range_alone_is_a_note(angle, doubtful, caplog):
+    """Fill of 35° slides at tan φ = 0.7, between the ends, and one of 25° below both."""
+    fill, live = af.limit.Fill(friction_angle=angle), af.BodyForce(1.0)
+    factors = [x for x, _ in turning_factors(np.tan(np.radians(45.0 + angle / 2.0)) ** 2).values()]
+    slope = np.tan(np.radians(angle))
+    assert (min(factors) > slope) == doubtful
+    found = af.collapse_factor(buried_stone(), live=live, friction=None, fill=fill)
+    slides = "at a factor of {:.4g} the fill itself slides, at"
+    upper = slides.format(max(factors))
+    assert [note.startswith(upper) for note in found.notes] == [True]
+    assert f"\nnote: {upper}" in describe_collapse(buried_stone(), found, LimitAnalysis((), None))
+    assert found.least.notes == found.notes
+    checked = af.kinematic_assessment(buried_stone(), SITE, friction=None, fill=fill)
+    assert checked.alpha_0 == pytest.approx(max(factors))
+    assert (checked.least.alpha_0 > slope) == doubtful
+    # doubts are of the least factor, and of the least margin
+    least = [min(factors), checked.least.alpha_0] * doubtful
+    said = [record.getMessage() for record in caplog.records]
+    assert all(x.startswith(slides.format(y)) for x, y in zip(said, least, strict=True))
 
 
 def test_a_stone_turns_into_a_fill_with_and_without_its_backing(verified):
@@ -133,7 +155,7 @@ def test_a_stone_turns_into_a_fill_with_and_without_its_backing(verified):
     assert f"at {least:.4g} g ({CENTROIDS}, {NONE}, no backing) to" in str(found)
     assert f"({FEET}, {THIRD}, the backing)" in str(found)
     settings = LimitAnalysis((af.BodyForce(1.0),), None, fill=fill)
-    assert settings.solve_least(settings.solve(buried_stone())).factor == pytest.approx(least)
+    assert settings.solve(buried_stone()).least.factor == pytest.approx(least)
     # a reader takes the state that is known, at the worse place of the inertia
     line = describe_collapse(buried_stone(), found, settings).splitlines()[2]
     for state in product((THIRD, NONE), ("the backing", "no backing")):
