@@ -267,6 +267,13 @@ def find_least(studies: Sequence[StudyFindings], name: str) -> tuple[float, str,
     return min((row for row in rows if row[0] == row[0]), default=(np.inf, "", ""))
 
 
+def _find_reached_ends(found: StudyFindings, row: Any) -> list[str]:
+    """Return the keys swept over three numbers or more of which a case has the first or last."""
+    swept = {key: found.table[key].values for key in found.keys if key in found.table.dims}
+    numbers = {k: v for k, v in swept.items() if v.dtype.kind in "if" and len(v) > 2}
+    return [key for key, values in numbers.items() if row[key] in (min(values), max(values))]
+
+
 def _compare_cases(found: StudyFindings, rows: list[Any], given: Any) -> str:
     """Say which of some cases changes the finding that decides most; "" if none does by much."""
     name, first = found.decides, rows[0]
@@ -280,14 +287,7 @@ def _compare_cases(found: StudyFindings, rows: list[Any], given: Any) -> str:
 
     if found.keys != ("case",) or first is not given:  # none of them is the given one
         end, beyond = ("least", "less") if least else ("largest", "more")
-        swept = {key: found.table[key].values for key in found.keys if key in found.table.dims}
-        ends = [
-            key
-            for key, values in swept.items()
-            if values.dtype.kind in "if"
-            and len(values) > 2
-            and extreme[key] in (min(values), max(values))
-        ]
+        ends = _find_reached_ends(found, extreme)
         of = f" of {join_words(ends)}" * (len(found.keys) > 1)
         place = found.label(extreme)
         place += f", where the sweep{of} ends: {beyond} may lie beyond" * bool(ends)
