@@ -832,14 +832,20 @@ def test_a_result_without_a_time_history_has_a_report(
     monkeypatch.setattr(cut_road, "__defaults__", (8,))
     path, folder = tmp_path / "case.toml", tmp_path / "out"
     path.write_text(f'{BRIDGE}[rating]\nvehicle = "LM2"\nlive = 1.2\n', encoding="utf-8")
-    assert af.commands.main([command, str(path), "--out", str(folder), *given]) == 3
+    # joints slide under the vehicle, and at the favourable end of the range of the push alone
+    code, mark = (3, "in doubt") if command == "rate" else (0, "note")
+    assert af.commands.main([command, str(path), "--out", str(folder), *given]) == code
     said = capsys.readouterr().out
-    assert "\nin doubt: joints slide (arch, joint" in said
+    assert re.search(rf"\n{mark}: .*joints slide \(arch, joint", said)
     assert af.commands.main(["report", str(folder)]) == 0
     words = words_of(folder / "report.html")
     concluded = words.split("Inputs and assumptions")[1]  # between the contents and the heading
     assert found in concluded
-    assert re.search(r"In doubt, (rating|limit analysis): Joints slide \(arch, joint", concluded)
+    if command == "rate":
+        assert "In doubt, rating: Joints slide (arch, joint" in concluded
+    else:
+        assert "note: joints slide (arch, joint" in words
+        assert "oints slide" not in concluded
     assert ("Over the pressure of the fill, each at its worst place: " in concluded) == (
         command == "rate"
     )
