@@ -97,6 +97,17 @@ def test_each_rule_can_fail(changes, rule, state):
     assert states(data_of(**changes))[rule] == state
 
 
+@pytest.mark.parametrize(
+    ("share", "state"), [(1.0 - 1e-7, "met"), (0.9996, "met"), (0.999, "not met")]
+)
+def test_rules_are_judged_by_what_is_printed(share, state):
+    """Six decimals of a file end below 0.2 × 1.2 g: a ratio printed as 1 meets a rule of 1."""
+    peak = matched_motion(30.0).pga / 9.80665
+    checks = motion_rules.check_motions(data_of(factor=share * 0.24 / peak))
+    (found,) = (check for check in checks if "period zero" in check.rule)
+    assert (found.found, found.state) == ("1" if state == "met" else "0.999", state)
+
+
 def test_motions_without_a_target_are_compared_with_the_spectrum_of_the_assessment():
     """By the same ratios; without a spectrum the table says that there is none."""
     data = data_of(factor=0.5)

@@ -27,6 +27,9 @@ LONGEST_PERIOD = 4.0
 # Shortest stationary part of artificial motions, in both norms: from memory [s]
 MIN_PLATEAU = 10.0
 
+# Digits of what is found and printed, by which rules are judged
+DIGITS = 3
+
 
 class Check(NamedTuple):
     """One rule for the motions of a report."""
@@ -84,16 +87,22 @@ def _check_spectra(data: ReportData, rule: SelectionRule) -> Iterator[Check]:
         except InvalidInput as error:  # a spectrum that ends below the longest period
             yield Check(name, required, str(error), None)
         else:
-            met = bool(rule.lower <= design.min() and design.max() <= rule.upper)
+            least, most = _round(design.min()), _round(design.max())
+            met = rule.lower <= least and most <= rule.upper
             within = f"from {band[0]:.3g} to {band[1]:.3g} s"
-            yield Check(name, required, f"{design.min():.3g} to {design.max():.3g} {within}", met)
+            yield Check(name, required, f"{least:g} to {most:g} {within}", met)
         yield from _compare_beyond(motions, target, reduction, band[1])
     if rule.zero_period:
         mean = np.mean([motion.pga for motion in motions]) / STANDARD_GRAVITY
-        ratio = float(reduction * mean / target.horizontal(0.0))
+        ratio = _round(reduction * mean / target.horizontal(0.0))
         met = ratio >= rule.zero_period
         name = "mean PGA over the target at period zero"
-        yield Check(name, f"≥ {rule.zero_period:g}", f"{ratio:.3g}", met)
+        yield Check(name, f"≥ {rule.zero_period:g}", f"{ratio:g}", met)
+
+
+def _round(value: float) -> float:
+    """Return a number as it is printed."""
+    return float(f"{value:.{DIGITS}g}")
 
 
 def _compare_beyond(
@@ -130,8 +139,8 @@ def _check_plateaus(data: ReportData) -> Iterator[Check]:
     made = [each["synthetic"] for each in tables.values() if "synthetic" in each]
     if durations := [float(each.get("duration", usual)) for each in made]:
         share, least = PLATEAU[1] - PLATEAU[0], min(durations)
-        part = share * least
-        found = f"{part:.3g} s, {share:.0%} of {least:g} s"
+        part = _round(share * least)
+        found = f"{part:g} s, {share:.0%} of {least:g} s"
         name = "stationary part of artificial motions"
         yield Check(name, f"≥ {MIN_PLATEAU:g} s", found, part >= MIN_PLATEAU)
 
