@@ -6,11 +6,12 @@ from functools import partial
 
 import numpy as np
 
+from archfem.cases.answers import RESULTS, Row
 from archfem.cases.case import Case
 from archfem.cases.defaults import describe_margins_at_rest
 from archfem.errors import InvalidInput
 from archfem.limit.collapse import describe_crushing
-from archfem.limit.instability import explain_instability
+from archfem.limit.instability import explain_instability, geometric_factor
 from archfem.limit.thickness import minimum_thickness
 from archfem.masonry.ring_thickness import Ring
 from archfem.masonry.structure import Structure, describe_spans, join_names
@@ -84,23 +85,33 @@ def _describe_bearing(structure: Structure) -> str:
     return f"\nleast bearing of a lintel: {format_mm(bearing)}, of '{name}'{short}"
 
 
-def describe_thickness(case: Case, ring: Ring) -> tuple[str, float, list[str]]:
-    """Find a ring's least thickness: in words, as a factor of safety, and in lines."""
+def describe_thickness(case: Case, ring: Ring) -> tuple[list[Row], list[str]]:
+    """Find a ring's least thickness, and of more than a ring the least depth of all joints.
+
+    They are returned as rows, with factors of safety, and in lines.
+    """
     limit, build = case.limit, ring.with_thickness
     find = partial(minimum_thickness, build, strength=limit.strength, tolerance=1e-5)
     least = find(friction=limit.friction)
-    words, factor = f"{format_mm(least)} of {format_mm(ring.thickness)}", ring.thickness / least
+    words = f"{format_mm(least)} of {format_mm(ring.thickness)}, of the ring alone"
+    factor = ring.thickness / least
     lines = [
-        f"least thickness at rest: {words}, the mean depth of its joints as drawn, all stones "
-        "scaled alike about the middle line; the ring alone on fixed springings",
+        f"least thickness at rest: {words} on fixed springings, by the mean depth of its joints as "
+        "drawn, all stones scaled alike about the middle line",
         f"geometric factor of safety of the ring: {factor:.3g}; "
         f"{describe_crushing(limit.strength, case.structure)}",
     ]
+    rows = [Row(RESULTS["thickness"], "at rest", words, f"{factor:.4g}", {"most": factor})]
+    if len(ring.stones) < len(case.structure.free) and (whole := geometric_factor(case.structure)):
+        depth = f"{1.0 / whole:.3g} of what is built"
+        rows.append(
+            Row("least depth of all joints", "at rest", depth, f"{whole:.4g}", {"most": whole})
+        )
     if limit.friction is not None:
         with suppress(InvalidInput):  # without sliding it may stand at any thickness
             rough = find(friction=None)
             moving = explain_instability(build(0.99 * least)) or "joints crush"
             moving = moving.partition(": ")[0]
             lines.append(f"if thinner, {moving}; without sliding {format_mm(rough)} are enough")
-    whole = describe_margins_at_rest(case, case.structure)
-    return words, factor, [*lines, *(["the whole structure as drawn:", *whole] if whole else [])]
+    margins = describe_margins_at_rest(case, case.structure)
+    return rows, [*lines, *(["the whole structure as drawn:", *margins] if margins else [])]

@@ -221,11 +221,11 @@ def thickness(options: argparse.Namespace) -> int:
     case = Case.read(options.case, options.changes)
     ring = find_ring(case.structure, options.part)
     with result_text.record_doubts(case.structure) as doubts:
-        words, factor, lines = structure_text.describe_thickness(case, ring)
+        rows, lines = structure_text.describe_thickness(case, ring)
     text = "\n".join([*lines, *result_text.mark_remarks(doubts)])
     remarks: list[result_text.Remark] = [*doubts, *(x for x in lines if x.startswith(NOTE_MARK))]
-    given = words, remarks, "at rest", result_text.PushFactors(factor, factor)
-    stated = answers.state_outcome(RESULTS["thickness"], *given)
+    sentences = [f"{row.result}: {row.outcome}" for row in rows]
+    stated = answers.Statement(sentences, rows).with_remarks(remarks)
     files: Files = {"thickness.txt": text, **stated.as_file("thickness")}
     write_results("thickness", case, options.out, f"{case.title}\n{text}", lambda: files)
     return doubt_code(doubts)

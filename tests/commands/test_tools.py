@@ -1,5 +1,6 @@
 """Commands animate, doctor and examples."""
 
+import json
 import sys
 from importlib import metadata
 
@@ -189,6 +190,22 @@ def test_the_friction_from_which_it_stands_is_said(friction, least, tmp_path, ca
         *["Friction decides"][: friction is None],
     ):
         assert words in page
+
+
+@pytest.mark.slow
+def test_a_thickness_of_an_arch_on_piers_is_said_to_be_of_the_ring_alone(tmp_path):
+    """Beside it is the least depth of all joints, of which the factor is another one."""
+    shape = 'shape = "arch_on_piers"\nradius = 2.0\nthickness = 0.5\nvoussoirs = 9\n'
+    path = tmp_path / "arch.toml"
+    path.write_text(f"[structure]\n{shape}pier_breadth = 0.6\ncourses = [0.5]\n")
+    assert af.commands.main(["thickness", str(path), "--out", str(tmp_path)]) in (0, 3)
+    ring, every = json.loads((tmp_path / "thickness.json").read_text())["rows"]
+    assert ring[2].endswith("of 500 mm, of the ring alone")
+    assert every[0] == "least depth of all joints"
+    assert 1.0 / float(every[2].split()[0]) == pytest.approx(float(every[3]), rel=2e-3)
+    assert 1.0 < float(every[3]) < 0.8 * float(ring[3])
+    text = (tmp_path / "thickness.txt").read_text()
+    assert f"geometric factor of safety at rest: {float(every[3]):.3g}, as" in text
 
 
 @pytest.mark.parametrize(
