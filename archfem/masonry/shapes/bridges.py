@@ -190,7 +190,7 @@ def buttressed_arch(  # noqa: PLR0913  (all are lengths and properties of one st
         span: clear span between the springings [m].
         thickness: thickness of the ring [m].
         voussoirs: number of stones.
-        breadth: breadth of each buttress [m].
+        breadth: breadth of each buttress, outside the clear span: flush with the intrados [m].
         height: height of the buttresses, from foundation to y = 0, the springing level of the
             centre line [m].
         rise: clear rise of the intrados above its springings [m]; or
@@ -240,7 +240,7 @@ def arcade(  # noqa: PLR0913  (all are lengths and properties of one structure)
     Args:
         spans: clear spans of the arches between their springings [m].
         heights: heights of the piers, one more than arches, as for `buttressed_arch` [m].
-        breadths: breadths of the piers [m].
+        breadths: breadths of the piers, between the clear spans: flush with the intrados [m].
         thicknesses: thicknesses of the rings [m].
         voussoirs: numbers of stones.
         rises: clear rises of the intrados above their springings [m]; or

@@ -313,7 +313,8 @@ def arch_on_piers(  # noqa: PLR0913  (all are lengths and properties of one stru
         radius: radius of the ring's centre line, which is centred on the origin [m].
         thickness: thickness of the ring [m].
         voussoirs: number of stones in the ring.
-        pier_breadth: breadth of both piers, at least the thickness of the ring [m].
+        pier_breadth: breadth of both piers, centred under the feet of the ring, at least its
+            thickness [m].
         courses: heights of the courses of each pier, from below [m].
         width: out of plane [m].
         material: material of all blocks.
