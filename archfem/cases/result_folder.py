@@ -215,7 +215,7 @@ def pushover_files(case: Case, push: Pushover, notes: Sequence[str]) -> Files:
     site = compare_push(case, peak, peak) if peak else None
     stated = state_outcome("pushover", push.sentence, notes, "-", site)
     return {
-        "pushover.txt": describe_pushover(push, notes),
+        "pushover.txt": describe_pushover(case.structure, push, notes),
         "pushover.csv": curve,
         "pushover.png": push.plot(),
         **stated.as_file("pushover"),

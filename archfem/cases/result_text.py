@@ -304,8 +304,9 @@ def describe_collapse(
     structure: Structure, collapse: Collapse, limit: LimitAnalysis, parapets: float = 0.0
 ) -> str:
     """Describe the result of limit analysis: load, hinges, sliding, crushing, and the fill."""
-    faces = structure.face_names
-    hinges = list(dict.fromkeys(f"{faces[k]} at the {side}" for k, side in collapse.hinges))
+    faces, joints = structure.face_names, structure.joints
+    sides = (f"{faces[k]} at the {joints[k].name_face(side)}" for k, side in collapse.hinges)
+    hinges = list(dict.fromkeys(sides))
     sliding = list(dict.fromkeys(faces[k] for k in collapse.sliding))
     lines = [f"limit analysis: {collapse.sentence}"]
     lines += [f"hinges, by the face in contact: {list_or_count(hinges)}"] if hinges else []
@@ -529,10 +530,10 @@ def compare_push(case: Case, low: float, high: float, unit: float = 1.0) -> Push
     return PushFactors(low * unit / ground, high * unit / ground, size)
 
 
-def describe_pushover(push: Pushover, notes: Sequence[str]) -> str:
+def describe_pushover(structure: Structure, push: Pushover, notes: Sequence[str]) -> str:
     """Describe a pushover: factor, end, the joints in the order in which they hinge, notes."""
-    names = push.joints["name"].values
-    hinges = [f"{names[joint]} at the {side}" for joint, side in push.hinges]
+    turning = [(structure.joints[number], side) for number, side in push.hinges]
+    hinges = [f"{joint.name} at the {joint.name_face(side)}" for joint, side in turning]
     turns = [f"hinges in turn: {join_names(hinges, '; ')}"] if hinges else []
     return "\n".join([f"pushover: {push.sentence}", *turns, *notes])
 

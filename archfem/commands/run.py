@@ -468,7 +468,7 @@ def print_results(case: Case, found: Iterable[Result], folder: Path) -> tuple[st
                 given = case.pushover
                 loads = (given.live, given.dead) if given else ((), ())
                 notes = result_text.note_masses(case.structure, *loads, case.parapets)
-                print(result_text.describe_pushover(result, notes))
+                print(result_text.describe_pushover(case.structure, result, notes))
                 write(results.pushover_files(case, result, notes), folder)
             elif isinstance(result, Suite):
                 suite = result

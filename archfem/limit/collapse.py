@@ -234,8 +234,12 @@ class Collapse(ResultDisplay):
 
     def __str__(self) -> str:
         """Describe outcome, factor and failing joints in one line."""
-        turning = zip(self.hinges, self.hinge_names, strict=True)
-        sides = [f"{name} at the {side}" for (_, side), name in turning]
+        faces = [
+            side if self.structure is None else self.structure.joints[number].name_face(side)
+            for number, side in self.hinges
+        ]
+        turning = zip(self.hinge_names, faces, strict=True)
+        sides = [f"{name} at the {face}" for name, face in turning]
         hinges = list_or_count(sides) or "none"
         sliding = list_or_count(self.sliding_names) or "none"
         bound = "" if self.upper == self.lower or np.isnan(self.lower) else f" to {self.upper:.4g}"

@@ -225,6 +225,13 @@ class Joint:
         """Unit vector from intrados to extrados (2,)."""
         return (self.ends[1] - self.ends[0]) / self.depth
 
+    def name_face(self, side: str) -> str:
+        """Return "intrados" or "extrados", or which face that is of a bed in a pier."""
+        across, up = self.tangent
+        if self.role != "pier" or abs(up) > abs(across):
+            return side
+        return ("left" if (across > 0.0) == (side == "intrados") else "right") + " face"
+
 
 @dataclass(frozen=True, repr=False)
 class Structure(ResultDisplay):

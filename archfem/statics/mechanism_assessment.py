@@ -210,9 +210,10 @@ class KinematicAssessment(ResultDisplay):
         if self.path is None:
             lines.append("no horizontal force makes it a mechanism")
         else:
-            names = [joint.name for joint in self.structure.joints]
-            hinges = list_or_count([f"{names[k]} at the {end}" for k, end in self.hinges])
-            sliding = list_or_count([names[k] for k in self.sliding])
+            joints = self.structure.joints
+            sides = [(joints[k], side) for k, side in self.hinges]
+            hinges = list_or_count([f"{x.name} at the {x.name_face(side)}" for x, side in sides])
+            sliding = list_or_count([joints[k].name for k in self.sliding])
             many = not hinges and sliding and slides_anywhere(self.structure, self.alpha_0)
             vanishes = f", d_0* = {self.d_0_star:.4g} m, T_s = {self.T_s:.3f} s"
             weight = self.M_star * self.structure.gravity / self.e_star / kN

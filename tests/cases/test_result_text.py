@@ -16,6 +16,7 @@ from archfem.cases.result_text import (
     _mechanism_cell,
     describe_collapse,
     describe_limit,
+    describe_pushover,
     describe_run,
     describe_run_quality,
     describe_verdicts,
@@ -111,6 +112,33 @@ DEFAULTS = (
     "fill, by default: law pressure, cohesion 0 kPa, active 1, dispersal boussinesq, spread 30 "
 )
 DEFAULTS += "degree, lever 0"
+
+
+@pytest.mark.parametrize("foot", ["buttressed", "on piers"])
+def test_a_hinge_of_a_pier_is_named_by_its_left_or_right_face(foot):
+    """Pushed to the right, a pier turns about its right face, whichever side is its intrados."""
+    if foot == "on piers":
+        sizes = {"radius": 1.7, "thickness": 0.4, "voussoirs": 9, "pier_breadth": 0.9}
+        built, base = af.arch_on_piers(**sizes, courses=[0.8] * 3), "joint 15"
+    else:
+        sizes = {"span": 3.0, "thickness": 0.4, "voussoirs": 9, "breadth": 0.9, "height": 2.4}
+        built, base = af.shapes.buttressed_arch(**sizes, embrace=180), "pier 2, base"
+    for joint in built.joints:
+        inner, outer = joint.ends[:, 0]
+        faces = ["left face", "right face"][:: 1 if inner < outer else -1]
+        expected = faces if joint.role == "pier" else ["intrados", "extrados"]
+        assert [*map(joint.name_face, ("intrados", "extrados"))] == expected
+    pushed = af.collapse_factor(built, live=af.BodyForce(1.0))
+    turned = SimpleNamespace(hinges=pushed.hinges, sentence="")
+    spectrum = af.motion.Eurocode8(0.2, "B")
+    for words in (
+        describe_collapse(built, pushed, parse_limit({})),
+        str(pushed),
+        str(af.kinematic_assessment(built, spectrum)),
+        describe_pushover(built, turned, []),
+    ):
+        assert f"{base} at the right face" in words
+        assert re.search(r"joint \d+ at the extrados", words)  # of the ring
 
 
 def test_limit_analysis_in_words(ring):

@@ -132,6 +132,8 @@ def build_input_section(data: ReportData) -> Section:
         moved = f"none: equilibrium as built{follows}"
     elif data.statements.keys() & {*STATIC_RESULTS}:
         moved += f"; in limit analysis none: equilibrium as built{follows}"
+    joints = [joint for joint in data.case.structure.joints if joint.role == "pier"]
+    piers = dict.fromkeys(f"{joint.name_face('extrados')} of {joint.part}" for joint in joints)
     assumptions = [
         ("structure", "plane; forces are those of the whole width"),
         ("blocks", "rigid" if data.is_static else blocks.get(fidelity, f"by part: {fidelity}")),
@@ -140,6 +142,7 @@ def build_input_section(data: ReportData) -> Section:
         ("ground", f"rigid, moves as one; fixed to it: {join_names([*fixed])}"),
         ("units", "SI: m, kg, s, N, Pa, where no other unit stands beside a number"),
         ("signs", SIGN_CONVENTION),
+        *[("extrados", f"outer face of a ring; {join_names([*piers])}")] * bool(piers),
         ("e", "eccentricity M / (N h), h the depth of the joint: ±0.5 at its edges"),
         ("V / N", "mobilised friction |V| / N: at its limit μ, with c A / N added, it slides"),
     ]
