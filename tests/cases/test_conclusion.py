@@ -389,7 +389,11 @@ def test_the_answer_has_displacements_the_first_fall_and_the_checks(case):
     over = "1.30 to 1.51 × over motions and time steps"
     assert pieces[0].text == f"It first falls at 1.30 × 'a', 0.26 to 0.282 g ({over})."
     texts = [getattr(piece, "text", "") for piece in pieces]
-    assert "In doubt, kinematic assessment: The curve is an upper bound." in texts
+    # the head lists what stands as in doubt below, and no more
+    assert "Note, kinematic assessment: The curve is an upper bound." in texts
+    assert [x for x in texts if x.startswith("In doubt, ")] == [
+        x for x in texts if "steps find" in x
+    ]
     assert (
         "In doubt, scale of the motion: Under 'a' and 'b': its time steps find the first fall at "
         "1.3 to 1.51 ×. Under 'a' and 'b': none falls as rigid."
@@ -436,6 +440,19 @@ def test_the_answer_has_displacements_the_first_fall_and_the_checks(case):
         "the least margin is 1.04 (0.842 by displacements; 1.1 with the weights apart), on" in said
     )
     assert "by damage, right, an upper bound: the runs do not decide, for 3 at least are" in said
+
+
+def test_an_upper_bound_is_no_doubt_about_a_study_whose_cases_all_fail_by_it(case):
+    bound, other = Doubt(f"the curve is {UPPER_BOUND}"), Doubt("no step converges")
+    for margins, doubt, listed in (
+        ([0.76, 0.72], bound, []),
+        ([0.76, 1.02], bound, ["study"]),
+        ([0.76, 0.72], other, ["study"]),
+        ([], bound, ["study"]),
+    ):
+        data = data_of(case)
+        vars(data)["studies"] = [SimpleNamespace(worst={"least_margin": margins}, doubts=[doubt])]
+        assert doubts.list_decisive_doubts(data, [(doubts.STUDIES, doubt)]) == listed
 
 
 @pytest.mark.parametrize(("share", "decided"), [(0.04, True), (0.06, False)])

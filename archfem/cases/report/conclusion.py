@@ -316,7 +316,9 @@ def build_conclusion(data: ReportData) -> Section:
         shown = [sentence(str(replace(x, remedy=""))) for x in ordered[:MAX_DOUBTS]]
         if more := len(doubts[result]) - len(shown):
             shown.append(f"{more} more: see section '{SECTIONS[result]}'.")
-        blocks.append(TextBlock(f"In doubt, {result}: {' '.join(shown)}", "doubt"))
+        # what cannot change the answer is none of the doubts of the head
+        lead, manner = ("In doubt", "doubt") if result in decisive else ("Note", "missing")
+        blocks.append(TextBlock(f"{lead}, {result}: {' '.join(shown)}", manner))
     for result, notes in list_notes(data).items():
         blocks.append(TextBlock(f"Note, {result}: {' '.join(map(sentence, notes))}", "missing"))
     if rows:

@@ -1,6 +1,6 @@
 """Doubts and notes of the results in a report, and what was not varied."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -95,16 +95,19 @@ def list_checks(data: ReportData) -> list[Ratios]:
     return [check for check in checks if not check.linear] or checks
 
 
-def list_decisive_doubts(data: ReportData, doubts: Iterable[tuple[str, Doubt]]) -> list[str]:
+def list_decisive_doubts(data: ReportData, doubts: Sequence[tuple[str, Doubt]]) -> list[str]:
     """List the results whose doubts may change the answer.
 
-    A bound from above can not change checks that fail by it.
+    A bound from above can not change checks that fail by it, nor a study whose cases all do.
     """
-    checks, own = list_checks(data), RESULTS["assessment"]
-    failed = bool(checks) and all(check.most < 1.0 for check in checks)
-    bounds = [doubt for _, doubt in doubts if failed and UPPER_BOUND in doubt.values]
-    listed = (result for result, doubt in doubts if result != own or doubt not in bounds)
-    return list(dict.fromkeys(listed))
+    checks, studies = list_checks(data), [each.worst for each in data.studies if each.doubts]
+    margins = [worst.get("least_margin", [1.0]) for worst in studies]
+    failed = {
+        RESULTS["assessment"]: bool(checks) and all(check.most < 1.0 for check in checks),
+        STUDIES: all(len(each) and max(each) < 1.0 for each in margins),
+    }
+    bounded = {each for each in doubts if failed.get(each[0]) and UPPER_BOUND in str(each[1])}
+    return list(dict.fromkeys(each[0] for each in doubts if each not in bounded))
 
 
 def object_to_motions(data: ReportData) -> str:
