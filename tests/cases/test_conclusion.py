@@ -442,6 +442,17 @@ def test_the_answer_has_displacements_the_first_fall_and_the_checks(case):
     assert "by damage, right, an upper bound: the runs do not decide, for 3 at least are" in said
 
 
+@pytest.mark.parametrize(("second", "varied"), [("2.5 ms", True), ("5 ms", False)])
+def test_a_search_of_scales_by_several_time_steps_has_varied_the_step(case, second, varied):
+    data = data_of(case, a=verdict_of())
+    assert "time step" in doubts.list_unvaried(data)
+    vars(data)["files"] = {"scale.csv": None}
+    table = f"step,scale,properties,the structure\n5 ms,1,as given,stands\n{second},1.2,,stands\n"
+    object.__setattr__(data, "read_text", {"scale.csv": table}.get)
+    assert ("time step" not in doubts.list_unvaried(data)) is varied
+    assert "fidelity" in doubts.list_unvaried(data)
+
+
 def test_an_upper_bound_is_no_doubt_about_a_study_whose_cases_all_fail_by_it(case):
     bound, other = Doubt(f"the curve is {UPPER_BOUND}"), Doubt("no step converges")
     for margins, doubt, listed in (

@@ -227,7 +227,10 @@ def list_unvaried(data: ReportData) -> list[str]:
     single += [] if {"scale", "risk"} & data.statements.keys() else ["size of the motions"]
     predicted = all("predicted_error" in run.dataset.attrs for run in data.runs.values())
     if not predicted and "accuracy.txt" not in data.files:
-        single += ["fidelity"] if "dt" in list_varied(data) else ["time step", "fidelity"]
+        searches = [data.read_text(x) or "" for x in data.list_parts("scale.csv").values()]
+        steps = {run.partition(",")[0] for x in searches for run in x.splitlines()[1:]}
+        stepped = "dt" in list_varied(data) or len(steps) > 1
+        single += ["fidelity"] if stepped else ["time step", "fidelity"]
     return [each for each in single if each not in studied]
 
 
