@@ -1,11 +1,13 @@
 """Studies in reports: a row for each case, those that fall first, and what changes the answer."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 import xarray as xr
 
 import archfem as af
-from archfem.cases.report import study_findings
+from archfem.cases.report import sections, study_findings
 from archfem.studies.evaluators import evaluate_limit
 from archfem.view import draw_findings
 
@@ -84,11 +86,31 @@ def test_a_case_that_falls_is_a_hatched_bar_and_the_lines_differ():
     assert sorted(legend) == ["case 0, the first", "falls"]
 
 
-def test_cases_with_doubts_stand_before_others():
-    found = study(cases=3)
-    found.worst["doubts"] = [0.0, 0.0, 1.0]
+def test_of_many_cases_those_with_doubts_stand_before_others():
+    found = study(cases=30)
+    found.worst["doubts"] = [*[0.0] * 29, 1.0]
     rows = study_findings.tabulate_study(found).rows
-    assert [row[0] for row in rows] == ["case 2", "case 0", "case 1"]
+    assert [row[0] for row in rows[:3]] == ["case 29", "case 0", "case 1"]
+
+
+def test_two_studies_of_the_same_cases_have_one_order():
+    """Whichever of them fall or have doubts, as the tables of a report stand beside one another."""
+    plain, other = study(cases=3), study(cases=3, falls=[2])
+    other.worst["doubts"] = [0.0, 1.0, 0.0]
+    for each in plain, other:
+        names = [row[0] for row in study_findings.tabulate_study(each).rows]
+        assert names == ["case 0", "case 1", "case 2"]
+
+
+@pytest.mark.parametrize(("key", "own"), [("structure.thickness", True), ("model.dt", False)])
+def test_a_study_of_lengths_says_that_the_limit_of_dislocation_is_that_of_the_case(ring, key, own):
+    """A tenth of the joints' depth, of which the line in the picture is the one of the case."""
+    found = study(cases=3, varied=key)
+    data = SimpleNamespace(case=SimpleNamespace(structure=ring))
+    _, figure = sections._build_study(data, found)
+    limit = f"{100.0 * np.median(ring.depths):.3g} mm"
+    assert f"dotted the limit of dislocation of the case, {limit}" in figure.caption
+    assert ("; cases of other lengths have others" in figure.caption) is own
 
 
 @pytest.mark.parametrize(

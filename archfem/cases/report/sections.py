@@ -26,7 +26,7 @@ from archfem.cases.report.response import (
     build_ground_section,
     build_run_sections,
 )
-from archfem.cases.report.study_findings import StudyFindings, tabulate_study
+from archfem.cases.report.study_findings import StudyFindings, list_studied, tabulate_study
 from archfem.cases.run import DRAWING_FILE
 from archfem.dynamics.collapse_state import DISLOCATION, FALLEN_STATES, shallowest_part
 from archfem.dynamics.history import SIGN_CONVENTION
@@ -416,6 +416,7 @@ def _build_study(data: ReportData, found: StudyFindings) -> list[Any]:
     with suppress(InvalidInput), limit_width(MAX_WIDTH):  # no number differs
         figure = draw_findings(found.numbers, max_panels=4, limits={key: 1e3 * limit})
         dotted = f", dotted the limit of dislocation of the case, {format_mm(limit)}"
+        dotted += "; cases of other lengths have others" * ("lengths" in list_studied(found))
         caption += f"; all points{dotted * (key in found.numbers)}"
         blocks.append(FigureBlock.of(figure, sentence(caption)))
     doubts = (f"{DOUBT_MARK}{replace(doubt, remedy='')}" for doubt in found.doubts)

@@ -181,9 +181,14 @@ def _find_worst(frame: Any, keys: list[str], names: list[str]) -> Any:
 
 
 def tabulate_study(found: StudyFindings) -> Grid:
-    """Tabulate the worst point of each case: those that fall first, then those with doubts."""
-    ranks = ["rank", *(["doubts"] if "doubts" in found.worst else [])]
-    order = found.worst.sort_values(ranks, ascending=[True, False][: len(ranks)], kind="stable")
+    """Tabulate the worst point of each case in the order of the study.
+
+    Of many cases those that fall come first, then those with doubts.
+    """
+    order = found.worst
+    if len(order) > MAX_CASES:
+        ranks = ["rank", *(["doubts"] if "doubts" in order else [])]
+        order = order.sort_values(ranks, ascending=[True, False][: len(ranks)], kind="stable")
     pair = next((name for name in _MOTIONS if name in order), "")
     several = pair not in ("", *found.keys) and order["runs"].max() > 1
     state = "fall" in order and any(order["fall"])
