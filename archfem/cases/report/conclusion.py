@@ -113,8 +113,10 @@ def _say_plainly(data: ReportData, doubtful: Sequence[str]) -> Iterator[str]:
     failed = [check for check in checks if check.least < 1.0]
     found = dict.fromkeys(_judge_check(data, check)[0] for check in failed or checks)
     assessed = [f"by the kinematic assessment {words}" for words in found]
+    unchecked, overturns = _say_unchecked(data)
     if data.runs:
-        yield from _say_survival(data, doubtful, assessed if failed else [])
+        failing = [*assessed * bool(failed), *unchecked * overturns]
+        yield from _say_survival(data, doubtful, failing)
         yield from _say_first_failures(data)
         yield from say_fragile(data)
         studied = [next(say_what_changes(each), "") for each in data.studies]
@@ -131,10 +133,16 @@ def _say_plainly(data: ReportData, doubtful: Sequence[str]) -> Iterator[str]:
                 times = f", at {row.factor} times {row.demand}"
                 yield f"{row.result}: {row.outcome}{times * (name != 'risk' and row.factor != '-')}"
     yield from (words for least, words in _say_less(data) if least < 1.0 or not data.runs)
-    if not data.across[0] and _build_transverse(data):
-        push, demand = data.case.structure.transverse_push[0], find_largest_demand(data)
-        falls = f", where it may overturn from {push:.3g} g on" * (push < demand)
-        yield f"across the plane of the drawing it was not checked{falls}"
+    yield from [] if data.runs and overturns else unchecked
+
+
+def _say_unchecked(data: ReportData) -> tuple[list[str], bool]:
+    """Say that nothing was checked across the plane, and whether the demand may overturn it."""
+    if data.across[0] or not _build_transverse(data):
+        return [], False
+    push, demand = data.case.structure.transverse_push[0], find_largest_demand(data)
+    falls = f", where it may overturn from {push:.3g} g on" * (push < demand)
+    return [f"across the plane of the drawing it was not checked{falls}"], push < demand
 
 
 def _say_first_failures(data: ReportData) -> Iterator[str]:
@@ -201,22 +209,23 @@ def _say_survival(
 ) -> Iterator[str]:
     """Yield whether it survives the motions, and how often with other properties.
 
-    Too few motions decide none, nor do runs without joints; failing assessments stand beside.
+    Too few motions decide none, nor do runs without joints. What fails otherwise comes before a
+    survival, and behind a fall.
     """
     verdicts, (_, answer) = [run.verdict for run in data.runs.values()], find_worst(data)
     in_doubt = " (in doubt, as below)" * (HISTORIES in doubtful)
     survives, reason = answer.startswith("survives"), _say_why_undecided(data)
-    answer = f"it {answer}{in_doubt}"
+    answer = f"{'under its motions ' * bool(survives and failed)}it {answer}{in_doubt}"
     if survives and reason:
         answer = f"not decided{in_doubt}, as {reason}"
-    answer = f", {'but' if survives and not reason else 'and'} ".join([answer, *failed])
+    yield from failed if survives else ()
     sizes = [x.displacement for x in verdicts if x.outcome in COLLAPSE_STATES[:2]]
     known = bool(sizes) and np.isfinite(sizes).all()
     moved = f", and moves by {Ends.of(sizes):mm}" if known else ""
     beside = any(scale <= 1.0 for scale, *_ in _say_across(data))
     lead = f"in its plane{in_doubt} it" if beside else f"{answer}: it"
     yield f"{lead} {'; it '.join(describe_outcomes(data))}{moved}"
-    yield from failed if beside else ()
+    yield from () if survives else failed
     ranges = sorted(data.verdict_ranges, key=lambda x: (x.falls.sum(), x.dislocated.sum()))
     for found in ranges[-1:]:
         motion = found.dataset.attrs.get("motion")
