@@ -253,18 +253,21 @@ def state_assessments(
     found: Mapping[str, KinematicAssessment], remarks: Sequence[Remark]
 ) -> Statement:
     """State each check of an assessment with the directions in which it holds; the last decides."""
-    checks: dict[tuple[str, str], tuple[AssessmentCheck, Ratios, list[str]]] = {}
+    checks: dict[tuple[str, str], tuple[AssessmentCheck, AssessmentCheck, Ratios, list[str]]] = {}
     for direction, result in found.items():
-        for check, ratios in list_ratios(result):
-            same = checks.setdefault((str(check), str(ratios)), (check, ratios, []))
-            same[2].append(direction)
+        for number, (check, ratios) in enumerate(list_ratios(result)):
+            # its values are those of the ratio that decides
+            split = result.of_bodies if ratios.bodies is not None else None
+            shown = check if split is None else split.checks[number]
+            same = checks.setdefault((str(check), str(ratios)), (check, shown, ratios, []))
+            same[3].append(direction)
     last = [str(result.checks[-1]) for result in found.values()]
     rows, sentences = [], []
-    for (text, _), (check, ratios, directions) in checks.items():
+    for (text, _), (check, shown, ratios, directions) in checks.items():
         ways, outcome = " and ".join(directions), check.words
         if check.passes and check.at_rest:
             outcome += ", for the mechanism does not begin to move"
-        demand, capacity = (f"{x:.4g} {check.unit}" for x in (check.demand, check.capacity))
+        demand, capacity = (f"{x:.4g} {check.unit}" for x in (shown.demand, shown.capacity))
         name, numbers = f"assessment: {check.name}, {ways}", ratios._replace(directions=directions)
         rows.append(Row(name, demand, f"{capacity}, {outcome}", str(ratios), numbers._asdict()))
         sentences += [f"kinematic assessment, {ways}: {text}"] if text in last else []

@@ -25,7 +25,7 @@ from archfem.limit.vehicles import MovingLoad
 from archfem.masonry.loads import PointLoad
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import Structure, rigid_motion_matrix
-from archfem.statics.assessment_checks import BY_SPLIT, UPPER_BOUND, AssessmentCheck
+from archfem.statics.assessment_checks import UPPER_BOUND, AssessmentCheck
 from archfem.statics.mechanism_assessment import KinematicAssessment
 from archfem.view.joint_marks import Marker, outline_moving_blocks, scale_motion
 from archfem.view.positions import FallingBlocks
@@ -419,10 +419,11 @@ def _draw_capacity_curve(axes: Axes, found: KinematicAssessment) -> None:
 def _title_check(check: AssessmentCheck) -> str:
     """Return outcome and ratio of a check in a few words; assumptions on a fill are in the text."""
     some = check.over_fill is not None and check.over_fill.needed
-    if check.outcome == BY_SPLIT:
-        return f"{check.name}: {check.outcome}, ratio {check.bodies:.3g} to {check.ratios}"
     outcome = "passes with some assumptions" if some else check.words
-    return f"{check.name}: {outcome}, ratio {check.ratios}"
+    whole = ""
+    if check.bodies is not None and check.bodies < 0.999 * check.least:
+        whole = f"{check.bodies:.3g} with one weight a body, as drawn "
+    return f"{check.name}: {outcome}, {whole}ratio {check.ratios}"
 
 
 def draw_capacity(

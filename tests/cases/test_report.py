@@ -125,6 +125,8 @@ CHECKS = [
 def state_each(hazard):
     """Statements by command and file, of results that were made up."""
     assessed = SimpleNamespace(checks=CHECKS, direction=1.0, notes=("faces slide flat",))
+    whole = replace(CHECKS[1], capacity=0.1008, demand=0.224, ratio=0.45, bodies=None)
+    assessed.of_bodies = SimpleNamespace(checks=[CHECKS[0], whole])
     assessed.doubts = (Doubt("it is {}", "compare it with a run", (UPPER_BOUND,)),)
     place = "passes without all, with 2 axles at -0.1, 1.1 m"
     found = SimpleNamespace(hazard=hazard, doubts=(), sentence="falls at 0.002 a year")
@@ -186,7 +188,8 @@ def test_demand_and_capacity_stand_beside_their_doubts(kept, undrawn):
             )
             for name, demand, capacity, factor in (
                 ("linear, q = 2, FC = 1.35", "2.844 m/s²", "8.212 m/s², passes", "2.89"),
-                ("a code", "0.22 m", "0.11 m, fails", "0.45 (0.5 with the weights apart)"),
+                # of the factor that decides
+                ("a code", "0.224 m", "0.1008 m, fails", "0.45 (0.5 with the weights apart)"),
             )
         ),
         (

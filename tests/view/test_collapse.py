@@ -155,6 +155,10 @@ def test_an_assessment_shows_moved_blocks_curve_and_demand(coarse_ring):
     title = right.get_title().replace("\n", " ")
     assert title.endswith(f"ratio {rest:.2f}, at which it begins to move")
     figure.draw_without_rendering()
+    # the curve is that of blocks, and a ratio with one weight a body decides
+    less = replace(found, displacement=replace(check, bodies=0.5 * rest))
+    title = draw_kinematic_assessment(less).axes[1].get_title().replace("\n", " ")
+    assert f", {0.5 * rest:.3g} with one weight a body, as drawn ratio {rest:.2f}, at" in title
     # what is an upper bound is dotted
     bounded = replace(found, curve=found.curve.assign_attrs(holds=3))
     drawn = lines_of(draw_kinematic_assessment(bounded).axes[1])
