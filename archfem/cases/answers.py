@@ -116,7 +116,7 @@ class Scales(NamedTuple):
     held: float  # largest below any at which it does not stand; 0 for none
     states: Mapping[str, float]  # smallest that was run at which it is in a state
     unfinished: bool  # whether Ctrl-C has ended the search
-    all_steps: float | None = None  # at which it falls by all time steps
+    all_steps: float | None = None  # largest first fall by a time step
     as_one: float | None = None  # at which a stack falls as one rigid body
     moves_in_all: bool = False  # whether it moves as a mechanism at all that were run
     again: Sequence[float] = ()  # beyond a fall, at which it stands
@@ -189,7 +189,7 @@ def state_scale(
     scales = Scales(motion.name, pga, held, found.states, found.interrupted)
     if isinstance(found, CollapseScale):
         files["scale.csv"] = ResultTable(*found.rows()).csv
-        ends = found.upper, found.as_one.scale if found.as_one else np.inf
+        ends = found.first_falls[1], found.as_one.scale if found.as_one else np.inf
         reached = [scale if scale < np.inf else None for scale in ends]
         scales = scales._replace(all_steps=reached[0], as_one=reached[1], again=found.above)
         scales = scales._replace(moves_in_all=found.moves_in_all)

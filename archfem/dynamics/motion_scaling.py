@@ -135,16 +135,16 @@ class CollapseScale:
     """Scales of a motion between which a structure falls, searched with several time steps.
 
     A structure has fallen once its `CollapseState` is "partly fallen" or "fallen". A run that is
-    broken off counts neither as a fall nor as standing, and no bracket rests on it. Only falls
-    count of a step whose search was interrupted, unless no step has a finished search. The response
-    need not be monotonic: it may survive a motion stronger than one that brought it down, and fall
-    at a scale between two at which it stood.
+    broken off counts neither as a fall nor as standing, and no bracket rests on it. Only falls and
+    dislocations count of `longer` steps, and of a step whose search was interrupted, unless no step
+    has a finished search. The response need not be monotonic: it may survive a motion stronger than
+    one that brought it down, and fall at a scale between two at which it stood.
 
     Attributes:
         searches: runs made, by time step [s].
         pga: peak of the motion [m/s²].
         of_model: doubts that concern every run, whatever its scale.
-        longer: runs made before, with steps too long for sliding; no bound rests on them.
+        longer: runs made before, with steps too long for sliding; none of them counts as standing.
         as_one: first fall of a stack as one rigid body; None of other structures.
     """
 
@@ -157,15 +157,15 @@ class CollapseScale:
     @property
     def sentence(self) -> str:
         """Scales around the fall, and the least at which it is dislocated, in words."""
-        least, met = self._least_fall, "falls at no scale that was tried"
+        (least, last), met = self.first_falls, "falls at no scale that was tried"
         if least < inf:
             met = f"falls at {say_scale(least, self.pga)}"
         elif unanswered := [run.scale for run in self._runs if run.fall is None]:
             none = f"{len(unanswered)} have none, the first at {min(unanswered):#.3g} ×"
             met = f"falls in no run that has an answer ({none})"
-        if least < self.upper:
-            at = f"first falls at {self.upper:#.3g} ×" if self.upper < inf else "falls at no scale"
-            met = f"{met}, {'the other' if len(self.searches) == 2 else 'the last'} time step {at}"
+        if least < last:
+            at = f"first falls at {last:#.3g} ×" if last < inf else "falls at no scale"
+            met = f"{met}, {'the other' if len(self._every) == 2 else 'the last'} time step {at}"
         if self.above:
             met = f"{met}, and {say_again(self.above)}"
         if self.dislocated < inf:
@@ -188,9 +188,10 @@ class CollapseScale:
     @property
     def mechanism(self) -> str:
         """Joints by which it falls at the smallest such scale, in words; "" if unknown."""
-        falls = (run.fall for run in self._runs if run.scale == self._least_fall)
+        least, _ = self.first_falls
+        falls = (run.fall for run in self._runs if run.scale == least)
         by = next((fall.mechanism for fall in falls if fall and fall.mechanism), "")
-        return f"at {self._least_fall:#.3g} × it falls {by}" if by else ""
+        return f"at {least:#.3g} × it falls {by}" if by else ""
 
     def _say_tested(self) -> str:
         """Return in words how closely scales were run up to `lower`; "" where none stands."""
@@ -215,14 +216,15 @@ class CollapseScale:
     def doubts(self) -> tuple[Doubt, ...]:
         """Reasons why the scales may be wrong."""
         doubts = [*self.of_model]
-        finished = {dt: each for dt, each in self._every.items() if not each.interrupted}
-        if len(finished) > 1 and _disagreeing(finished):
-            low, *_, high = sorted(x[COLLAPSE_DEFINITION].upper for x in finished.values())
+        low, high = self.first_falls
+        if len(self._finished) > 1 and _disagreeing(self._finished):
             words, ends = "its time steps find the first fall at {:#.3g} × the motion", (low, high)
             if high == inf:
                 words, ends = "a time step finds a fall at {:#.3g} ×, and another none", (low, low)
             doubts.append(Doubt(words, "", (ends,)))
-        searches = {f"by {1e3 * dt:g} ms": search for dt, search in self.searches.items()}
+        longer = {dt: x for dt, x in self.longer.items() if x[COLLAPSE_DEFINITION].upper == low}
+        every = {**longer, **self.searches}
+        searches = {f"by {1e3 * dt:g} ms": search for dt, search in every.items()}
         of_runs = doubt_searches(searches, COLLAPSE_DEFINITION)
         doubts += [x for x in of_runs if replace(x, place="") not in self.of_model]
         falls = [(run.scale, run.doubts) for run in self._runs if run.fails(COLLAPSE_DEFINITION)]
@@ -250,28 +252,41 @@ class CollapseScale:
         return self.searches[dt][COLLAPSE_DEFINITION]
 
     @property
+    def _finished(self) -> dict[float, MechanismScales]:
+        """Finished searches, those with longer steps first; all if none is."""
+        finished = {dt: each for dt, each in self._every.items() if not each.interrupted}
+        return finished or self.searches
+
+    @property
     def _decisive(self) -> dict[float, MechanismScales]:
-        """Finished searches, those with longer steps if there are no others; all if none is."""
-        made = (self.searches, self.longer)
-        finished = ({dt: x for dt, x in each.items() if not x.interrupted} for each in made)
-        return next(filter(None, finished), self.searches)
+        """Finished searches, those with longer steps only if there are no others."""
+        return {dt: x for dt, x in self._finished.items() if dt in self.searches} or self._finished
 
     @property
     def _runs(self) -> list[ScaledRun]:
-        """Runs of these, and of interrupted searches with shorter steps, whose falls count."""
-        made = {**self._decisive, **self.searches}
-        return [run for search in made.values() for run in search.runs]
+        """Runs of these, and of interrupted searches; of longer steps falls and dislocations."""
+        made, longer = {**self._decisive, **self.searches}, self.longer.values()
+        moved = (
+            run for each in longer for run in each.runs if run.fall and run.fall.kind != "stands"
+        )
+        return [*(run for search in made.values() for run in search.runs), *moved]
 
     @property
-    def _least_fall(self) -> float:
-        """Smallest scale at which it fell with any step [-]; infinite for none."""
-        return min((run.scale for run in self._runs if run.fails(COLLAPSE_DEFINITION)), default=inf)
+    def first_falls(self) -> tuple[float, float]:
+        """Smallest scale at which any run fell, and the largest first fall of a finished step [-].
+
+        They are infinite for none. Steps too long for sliding are among these.
+        """
+        falls = (run.scale for run in self._runs if run.fails(COLLAPSE_DEFINITION))
+        finished = (each[COLLAPSE_DEFINITION].upper for each in self._finished.values())
+        return min(falls, default=inf), max(finished, default=inf)
 
     @property
     def lower(self) -> float:
         """Largest scale below all falls up to which each finished step came without one [-]."""
         reached = min(each[COLLAPSE_DEFINITION].lower for each in self._decisive.values())
-        held = (run.scale for run in self._runs if run.fall and run.scale < self._least_fall)
+        least, _ = self.first_falls
+        held = (run.scale for run in self._runs if run.fall and run.scale < least)
         return max((scale for scale in held if scale <= reached), default=0.0)
 
     @property
@@ -297,7 +312,7 @@ class CollapseScale:
         """
         scales = {"tension": find_tension(self._runs), "moves": self.moves}
         scales = {state: at for state, at in scales.items() if at <= max(self._stood)}
-        scales |= {"dislocated": self.dislocated, "falls": self._least_fall}
+        scales |= {"dislocated": self.dislocated, "falls": self.first_falls[0]}
         return {state: scale for state, scale in scales.items() if scale < inf}
 
     @property
@@ -332,7 +347,7 @@ class CollapseScale:
 
     @property
     def upper(self) -> float:
-        """Scale by which it fell with all finished steps [-]; infinite if it stood with one."""
+        """Scale by which it fell with each finished step that follows sliding, or infinite [-]."""
         return max(each[COLLAPSE_DEFINITION].upper for each in self._decisive.values())
 
     @property

@@ -393,6 +393,42 @@ def test_the_fall_of_steps_too_long_for_sliding_is_stated_and_bounds_nothing(mon
     assert all(row[2] == "as given" for row in given.rows()[1])
 
 
+def test_the_smallest_fall_of_any_step_is_the_one_that_is_stated(monkeypatch):
+    """5 ms, too long for sliding, fall from 2.2 on, 3 ms from 2.9 on and 1.5 ms from 2.5 on."""
+    falls = {0.005: 2.2, 0.0025: 2.3, 0.003: 2.9, 0.0015: 2.5}
+    windows = {dt: ((scale, inf),) for dt, scale in falls.items()}
+    found = searched_by_steps(monkeypatch, windows, {}, 0.004, is_given=False)
+    long = found.longer[0.005]
+    moved = replace(long.runs[2], fall=replace(long.runs[2].fall, kind="dislocated"))
+    fell = replace(long["collapse"].run, doubts=(Doubt("slip is wrong"),))
+    found = replace(found, longer={0.005: long.with_run(moved).with_run(fell)})
+    cells = [(float(row[1]), row[3]) for row in found.rows()[1]]
+    least = {
+        kind: min(x for x, state in cells if state == kind) for kind in ("fallen", "dislocated")
+    }
+    last = max(
+        min(run.scale for run in each.runs if run.fails("collapse"))
+        for each in (*found.longer.values(), *found.searches.values())
+    )
+    assert 2.2 < least["fallen"] < 2.35 < 2.9 < last < 3.05
+    first = f"{found.states['falls']:#.3g}"
+    assert (float(first), found.first_falls) == (least["fallen"], (found.states["falls"], last))
+    assert found.states["dislocated"] == moved.scale == pytest.approx(least["dislocated"], rel=5e-3)
+    assert f" ({first} × the motion), the last time step first falls at {last:#.3g} ×" in str(found)
+    assert [*map(str, found.doubts)] == [
+        f"its time steps find the first fall at {first} to {last:#.3g} × the motion",
+        f"at {first} × by 5 ms: slip is wrong",
+    ]
+    (read,) = answers.read_numbers(
+        answers.Scales,
+        answers.Statement.read(
+            answers.state_scale(found, af.Motion(np.ones(9), 0.01), [])["scale.json"]
+        ),
+    )
+    assert (read.states, read.all_steps) == (found.states, last)
+    assert found.held < moved.scale < found.lower < found.states["falls"]
+
+
 def test_the_second_step_begins_near_the_fall_of_the_first(monkeypatch):
     """Its scales lie between those of the first."""
     made = {}
