@@ -124,7 +124,7 @@ class HealingCache(FunctionCache):
             return code
         if _loads_only[-1]:
             raise NotStored
-        _announce_compilation(f"{self._py_func.__module__} {sig}")
+        _announce_compilation(f"{self._py_func.__module__}.{self._py_func.__name__} {sig}")
         with suppress(OSError):  # without a lock each process compiles
             self._wait_for_others(hashlib.sha256(str(sig).encode()).hexdigest()[:16])
         return self._load(sig, target_context)
@@ -300,13 +300,13 @@ _announced: set[str] = set()
 
 
 def _announce_compilation(name: str) -> None:
-    """Announce the part of a run that is compiled, once, by a module and the types it is for."""
+    """Announce the part of a run that is compiled, once, by a function and the types it is for."""
     # what is compiled at once, by a word of its first kernel, and its time as a multiple of that
-    # of the reference function
+    # of the reference function; others of joints.large take seconds where they alone are missing
     parts = {
         "rigid_body.time_stepping": ("fall of loose blocks", 185.0),
         "solvers.supernodal_lu": ("steps of elastic blocks", 160.0),
-        "joints.large": ("time steps of large displacements", 190.0),
+        "joints.large.forces.compute_step_forces": ("time steps of large displacements", 190.0),
         "SmallSystem": ("time steps", 115.0),  # of rigid blocks with small displacements
     }
     part, multiple = next((parts[word] for word in parts if word in name), ("", 0.0))

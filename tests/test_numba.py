@@ -18,7 +18,8 @@ from archfem import _numba, _threads
 def test_compilation_is_reported_once_for_each_part(capsys, monkeypatch):
     monkeypatch.setattr(_numba, "_announced", set())
     monkeypatch.setattr(_numba, "_time_compilation", lambda: 0.2)
-    modules = ("joints.large.forces", "dynamics.solvers.base", "dynamics.solvers.supernodal_lu")
+    steps_alone = "joints.large.forces.facet_slips", "joints.large.forces.compute_step_forces"
+    modules = (*steps_alone, "dynamics.solvers.base", "dynamics.solvers.supernodal_lu")
     steps = "dynamics.solvers.base (SmallSystem(float64))"
     for module in (*modules, "dynamics.rigid_body.time_stepping", steps, steps):
         _numba._announce_compilation(f"archfem.{module}")

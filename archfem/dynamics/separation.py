@@ -135,7 +135,8 @@ class MeetingMonitor:
         limits, pairs = self._limits.copy(), self.model.structure.pairs[self._joints]
         if not overruns.any():
             limits[tuple(pairs.T)] = limits[tuple(pairs.T[::-1])] = -np.inf
-        poses, depths = self._fit_motions(corners[steps]), self._compressions(faces[steps])
+        poses = self._fit_motions(corners[steps])
+        depths = np.ascontiguousarray(self._compressions(faces[steps]))  # one kind to compile for
         k, *pair = find_meeting(self._bodies, self._world, poses, limits, pairs, depths)
         if k < 0:
             return None

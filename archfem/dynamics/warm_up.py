@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from multiprocessing import get_context
 from time import perf_counter
+from typing import Any, cast
 
 import numpy as np
 
@@ -19,6 +20,7 @@ from archfem.dynamics.solvers.equation import Equation
 from archfem.dynamics.solvers.integrator import Stepper
 from archfem.dynamics.solvers.newton import NewtonSolver
 from archfem.dynamics.time_history import last_state, time_history
+from archfem.joints.large.forces import facet_slips
 from archfem.masonry.materials import Contact
 from archfem.masonry.shapes.rings import circular_arch, column
 from archfem.models.builder import build
@@ -80,6 +82,8 @@ def _compile_large_displacements(*, is_chain: bool) -> None:
         return
     end = last_state(run)
     model.observer().joint_ends(end.q)  # pose of a face, as films need it
+    # of elastic blocks, with which a run of stiff joints is compared
+    facet_slips(cast(Any, model).joints, np.array(end.q))
     simulate_fall(model, end, _SHORT_MOTION)
     # a negative tolerance, so that even blocks that have not moved are tested
     batch = next(stepper.batches(end, _SHORT_MOTION.dt, end.time + _SHORT_MOTION.dt))

@@ -1,10 +1,14 @@
 """Kernels that were compiled beforehand are those that runs need."""
 
+from types import SimpleNamespace
+
 import numba.core.event as event
 import numpy as np
 import pytest
 
 import archfem as af
+from archfem.dynamics import State
+from archfem.dynamics.separation import MeetingMonitor
 from archfem.dynamics.warm_up import COMPILED_VARIANTS, compile_variant
 
 
@@ -47,6 +51,23 @@ def test_a_run_finds_every_kernel_compiled(kind, closure):
             method=method,
             scheme=getattr(af.dynamics, scheme)(),
         )
+    assert counting.count == 0
+
+
+def test_what_follows_a_run_with_large_displacements_is_compiled():
+    """Stones of an arch are searched for meetings, and stiff joints compared with elastic ones."""
+    compile_variant("newton, large displacements, chain of rigid stones")
+    arch = af.circular_arch(radius=3.0, thickness=0.6, embrace=150.0, voussoirs=3)
+    rigid, elastic = (
+        af.build(arch, fidelity=each, displacements="large") for each in ("rigid", "condensed")
+    )
+    start = State(0.0, *np.zeros((3, rigid.size)))
+    batch = SimpleNamespace(read=lambda observer: np.array([observer.read(start.q)] * 2))
+    counting = Compilations()
+    with event.install_listener("numba:compile", counting):
+        # a negative tolerance, so that even blocks that have not moved are tested
+        MeetingMonitor(rigid, start, tolerance=-1.0).find_first(batch)
+        assert elastic.face_mismatch(np.zeros(elastic.size))[1]
     assert counting.count == 0
 
 
