@@ -40,7 +40,8 @@ from archfem.masonry.shapes import bridges, rings, walls
 from archfem.masonry.shapes.bridge_parts import Arch, Backfill, Paving, Pier, Sidewall
 from archfem.masonry.standing import StandingBody, carrying
 from archfem.masonry.structure import Joint, Structure, join_names, suggest_name
-from archfem.masonry.survey.outlines import Layer, Survey, read_outlines, surveyed
+from archfem.masonry.survey.layers import Layer
+from archfem.masonry.survey.outlines import Survey, read_outlines, surveyed
 
 Described = TypeVar("Described")
 

@@ -37,7 +37,7 @@ from archfem.masonry.materials import Contact, Material
 from archfem.masonry.parts import PART_ROLES
 from archfem.masonry.standing import StandingBody
 from archfem.masonry.structure import Joint
-from archfem.masonry.survey.outlines import Layer
+from archfem.masonry.survey.layers import Layer
 from archfem.models.discretisation import MODEL_FIDELITIES
 from archfem.motion.design_spectra import registered_spectra
 from archfem.motion.hazard import MEASURES

@@ -28,7 +28,7 @@ from .structure import Joint as Joint
 from .structure import Structure as Structure
 from .survey.circle_fit import FittedCircle as FittedCircle
 from .survey.circle_fit import fitted_circle as fitted_circle
-from .survey.outlines import Layer as Layer
+from .survey.layers import Layer as Layer
 from .survey.outlines import Survey as Survey
 from .survey.outlines import read_outlines as read_outlines
 from .survey.outlines import surveyed as surveyed

@@ -1,13 +1,16 @@
 """Surveys as structures: corners, materials, layers and roles of drawn outlines, and cases."""
 
 import json
+import re
+import tomllib
 from pathlib import Path
 
 import numpy as np
 import pytest
-from drawn import assert_same, dxf, geojson, square
+from drawn import assert_same, draw_portal, dxf, geojson, square
 
 import archfem as af
+from archfem.cases.structure_keys import read_survey
 from archfem.commands import main
 
 SHIPPED = Path(__file__).parents[2] / "meshes" / "survey.toml"
@@ -100,6 +103,61 @@ def test_layers_must_be_those_of_the_file(tmp_path, stack):
         af.read_outlines(path, layers=layers | {"colum": af.masonry.Layer()})
     with pytest.raises(af.errors.InvalidStructure, match=r"snap \[m\] = 0\.0 is not above 0"):
         af.read_outlines(path, snap=0.0)
+
+
+PIERS = """
+"west pier" = { x = ["-2 m", "0 m"], y = ["-1.35 m", "0 m"], role = "pier" }
+"east pier" = { x = ["0 m", "2 m"], y = ["-1.35 m", "0 m"], role = "pier" }
+"""
+
+
+def one_layer(folder, piers=PIERS, ground="-1.35 m"):
+    """Write the case of a portal whose stones are on the layer of its ring, over a given level."""
+    folder.mkdir()
+    courses = [f"{side} {k}" for side in ("WEST", "EAST") for k in (1, 2, 3)]
+    path = draw_portal(folder, dict.fromkeys(courses, "RING"))
+    text = re.sub(r"(WEST|EAST) = .*\n", "", path.read_text()).replace("[model]", f"{piers}[model]")
+    text = text.replace('part = "slab", fixed = true', "ignore = true")
+    path.write_text(text.replace("[structure.l", f'ground = "{ground}"\n[structure.l'))
+    return path
+
+
+def test_stones_of_one_layer_have_parts_by_place_and_ground_by_its_level(tmp_path):
+    """As the same stones on layers of their own, on a slab that is drawn."""
+    layered, placed = (
+        af.Case.read(path).structure
+        for path in (draw_portal(tmp_path), one_layer(tmp_path / "one"))
+    )
+    parts = [[(b.part, b.role) for b in each.blocks if not b.fixed] for each in (layered, placed)]
+    assert parts[0] == parts[1]
+    (ground,) = (block for block in placed.blocks if block.fixed)
+    assert (ground.name, ground.points[:, 1].max()) == ("ground", pytest.approx(-1.35, abs=4e-3))
+    assert np.ptp(ground.points[:, 0]) == pytest.approx(2.0 * 3.65, abs=0.05)  # of 3.65 m drawn
+    pushes = [af.collapse_factor(each, live=af.BodyForce(1.0)).factor for each in (layered, placed)]
+    assert pushes[1] == pytest.approx(pushes[0], abs=1e-4)  # feet are 1.5 mm off the level [g]
+
+
+@pytest.mark.parametrize(
+    ("piers", "words"),
+    [
+        (PIERS.replace("-2 m", "2 m"), "no stones within x and y .* of 'west pier'"),
+        (
+            PIERS.replace('"0 m", "2 m"', '"-2 m", "2 m"'),
+            "within x and y of 'west pier', 'east pier': let",
+        ),
+        (PIERS.replace('["-2 m", "0 m"]', '["-2 m"]'), r"limits of x or y .* give \(a, b\)"),
+    ],
+)
+def test_limits_of_parts_must_hold_stones_and_be_apart(tmp_path, piers, words):
+    with pytest.raises(af.InvalidInput, match=words):
+        af.Case.read(one_layer(tmp_path / "one", piers))
+
+
+def test_outlines_by_place_can_be_left_out(tmp_path):
+    left_out = PIERS + 'keystone = { x = ["-0.1 m", "0.1 m"], y = ["1 m", "2 m"], ignore = true }\n'
+    path = one_layer(tmp_path / "one", left_out)
+    survey = read_survey(tomllib.loads(path.read_text()), path.parent)
+    assert (len(survey.blocks), survey.ignored["keystone"]) == (17, 1)
 
 
 def case(tmp_path, **structure):

@@ -49,7 +49,6 @@ from archfem.masonry.structure import (
     LARGE_STONE,
     Structure,
     join_names,
-    suggest_name,
 )
 from archfem.masonry.survey.drawings import (
     ANNOTATIONS,
@@ -60,6 +59,7 @@ from archfem.masonry.survey.drawings import (
     read_polylines,
 )
 from archfem.masonry.survey.dxf import POLYLINES, load_dxf
+from archfem.masonry.survey.layers import Layer, group_by_place
 from archfem.units import G, in_unit
 
 # Gaps and contacts up to this multiple of the tolerance are taken for errors of the survey [-]
@@ -78,25 +78,6 @@ Materials = Mapping[str, Material]
 
 class NarrowGap(InvalidStructure):
     """A gap between two faces that is too narrow to be one on purpose."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Layer:
-    """Properties of the blocks on one layer of a drawing (in GeoJSON, of one part).
-
-    Attributes:
-        part: part of the structure; by default the name of the layer.
-        role: role of the part, "ring", "pier" or "other"; by default inferred from its name.
-        material: name of the material; by default that of the whole survey.
-        fixed: whether the blocks are abutments or foundations.
-        ignore: whether the layer contains no blocks.
-    """
-
-    part: str | None = None
-    role: str | None = None
-    material: str | None = None
-    fixed: bool = False
-    ignore: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,6 +122,7 @@ def read_outlines(
     unit: str | None = None,
     snap: Metres = 1e-3,
     layers: Mapping[str, Layer] | None = None,
+    ground: Metres | None = None,
     material: Material = STONE,
     materials: Materials = MATERIAL_PRESETS,
 ) -> Survey:
@@ -159,6 +141,7 @@ def read_outlines(
             of it [m].
         layers: properties of all layers of the drawing by name. Role, material and fixed of a
             GeoJSON feature take precedence.
+        ground: level of fixed ground below the drawing; None where it has fixed blocks [m].
         material: material of blocks for which neither feature nor layer names one.
         materials: materials by name.
 
@@ -178,7 +161,10 @@ def read_outlines(
             faults.append(f"besides, {error}")
         raise InvalidInput(f"{path}: " + ";\n  ".join(faults))
     if layers is not None:
-        _check_layers(outlines, layers, path, ignored)
+        outlines = group_by_place(outlines, layers, path, ignored)
+    size = _measure(outlines)
+    if ground is not None:
+        outlines.append(_draw_ground(outlines, ground))
     try:
         points, moved, _ = _close_or_advise(outlines, snap)
         blocks = [
@@ -192,7 +178,16 @@ def read_outlines(
         raise type(error)(f"{path}: {error}") from error
     lost = tuple(_find_lost(Path(path), unit, ignored, outlines, snap))
     held = _describe_ignored(Path(path), ignored, outlines)
-    return Survey(made, _measure(outlines), moved, outlines[0].frame, ignored, held, lost)
+    return Survey(made, size, moved, outlines[0].frame, ignored, held, lost)
+
+
+def _draw_ground(outlines: Sequence[Outline], level: float) -> Outline:
+    """Return fixed ground below a level, twice as broad as the drawing."""
+    (breadth, height), frame = _measure(outlines), outlines[0].frame
+    left = min(each.points[:, 0].min() for each in outlines) - 0.5 * breadth
+    right, low = left + 2.0 * breadth, level - 0.1 * max(breadth, height)
+    points = np.array([[left, low], [right, low], [right, level], [left, level]])
+    return Outline(points, "ground", "ground", None, fixed=True, role="other", frame=frame)
 
 
 def _describe_ignored(
@@ -264,6 +259,7 @@ def surveyed(  # noqa: PLR0913  (the drawing, and what its blocks are and how th
     unit: str | None = None,
     snap: Metres = 1e-3,
     layers: Mapping[str, Layer] | None = None,
+    ground: Metres | None = None,
     material: Material = STONE,
     materials: Materials = MATERIAL_PRESETS,
     contact: Contact = STONE_TO_STONE,
@@ -278,6 +274,7 @@ def surveyed(  # noqa: PLR0913  (the drawing, and what its blocks are and how th
         unit: unit of the coordinates, as for `read_outlines`.
         snap: vertices and edges nearer than this are made to touch [m].
         layers: properties of all layers by name, as for `read_outlines`.
+        ground: level of fixed ground, as for `read_outlines` [m].
         material: material of blocks for which neither feature nor layer names one.
         materials: materials by name.
         contact: contact between blocks of one material.
@@ -289,9 +286,8 @@ def surveyed(  # noqa: PLR0913  (the drawing, and what its blocks are and how th
         InvalidInput: as `read_outlines`; or the contact of two materials is missing.
         InvalidStructure: as `read_outlines`; or the blocks are not connected.
     """
-    survey = read_outlines(
-        path, unit=unit, snap=snap, layers=layers, material=material, materials=materials
-    )
+    blocks: dict[str, Any] = {"ground": ground, "material": material, "materials": materials}
+    survey = read_outlines(path, unit=unit, snap=snap, layers=layers, **blocks)
     if survey.frame.stated:
         question = f"{_question_unit(survey.frame)} By it that is {_say_size(survey.size)}"
         logger.warning("%s: %s; leave unit out, or correct the drawing", path, question)
@@ -312,33 +308,6 @@ def _name_joints(structure: Structure, path: Path, unit: str | None) -> Structur
     named = enumerate(structure.joints)
     joints = [replace(joint, name=names.get(number, joint.name)) for number, joint in named]
     return replace(structure, joints=tuple(joints))
-
-
-def _check_layers(
-    outlines: list[Outline], layers: Mapping[str, Layer], path: str | Path, ignored: Counter[str]
-) -> None:
-    """Refuse layers of the file without properties, and properties of missing layers."""
-    there = {outline.layer for outline in outlines}
-    if strange := sorted(there - set(layers)):
-        stones = [outline for outline in outlines if outline.layer == strange[0]]
-        about = stones[0].frame.place(stones[0].points.mean(axis=0))
-        hints = [suggest_name(strange[0], there & set(layers), 0.7)]
-        # a key of the case that no layer of the drawing has is the misspelt one
-        for key in (x for x in layers if x not in there):
-            if hint := suggest_name(key, [strange[0]], 0.7):
-                hints.append(f"for '{key}' of [structure.layers], {hint}")
-        hint = next(filter(None, hints), "name its part, or ignore it")
-        raise InvalidInput(
-            f"{path}: of layer '{strange[0]}' (closed outlines: {len(stones)}, the first about "
-            f"{about}) nothing is said: {hint}"
-        )
-    expected = {name for name, layer in layers.items() if not layer.ignore}
-    if missing := sorted(expected - there):
-        hidden = ignored.get(f"{missing[0]} (hidden)")
-        also = f", and {hidden} outlines on it are hidden, which are not read" if hidden else ""
-        raise InvalidInput(
-            f"{path} has no outlines on layer '{missing[0]}': its layers are {sorted(there)}{also}"
-        )
 
 
 def _make_block(
