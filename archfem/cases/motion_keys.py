@@ -1,7 +1,7 @@
 """Sections [motion] and [suite] of case files: ground motions, suites and target spectra."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from inspect import signature
 from pathlib import Path
@@ -11,7 +11,7 @@ import numpy as np
 
 from archfem._typing import Array
 from archfem._validation import check_choice, declared_keys
-from archfem.cases.toml_file import Table, check_table, format_tables
+from archfem.cases.toml_file import Table, check_table, format_tables, read_object
 from archfem.errors import InvalidInput
 from archfem.motion.design_spectra import (
     DesignSpectrum,
@@ -21,6 +21,9 @@ from archfem.motion.design_spectra import (
 from archfem.motion.motion import Motion
 from archfem.motion.record_selection import RecordSelection
 from archfem.motion.suite import Suite
+
+# What makes a motion of the keys of its table
+MADE: Mapping[str, Callable[..., Motion]] = {"synthetic": Motion.synthetic, "held": Motion.held}
 
 
 def source_keys() -> dict[str, Any]:
@@ -35,7 +38,8 @@ def source_keys() -> dict[str, Any]:
 def motion_keys() -> dict[str, Any]:
     """Return the keys of one motion."""
     own = declared_keys(Motion.cut) | declared_keys(Motion.with_rest)
-    own |= {"vertical": (str, dict), "resample": "s", "scale": "1", "reversed": bool}
+    own |= {"vertical": (str, dict), "held": dict}
+    own |= {"resample": "s", "scale": "1", "reversed": bool}
     return source_keys() | own
 
 
@@ -212,20 +216,22 @@ def _locate_component(path: Path, samples: Array, folder: Path) -> dict[str, Any
 def _parse_source(table: Any, keys: Table, section: str) -> dict[str, Any]:
     """Check the keys of the source of a motion: a file, samples, or synthetic."""
     settings = check_table(table, keys, section)
-    sources = sorted({"file", "synthetic", "samples"} & set(settings))
+    sources = sorted({"file", "samples", *MADE} & set(settings))
     if len(sources) != 1:
         raise InvalidInput(
             f"{section} needs either a file, or synthetic = {{ seed = 1, … }} to make one, or "
-            f"samples = [ … ] and dt; it has {sources or 'none of them'} "
+            f'held = {{ push = "0.4 g" }}, or samples = [ … ] and dt; it has '
+            f"{sources or 'none of them'} "
             f'(remove = ["{section}.synthetic"] leaves out that of a base)'
         )
     (source,) = sources
-    if source == "synthetic":
-        keys = declared_keys(Motion.synthetic)
-        settings[source] = check_table(settings[source], keys, f"{section}.synthetic")
+    if source in MADE:
+        keys = declared_keys(MADE[source])
+        settings[source] = check_table(settings[source], keys, f"{section}.{source}")
+        read_object(MADE[source], settings[source], f"{section}.{source}")
     # Keys that describe a file are errors beside another source; samples have a step.
-    of_files = {"file": set(), "synthetic": {"column", "units", "dt", "response"}}
-    if unused := sorted(of_files.get(source, {"column", "units", "response"}) & set(settings)):
+    of_files = {"column", "units", "response"} | ({"dt"} if source in MADE else set())
+    if unused := sorted(of_files & set(settings) if source != "file" else ()):
         raise InvalidInput(f"{section}.{unused[0]} belongs to a file, not to {source}")
     if source == "samples" and "dt" not in settings:
         raise InvalidInput(f'{section}.samples needs the time between them, e.g. dt = "5 ms"')
@@ -245,8 +251,8 @@ def _build_source(settings: Table, folder: Path) -> Motion:
     """Return the motion of samples, of a seed, or of a file with its keywords."""
     if "samples" in settings:
         return Motion(np.array(settings["samples"]), settings["dt"])
-    if "synthetic" in settings:
-        return Motion.synthetic(**settings["synthetic"])
+    for source in MADE.keys() & settings.keys():
+        return MADE[source](**settings[source])
     options = {key: settings[key] for key in ("column", "units", "dt") if key in settings}
     if "response" in settings:
         options["response"] = folder / settings["response"]

@@ -213,6 +213,7 @@ def _motion() -> Schema:
     synthetic = _table_of(Motion.synthetic)
     vertical = _table(motion_keys.source_keys(), Motion.read, synthetic=synthetic)
     own = {"synthetic": synthetic, "vertical": _any([{"type": "string"}, vertical])}
+    own["held"] = _table_of(Motion.held)
     return _table(motion_keys.motion_keys(), Motion.read, **own)
 
 

@@ -65,7 +65,9 @@ def warn_lost_solution(solutions: NonassociatedBounds) -> None:
                 "a descent from the least of these found it"
             )
         logger.warning(
-            "a weaker solution without dilatancy may exist: %s; hold a motion a tenth below", found
+            "a weaker solution without dilatancy may exist: %s; hold a push a tenth below, by "
+            "[motion] held",
+            found,
         )
     if solutions.jumps:
         share, factor = solutions.path[-1]

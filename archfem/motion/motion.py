@@ -10,11 +10,19 @@ import numpy as np
 
 from archfem._display import ResultDisplay
 from archfem._typing import Angle, Array, MetresPerSecondSquared, Seconds
-from archfem._validation import check_number, check_words, is_number, short_repr, validate_methods
+from archfem._validation import (
+    check_between,
+    check_number,
+    check_words,
+    count_pieces,
+    is_number,
+    short_repr,
+    validate_methods,
+)
 from archfem.errors import InvalidInput
 from archfem.motion import signal_processing
 from archfem.motion.records.reader import join_channels, read_components
-from archfem.units import STANDARD_GRAVITY, in_degrees
+from archfem.units import STANDARD_GRAVITY, in_degrees, warn_if_in_g
 
 COMPONENTS = "horizontal", "vertical", "transverse"
 
@@ -141,6 +149,34 @@ class Motion(ResultDisplay):
             duration, dt, pga=pga, ratio=vertical_ratio, seed=seed
         )
         return cls(level, dt, upright, name=f"synthetic {seed}")
+
+    @classmethod
+    def held(
+        cls,
+        *,
+        push: MetresPerSecondSquared,
+        rise: Seconds = 1.0,
+        duration: Seconds = 10.0,
+        dt: Seconds = 0.005,
+    ) -> "Motion":
+        """Return a push that rises linearly, and is held: the ground accelerates by its opposite.
+
+        Args:
+            push: horizontal force per mass, positive to the right, as by `BodyForce` [m/s²].
+            rise: time until it is reached [s].
+            duration: time of the last sample [s].
+            dt: time between samples [s].
+
+        Raises:
+            InvalidInput: a value is out of range.
+        """
+        for name, value, most in (("rise", rise, duration), ("dt", dt, rise)):
+            check_between(value, f"{name} of a held push [s]", 0.0, most, ends="(]")
+        warn_if_in_g(abs(push), "a held push")
+        most = signal_processing.MAX_SAMPLES
+        count = count_pieces(duration, dt, "samples of a held push", most)
+        share = np.minimum(dt * np.arange(count + 1) / rise, 1.0)
+        return cls(-push * share, dt, name=f"{push / STANDARD_GRAVITY:.3g} g held")
 
     @property
     def duration(self) -> float:

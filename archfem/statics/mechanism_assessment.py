@@ -447,7 +447,7 @@ class _Search:
             doubt = Doubt(
                 "alpha_0 is {}, the least that a search without dilatancy found, and a weaker "
                 "mechanism may exist",
-                "hold a motion a tenth below",
+                f"hold a push of {0.9 * found.factor:.3g} g, a tenth below, by [motion] held",
                 (UPPER_BOUND,),
             )
         return classify_motion(placed, joints, found.motion, flat, contacts, found.factor), doubt

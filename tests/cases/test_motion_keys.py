@@ -97,6 +97,12 @@ def test_samples_may_stand_in_the_case():
         ("suite.pairs.third={synthetic={sed=1}}", "unknown key 'suite.pairs.third.synthetic.sed'"),
         ("suite.pairs.third={synthetic={}, units='g'}", "units belongs to a file"),
         ("suite.pairs.third={synthetic={}, response='a.xml'}", "response belongs to a file"),
+        ("suite.pairs.third={held={}}", r"third.held = {}: .*'push'"),
+        (
+            "suite.pairs.third={held={push=1.0, rise=0}}",
+            "rise of a held push .* not between 0 and 10",
+        ),
+        ("suite.pairs.third={held={push=1.0}, dt=0.01}", "dt belongs to a file, not to held"),
         ("suite.pairs.third={samples=[0.0, 1.0]}", "needs the time between them"),
         (
             "suite.pairs.third={samples=[0.0, 1.0], synthetic={}}",
@@ -115,6 +121,25 @@ def test_samples_may_stand_in_the_case():
 def test_refusals_name_the_key(small, change, says):
     with pytest.raises(af.InvalidInput, match=says):
         af.Case.read(small, [change]).ground_suite()
+
+
+@pytest.mark.parametrize(
+    ("push", "outcome"), [(0.24, "stands"), (0.26, "fallen"), (-0.26, "fallen")]
+)
+def test_a_held_push_overturns_a_block_from_breadth_over_height_on(push, outcome):
+    """Of 0.5 × 2 m: by hand from 0.25 g on, towards the side that it is pushed to."""
+    tables = {
+        "structure": {"shape": "column", "breadth": 0.5, "heights": [2.0]},
+        "contacts": {"stone to stone": {"normal_stiffness": 1e12, "shear_stiffness": 1e12}},
+        "model": {"fidelity": "rigid", "displacements": "large"},
+        "analysis": {"damping": "effective"},
+        "motion": {"held": {"push": f"{push} g", "duration": "4 s"}},
+    }
+    case = af.Case.of(tables)
+    history = case.analysis.run(case.ground_motion())
+    assert history.verdict.outcome == outcome
+    if outcome == "fallen":
+        assert history.dataset["fall_pose"].values[-1, 1, 0] * push > 0.0
 
 
 def test_files_of_a_pair_have_their_own_units_and_steps(tmp_path, at2):

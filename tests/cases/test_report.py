@@ -756,6 +756,12 @@ def test_stiffness_by_a_finish_is_inferred_and_numbers_have_their_units():
         ("duration 6 s; pga 2 m/s²; seed 3", "given"),
         ("dt 0.005 s", "default"),
     ]
+    held = af.Case.of({**tables, "motion": {"held": {"push": "3 m/s**2"}}})
+    rows = tabulate_inputs(report_data.ReportData(held, {})).rows
+    assert [row for row in rows if "motion" in row[0]] == [
+        ("motion, held", "push 3 m/s²", "given"),
+        ("motion, held", "rise 1 s; duration 10 s; dt 0.005 s", "default"),
+    ]
 
 
 def test_sources_of_a_suite_are_inputs_each_with_its_mark():

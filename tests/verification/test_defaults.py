@@ -22,6 +22,7 @@ MOTION = {
         **{"duration": 20.0, "pga": 0.3 * 9.80665, "seed": 0, "dt": 0.005},
         "vertical_ratio": 2.0 / 3.0,
     },
+    "motion.Motion.held": {"rise": 1.0, "duration": 10.0, "dt": 0.005},
     "motion.Motion.significant": {"low": 0.05, "high": 0.95},
     "motion.Motion.baseline_corrected": {"degree": 6},
     "motion.Motion.band_passed": {"order": 4},

@@ -18,6 +18,7 @@ from archfem.cases.defaults import (
     list_materials_and_contacts,
     value_text,
 )
+from archfem.cases.motion_keys import MADE
 from archfem.cases.report.report_data import STATIC_RESULTS, ReportData
 from archfem.cases.structure_keys import (
     PARTS_BY_NAME,
@@ -34,7 +35,6 @@ from archfem.masonry.shapes.bridge_parts import Backfill
 from archfem.masonry.structure import Structure, describe_piers, find_clear_spans
 from archfem.motion.design_spectra import CodeSpectrum
 from archfem.motion.matching import DEFAULT_BAND
-from archfem.motion.motion import Motion
 from archfem.statics.mechanism_assessment import kinematic_assessment
 from archfem.statics.pushover import pushover
 from archfem.units import Ends, in_unit
@@ -391,22 +391,23 @@ def _source_rows(motions: Sequence[Mapping[str, Any]]) -> Iterator[Row]:
 
 def _describe_motion(motion: Mapping[str, Any]) -> Iterator[tuple[str, str, str, str]]:
     """Yield component, key, value and mark of the sources of a motion, defaults included."""
-    kinds, parameters = declared_keys(Motion.synthetic), signature(Motion.synthetic).parameters
     parts = {"motion": motion}
     if "vertical" in motion:
         vertical = motion["vertical"]
         parts["vertical motion"] = vertical if isinstance(vertical, Mapping) else {"file": vertical}
     for part, table in parts.items():
         for key, value in table.items():
-            if key not in ("synthetic", "vertical"):
+            if key not in (*MADE, "vertical"):
                 yield part, key, describe_value(value), "given"
-        if (made := table.get("synthetic")) is None:
-            continue
-        values = {name: made.get(name, each.default) for name, each in parameters.items()}
-        ratio = values.pop("vertical_ratio")
-        for key, value in values.items():
-            yield f"{part}, synthetic", key, describe_value(value, kinds[key]), _mark(key in made)
-        if "vertical" not in motion:
+        for source in MADE.keys() & table.keys():
+            made, kinds = table[source], declared_keys(MADE[source])
+            usual = {name: x.default for name, x in signature(MADE[source]).parameters.items()}
+            ratio = (values := usual | made).pop("vertical_ratio", None)
+            for key, value in values.items():
+                text = describe_value(value, kinds[key])
+                yield f"{part}, {source}", key, text, _mark(key in made)
+            if ratio is None or "vertical" in motion:
+                continue
             mark = _mark("vertical_ratio" in made)
             yield "vertical motion, synthetic", "peak", f"{ratio:.3g} of the horizontal", mark
 

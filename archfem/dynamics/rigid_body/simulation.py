@@ -193,6 +193,8 @@ class RigidBlockSimulation:
         stride = max(1, round(spacing / dt))
         steps = int(np.ceil((end - start.time) / dt - 1e-6))
         anchor, since = start.poses, start.time
+        still = 0.0 if motion is None else end - motion.duration
+        after = f" ({still:.3g} s after the motion)" * (still > 0.0)
         with ProgressReport("loose blocks", end - start.time, rarely=True) as progress:
             for first, last in pairwise([*range(0, steps, stride), steps]):
                 middles = start.time + dt * (np.arange(first, last) + 0.5)
@@ -203,7 +205,7 @@ class RigidBlockSimulation:
                 if shaken or run.largest_displacement(anchor) > 5e-4:
                     anchor, since = run.poses, time
                 resting = time - since >= 0.5
-                words = f"{time:.3g} of {end:.3g} s at most, by steps of {1e3 * dt:g} ms"
+                words = f"{time:.3g} of {end:.3g} s at most{after}, by steps of {1e3 * dt:g} ms"
                 progress.show(words, dt * (last - first))
                 yield run.frame(time, resting)
                 if resting:
