@@ -322,11 +322,10 @@ def describe_collapse(
     lines += note_lower_crowns(structure, limit.fill)
     lines += note_masses(structure, collapse.live, collapse.dead, parapets)
     lines += [f"{NOTE_MARK}{note}" for note in collapse.notes]
-    push = sum(getattr(load, "horizontal", 0.0) for load in limit.live)
-    if structure.heads.any() and collapse.outcome is Outcome.COLLAPSES and push:
+    if structure.heads.any() and collapse.outcome is Outcome.COLLAPSES and collapse.push:
         lines.append(
             "blocks are rigid, and elastic joints may bear less: hold a push of "
-            f"{0.9 * collapse.factor * push:.3g} g, a tenth below, by [motion] held"
+            f"{0.9 * collapse.factor * collapse.push:.3g} g, a tenth below, by [motion] held"
         )
     return "\n".join(lines)
 
