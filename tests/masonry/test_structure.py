@@ -326,6 +326,21 @@ def test_the_tip_of_a_gable_is_one_block_with_the_course_below_it_across_the_pla
     assert not describe_carried(whole)
 
 
+def test_a_wall_across_its_plane_may_begin_at_its_eaves():
+    """A triangle 3 m high on a rectangle of 2.5 m: the triangle, from the next bed on."""
+    wall = af.shapes.wall(breadth=4.0, height=5.5, eaves=2.5, width=0.4, course=0.25)
+    for above, height in ((2.5, 3.0), (2.6, 2.75)):
+        columns = af.masonry.columns_across(wall, above=above)
+        strip, whole = columns["strip"], columns["whole"]
+        assert strip.weight == pytest.approx(height * 0.4 * 20e3)
+        area = 0.5 * (4.0 * height / 3.0) * height
+        assert whole.weight == pytest.approx(area * 0.4 * 20e3)
+        push = af.collapse_factor(strip, live=af.BodyForce(1.0), friction=None).factor
+        assert push == pytest.approx(0.4 / height)
+    with pytest.raises(af.InvalidInput, match=r"up to the last bed, = 5.4 is not between"):
+        af.masonry.columns_across(wall, above=5.4)
+
+
 def test_floor_and_roof_weigh_on_a_wall_across_its_plane(tmp_path):
     """A wall of 4 m with a door of 1 m: a floor on course 3, a roof on 5, a statue on all."""
     thick, floor, roof = 0.5, 4e3, 6e3  # [m, N/m, N/m]

@@ -333,8 +333,14 @@ def test_case_file_has_openings_by_name(tmp_path):
         ({"course": 0.0}, "course"),
         ({"course": 1e-3, "stone": 1e-3}, "courses times stones"),
         ({"openings": [af.shapes.Opening(left=-2.0, breadth=1.0, head=2.0)]}, "room for it"),
-        ({"openings": [af.shapes.Opening(left=0.0, breadth=1.0, head=4.0)]}, "room for it"),
-        ({"openings": [af.shapes.Opening(left=0.0, breadth=1.0, head=1.0, sill=1.5)]}, "room"),
+        ({"openings": [af.shapes.Opening(left=0.0, breadth=1.0, head=4.0)]}, "no room for it"),
+        ({"openings": [replace(DOOR, head=20.0)]}, "the wall is 4 m high, and has no room for it"),
+        ({"eaves": None, "openings": [replace(DOOR, head=20.0)]}, "4 m high, and has no room for"),
+        (  # a contradiction, and no lack of room
+            {"openings": [replace(DOOR, head=1.0, sill=1.5)]},
+            r"from 1\.5 to 1 m high: its sill must be below its head",
+        ),
+        ({"width": 40.0}, r"width \[m\] = 40.0 is not between 0 and 4: a wall is no thicker than"),
         ({"openings": [DOOR, af.shapes.Opening(left=0.0, breadth=0.5, head=1.0)]}, "overlap"),
         (
             {"openings": [DOOR, af.shapes.Opening(left=-0.5, breadth=0.5, sill=2.0, head=2.2)]},

@@ -216,7 +216,7 @@ def column(
 
 
 @validate_arguments
-def columns_across(wall: Structure) -> dict[str, Structure]:
+def columns_across(wall: Structure, *, above: Metres | None = None) -> dict[str, Structure]:
     """Return a wall across its plane, held by nothing else: a strip of it, and the whole.
 
     Both are as broad as the wall is thick, and have its courses: from one bed over most of its
@@ -228,6 +228,8 @@ def columns_across(wall: Structure) -> dict[str, Structure]:
 
     Args:
         wall: structure in its plane; its width is the thickness of the wall.
+        above: level from whose next bed on it is taken, such as that of the eaves; None for all
+            [m].
 
     Returns:
         Columns "strip", 1 m long, and "whole".
@@ -238,6 +240,10 @@ def columns_across(wall: Structure) -> dict[str, Structure]:
     """
     blocks = [wall.blocks[number] for number in wall.free]
     levels, areas = _divide_into_courses(blocks)
+    if above is not None:
+        check_between(above, "above [m], up to the last bed,", *levels[[0, -2]].tolist(), ends="[]")
+        first = int(np.searchsorted(levels, above - 1e-9))  # but for round-off
+        levels, areas = levels[first:], areas[:, first:]
     unit_weights = np.array([block.material.unit_weight for block in blocks])
     words = [block.material.stands_for for block in blocks]
     plain = np.array([not each for each in words]) if None in words else np.ones(len(words))

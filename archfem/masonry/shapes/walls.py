@@ -116,6 +116,8 @@ def wall(  # noqa: PLR0913  (all are lengths and properties of one structure)
     check_between(
         course, "course [m]", 0.0, height, ends="(]", remedy=taller, error=InvalidStructure
     )
+    thin = "a wall is no thicker than it is high: give its thickness in m"
+    check_between(width, "width [m]", 0.0, height, ends="(]", remedy=thin, error=InvalidStructure)
     shoulder = height if eaves is None else eaves
     check_between(shoulder, "eaves [m]", 0.0, height, ends="[]", error=InvalidStructure)
 
@@ -160,11 +162,15 @@ def _check_opening(opening: Opening, height: float, reach: float) -> None:
     words = ", with its bearing," if bearing else ""
     left, right = opening.left - bearing, opening.right + bearing
     if not within or max(-left, right) >= reach:
+        room = "no room for it and a lintel"
+        if reach > 0.0 and opening.head < height:
+            room = f"room for it below {reach:.4g} m from the middle"
+        why = f"the wall is {height:.4g} m high, and has {room} there: move it, or make it smaller"
+        if opening.sill >= opening.head:
+            why = "its sill must be below its head"
         raise InvalidStructure(
             f"opening '{opening.name}' is from x = {left:.4g} to {right:.4g} m{words} "
-            f"and from {opening.sill:.4g} to {opening.head:.4g} m high: the wall is {height:.4g} m "
-            f"high, and has room for it below {reach:.4g} m from the middle there: "
-            "move it, or make it smaller"
+            f"and from {opening.sill:.4g} to {opening.head:.4g} m high: {why}"
         )
 
 
