@@ -35,6 +35,7 @@ from archfem.limit.rating import Rating
 from archfem.masonry.loads import Action, Settlement, describe_massless
 from archfem.masonry.standing import describe_carried, find_bodies
 from archfem.masonry.structure import (
+    CLEAR_TURNS,
     UNCHECKED_ACROSS,
     Structure,
     join_joint_names,
@@ -309,8 +310,11 @@ def describe_collapse(
     hinges = list(dict.fromkeys(sides))
     sliding = list(dict.fromkeys(faces[k] for k in collapse.sliding))
     lines = [f"limit analysis: {collapse.sentence}"]
-    lines += [f"hinges, by the face in contact: {list_or_count(hinges)}"] if hinges else []
-    lines += [f"sliding: {list_or_count(sliding)}"] if sliding else []
+    both = len({faces[k] for k, _ in collapse.hinges} & {*sliding})
+    slides = list_or_count(sliding, f"{both} of which hinge too, drawn in the picture")
+    turns = list_or_count(hinges, CLEAR_TURNS)
+    lines += [f"hinges, by the face in contact: {turns}"] if hinges else []
+    lines += [f"sliding: {slides}"] if sliding else []
     lines += [str(collapse.solutions)] if collapse.solutions else []
     if collapse.over_fill:
         low, high = collapse.range

@@ -55,6 +55,7 @@ from archfem.masonry.loads import (
 from archfem.masonry.materials import STONE
 from archfem.masonry.standing import find_bodies
 from archfem.masonry.structure import (
+    CLEAR_TURNS,
     HasStructure,
     Structure,
     join_names,
@@ -240,7 +241,7 @@ class Collapse(ResultDisplay):
         ]
         turning = zip(self.hinge_names, faces, strict=True)
         sides = [f"{name} at the {face}" for name, face in turning]
-        hinges = list_or_count(sides) or "none"
+        hinges = list_or_count(sides, CLEAR_TURNS) or "none"
         sliding = list_or_count(self.sliding_names) or "none"
         bound = "" if self.upper == self.lower or np.isnan(self.lower) else f" to {self.upper:.4g}"
         text = f"{self._headline}: factor {self.lower:.4g}{bound}; hinges: {hinges}; "

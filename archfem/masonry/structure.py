@@ -90,10 +90,14 @@ def join_joint_names(names: Sequence[str], most: int = 8) -> str:
     return _shorten_list(names, _group_by_stem, "; ", most)
 
 
-def list_or_count(names: Sequence[str], most: int = 16) -> str:
+# Of hinges of a mechanism of many joints, most of which turn by little
+CLEAR_TURNS = "drawn in the picture where they turn clearly"
+
+
+def list_or_count(names: Sequence[str], drawn: str = "drawn in the picture") -> str:
     """List the joints of a mechanism, or count them where a picture alone shows so many."""
-    if len(names) > most:
-        return f"{len(names)} joints, drawn in the picture"
+    if len(names) > 16:
+        return f"{len(names)} joints, {drawn}"
     return join_joint_names(names)
 
 

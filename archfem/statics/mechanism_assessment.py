@@ -47,6 +47,7 @@ from archfem.limit.mechanism_names import name_mechanism
 from archfem.masonry.loads import AttachedLoad, BodyForce, name_side
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import (
+    CLEAR_TURNS,
     HasStructure,
     Structure,
     join_names,
@@ -212,7 +213,8 @@ class KinematicAssessment(ResultDisplay):
         else:
             joints = self.structure.joints
             sides = [(joints[k], side) for k, side in self.hinges]
-            hinges = list_or_count([f"{x.name} at the {x.name_face(side)}" for x, side in sides])
+            turning = [f"{x.name} at the {x.name_face(side)}" for x, side in sides]
+            hinges = list_or_count(turning, CLEAR_TURNS)
             sliding = list_or_count([joints[k].name for k in self.sliding])
             many = not hinges and sliding and slides_anywhere(self.structure, self.alpha_0)
             vanishes = f", d_0* = {self.d_0_star:.4g} m, T_s = {self.T_s:.3f} s"

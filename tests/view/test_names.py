@@ -5,6 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from bonded import bonded_wall
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 import archfem as af
@@ -201,4 +202,21 @@ def test_a_wall_that_slides_has_one_of_many_mechanisms():
         limit = LimitAnalysis((af.BodyForce(1.0),), "coulomb")
         text = describe_collapse(wall, limit.solve(wall), limit)
         assert (said in text) == slides
-        assert text.splitlines()[-1].startswith("blocks are rigid, and elastic joints may bear")
+        push = 0.9 * limit.solve(wall).factor  # a motion that tests the answer
+        assert text.splitlines()[-1] == (
+            "blocks are rigid, and elastic joints may bear less: hold a push of "
+            f"{push:.3g} g, a tenth below, by [motion] held"
+        )
+
+
+def test_joints_of_a_wedge_that_turn_and_slide_are_counted_as_both():
+    """The picture has those that turn clearly, and all that slide."""
+    wall, limit = bonded_wall(9, half=1.0), LimitAnalysis((af.BodyForce(1.0),), "coulomb")
+    found = limit.solve(wall)
+    text = describe_collapse(wall, found, limit)
+    turns, slides = {k for k, _ in found.hinges}, set(found.sliding)
+    drawn = f"{len(turns)} joints, drawn in the picture where they turn clearly"
+    assert f"\nhinges, by the face in contact: {drawn}\n" in text
+    both = f"{len(slides)} joints, {len(turns & slides)} of which hinge too, drawn in the picture"
+    assert f"\nsliding: {both}\n" in text
+    assert f"hinges: {drawn}; sliding: " in str(found)
