@@ -309,12 +309,8 @@ class Case:
         Raises:
             InvalidInput: a change is of another section, or of no key of [report].
         """
-        settings = deepcopy(self.settings)
-        for path, words in map(parse_change, changes):
-            if not path.startswith("report."):
-                raise InvalidInput(f"'{path}' changes results: run the case again with it")
-            set_value(settings, path, str(words))
-        return replace(self, report=_read_report(settings), settings=settings)
+        settings = sign(self.settings, changes)
+        return replace(self, report=settings.get("report", {}), settings=settings)
 
     def hash_inputs(self, *, presentation: bool = True) -> str:
         """Return the SHA-256 of the case, its input files and the program.
@@ -381,6 +377,17 @@ def _check_sections(settings: Table) -> None:
                 place = f"{section}.{key}" if section else key
                 raise InvalidInput(f"unknown key '{place}': it is {' or '.join(homes)}")
     refuse_unknown(settings, ("title", "extensions", *sections))
+
+
+def sign(settings: dict[str, Any], changes: Sequence[str]) -> dict[str, Any]:
+    """Return the tables of a case with other values of [report], as `Case.signed` takes them."""
+    signed = deepcopy(settings)
+    for path, words in map(parse_change, changes):
+        if not path.startswith("report."):
+            raise InvalidInput(f"'{path}' changes results: run the case again with it")
+        set_value(signed, path, str(words))
+    _read_report(signed)
+    return signed
 
 
 def _read_report(settings: Table) -> dict[str, str]:

@@ -25,7 +25,7 @@ from archfem.cases import answers, result_text, structure_text
 from archfem.cases import result_folder as results
 from archfem.cases.analysis_keys import name_vehicles, parse_rating, rate_case
 from archfem.cases.answers import RESULTS, state_ratings
-from archfem.cases.case import Case
+from archfem.cases.case import Case, sign
 from archfem.cases.defaults import describe_defaults, describe_fill_defaults
 from archfem.cases.run import (
     RATING_FILE,
@@ -409,6 +409,7 @@ def report(options: argparse.Namespace) -> None:
     """Write the report of a result folder, or of a history alone."""
     if options.pdf and str(options.out).lower().endswith(".docx"):
         raise InvalidInput(f"--pdf prints the page, and {options.out} is none: give FILE.html")
+    sign({}, options.changes)  # a wrong key is found before histories are read
     if options.pdf:
         write_progress_line("report", "drawing figures")
     if (history := Path(options.folder)).is_file():
