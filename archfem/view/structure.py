@@ -417,30 +417,29 @@ def _number_stones(axes: Axes, structure: Structure, part: str, inch: float, sig
 def _name_part(axes: Axes, joints: Sequence[Joint], inch: float, top: float) -> None:
     """Write the names of a part and of its joints, as many as fit in legible type below a top."""
     style: dict[str, Any] = {"color": Colour.TEXT, "zorder": 8, "path_effects": white_halo(1.6)}
-    ends = np.array([joint.ends[0] for joint in joints])
-    apart = np.linalg.norm(np.diff(ends, axis=0), axis=1).min() if len(ends) > 1 else np.inf
-    # a line of type takes 0.65 of the spacing
+    outward = -np.array([joint.tangent for joint in joints])
+    # names stand upright in an opening, where they are nearer to one another than joints
+    places = np.array([joint.ends[0] for joint in joints]) + Size.NOTE / 72.0 * inch * outward
+    apart = np.linalg.norm(np.diff(places, axis=0), axis=1).min() if len(joints) > 1 else np.inf
+    # two figures, or a line of type, take 0.65 of the spacing
     fitting = 0.65 * 72.0 * apart / inch
     every = max(1, int(np.ceil(Size.NOTE / fitting)))
     size = min(every * fitting, Size.LABEL)
     names = [short_name(joint.name, joint.part) for joint in joints]
     if max(map(len, names)) > MAX_NAME_LETTERS:  # they would be written over each other
         names = [str(k) for k in range(len(names))]
-    for joint, name in list(zip(joints, names, strict=True))[::every]:
-        outward = -np.array(joint.tangent)
-        angle = float(np.degrees(np.arctan2(outward[1], outward[0])))
-        # a name must not be upside down; vertical ones are read from the right
-        leftward = abs(angle) > 91.0
-        style |= {"rotation": angle - 180.0 * leftward, "rotation_mode": "anchor"}
-        style |= {"ha": "right" if leftward else "left", "va": "center_baseline"}
-        annotate(axes, name, joint.ends[0], 0.5 * size * outward, fontsize=size, **style)
+    for joint, name, way in list(zip(joints, names, outward, strict=True))[::every]:
+        # from the face to the middle of a name, of which a figure is 0.64 of its size wide
+        reach = size * (0.5 + abs(way) @ [0.32 * len(name), 0.4])
+        style |= {"ha": "center", "va": "center_baseline", "fontsize": size}
+        annotate(axes, name, joint.ends[0], reach * way, **style)
     if not joints[0].name.startswith(f"{joints[0].part}, "):
         return
     is_ring = joints[0].role == "ring"
     corners = np.array([joint.ends for joint in joints]).reshape(-1, 2)
     above = is_ring and corners[:, 1].max() > top - 1e-6  # a deck would strike the name through
     place = corners[:, 0].mean(), corners[:, 1].max() if above else corners[:, 1].min()
-    style |= {"rotation": 0.0, "ha": "center", "va": "bottom" if above else "top"}
+    style |= {"fontsize": Size.LABEL, "va": "bottom" if above else "top"}
     annotate(axes, joints[0].part, place, (0.0, 2.0 if above else -1.5 * Size.LABEL), **style)
 
 
