@@ -254,6 +254,8 @@ class NonassociatedBounds:
         if not np.isfinite(lower):
             return "without dilatancy it does not either: no factor is too large"
         weakest, strongest = self.between
+        if f"{lower:.4g}" == f"{weakest:.4g}" == f"{upper:.4g}":
+            return "proved the least, also without dilatancy: equilibrium and mechanism agree"
         limits = f"proved: none is below {lower:.4g}, nor above {upper:.4g}"
         if np.isinf(upper):  # a load that no associated factor limits has a lower bound alone
             limits = f"proved: none is below {lower:.4g}"

@@ -234,10 +234,11 @@ def utilisation_text(structure: Structure, joints: xr.Dataset) -> str:
             stress = float(joint_stress(structure, some)[step, number]) / MPa
     if found is None:
         return "no use of strength is known: all joints hinge or are open, or no strength is given"
+    unknown = "; at hinges it is not computed" * bool((joints["hinge"] != 0).any())
     return (
         f"largest compression at the edge of a joint that does not hinge: {stress:.3f} MPa, "
         f"{largest:.2%} of the stones' strength, {stress / largest:.3g} MPa, in "
-        f"{found['name'].values} at {float(found['time']):.3f} s"
+        f"{found['name'].values} at {float(found['time']):.3f} s{unknown}"
     )
 
 

@@ -1233,3 +1233,12 @@ def test_parts_of_a_bridge_state_the_lengths_that_are_left_out():
     left = {name: value for name, value, mark in rows if mark == "default"}
     assert left["sidewalls"] == "setback 0.4 m"
     assert left["backfill"].startswith("erosion 0 m; length without erosion to either")
+
+
+def test_inputs_name_the_shape_and_what_is_measured_in_words():
+    shape = {"shape": "buttressed_arch", "span": 3.0, "rise": 1.0, "thickness": 0.4}
+    tables = {"structure": {**shape, "voussoirs": 7, "breadth": 0.9, "height": 0.8}}
+    rows = tabulate_inputs(report_data.ReportData(af.Case.of(tables), {})).rows
+    assert ("shape", "buttressed arch", "given") in rows
+    (left,) = (value for name, value, _ in rows if name == "structure")
+    assert "span and rise are those of the intrados" in left

@@ -694,6 +694,8 @@ def test_a_least_factor_found_by_chance_is_doubted(caplog, agreeing, lower, word
     assert words in caplog.text
     least = agreeing or "a descent below them"
     assert f"(by 9 of 21 starting states, the least by {least})" in str(bounds)
+    closed = nonassociated.NonassociatedBounds((0.6, 0.6), (0.6, 0.6), (21, 9), agreeing=agreeing)
+    assert str(closed).startswith("proved the least, also without dilatancy: equilibrium and ")
 
 
 def test_where_dilatancy_locks_a_strut_the_answer_is_the_proven_bound():

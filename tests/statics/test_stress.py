@@ -167,8 +167,11 @@ def test_the_most_loaded_joint_of_a_run_is_named_but_not_a_hinge(stack):
     joints = af.joints.joint_dataset(stack, rows, np.array([0.0, 0.5, 1.0]))
     assert utilisation_text(stack, joints) == (
         "largest compression at the edge of a joint that does not hinge: 0.560 MPa, "
-        "1.00% of the stones' strength, 56 MPa, in joint 1 at 0.500 s"
+        "1.00% of the stones' strength, 56 MPa, in joint 1 at 0.500 s; at hinges it is not computed"
     )
+    rows[2, 0, 2] = 0.0
+    flat = af.joints.joint_dataset(stack, rows, np.array([0.0, 0.5, 1.0]))
+    assert utilisation_text(stack, flat).endswith("in joint 0 at 1.000 s")
     still = af.joints.joint_dataset(stack, 0.0 * rows, np.array([0.0, 0.5, 1.0]))
     assert utilisation_text(stack, still).startswith("no use of strength is known")
 

@@ -54,6 +54,7 @@ _OWN_ROWS = {"width", "gravity", "name"}
 
 # Keys that say little alone, in words
 _WORDS = {
+    "measured": "span and rise are those of the",
     "hump": "length without erosion to either side of the crown",
     "spandrels": "thickness of the spandrel walls in all",
 }
@@ -117,7 +118,9 @@ def _structure_rows(data: ReportData) -> Iterator[Row]:
         if key in ("material", "contact", "width", "gravity"):
             continue
         mark = "inferred" if key in drawn else "given"
-        text = "outlines" if drawn and key == "shape" else describe_value(value, kinds.get(key))
+        text = describe_value(value, kinds.get(key))
+        if key == "shape":
+            text = "outlines" if drawn else _say_key(value)
         if key in ("blocks", "joints"):
             text = f"{len(value)}, by their corners"
         yield key.replace("_", " "), text, mark
