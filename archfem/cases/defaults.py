@@ -148,6 +148,7 @@ def _list_settings(case: Case) -> Iterator[Default]:
         if key in _DECIDING_OF_FILL and not is_given:
             words = f"{key.replace('_', ' ')} {text}"
             yield Default(subject, words, path, "limit analyses and ratings depend on it")
+    yield from list_spectrum_defaults(case)
     reasons = {
         "fidelity": 'elastic blocks, all nodes; "rigid" is quicker, and blocks have no mesh',
         "displacements": 'equilibrium where the blocks stood; "large" follows slips and falls',
@@ -155,6 +156,33 @@ def _list_settings(case: Case) -> Iterator[Default]:
     for key, reason in reasons.items():
         if key not in case.settings.get("model", {}):
             yield Default("", f"{key} '{getattr(analysis, key)}'", f"model.{key}", reason)
+
+
+# What codes leave to the user of a spectrum
+_OF_SPECTRUM = {
+    "type": "2 is for sites where magnitudes above 5.5 contribute little",
+    "topography": "level ground: slopes and ridges amplify",
+}
+
+
+def list_spectrum_defaults(case: Case) -> Iterator[Default]:
+    """List the default values of the spectra of codes."""
+    spectra = {"assessment.spectrum": case.assessment.spectrum, "suite.target": case.target}
+    for path, spectrum in spectra.items():
+        section, name = path.split(".")
+        given = case.settings.get(section, {}).get(name) or {}
+        for key, reason in _OF_SPECTRUM.items():
+            if key not in given and hasattr(spectrum, key):
+                words = f"{key} {getattr(spectrum, key)}"
+                yield Default("spectrum", words, f"{path}.{key}", reason)
+
+
+def describe_spectrum_defaults(case: Case) -> str:
+    """Describe the values that the site's spectrum has by default; empty if it has none."""
+    path = "assessment.spectrum" if case.assessment.spectrum else "suite.target"
+    return ", ".join(
+        each.words for each in list_spectrum_defaults(case) if each.key.startswith(path)
+    )
 
 
 def describe_defaults(case: Case) -> str:

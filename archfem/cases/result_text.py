@@ -19,6 +19,7 @@ from archfem.cases.defaults import (
     describe_defaults,
     describe_fill_defaults,
     describe_margins_at_rest,
+    describe_spectrum_defaults,
     explain_defaults,
 )
 from archfem.cases.run import DeadLoadResult
@@ -531,7 +532,9 @@ def compare_push(case: Case, low: float, high: float, unit: float = 1.0) -> Push
     if case.limit.demand is not None:
         size = f"the demand of {ground:.3g} g"
     elif rock is not None:
+        open_values = describe_spectrum_defaults(case)
         size = f"the site's {rock:.3g} g × S {ground / rock:.3g}"
+        size += f" ({open_values} by default)" * bool(open_values)
     return PushFactors(low * unit / ground, high * unit / ground, size)
 
 

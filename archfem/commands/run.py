@@ -26,7 +26,11 @@ from archfem.cases import result_folder as results
 from archfem.cases.analysis_keys import name_vehicles, parse_rating, rate_case
 from archfem.cases.answers import RESULTS, state_ratings
 from archfem.cases.case import Case, sign
-from archfem.cases.defaults import describe_defaults, describe_fill_defaults
+from archfem.cases.defaults import (
+    describe_defaults,
+    describe_fill_defaults,
+    describe_spectrum_defaults,
+)
 from archfem.cases.run import (
     RATING_FILE,
     DeadLoadResult,
@@ -254,7 +258,9 @@ def assess(options: argparse.Namespace) -> int:
         lines = [x for x in str(result).splitlines() if not x.startswith(DOUBT_MARK)]
         texts.append("\n".join([f"{name}: {lines[0]}", *lines[1:]]))
     of_fill = describe_fill(case.assessment.options.get("fill"), case.structure)
-    texts.append("\n".join(filter(None, [of_fill, describe_fill_defaults(case)])))
+    spectrum = describe_spectrum_defaults(case)
+    spectrum = f"spectrum, by default: {spectrum}" * bool(spectrum)
+    texts.append("\n".join(filter(None, [of_fill, describe_fill_defaults(case), spectrum])))
     text = "\n\n".join(filter(None, [*texts, "\n".join(result_text.mark_remarks(every))]))
 
     def draw() -> Files:

@@ -9,6 +9,7 @@ import archfem as af
 from archfem.cases.case import case_of
 from archfem.cases.defaults import (
     describe_defaults,
+    describe_spectrum_defaults,
     explain_defaults,
     list_default_keys,
     list_defaults,
@@ -46,6 +47,28 @@ def test_a_default_of_many_contacts_is_named_once():
     }
     text = describe_defaults(af.Case.of({"structure": structure}))
     assert "'soil to stone' μ 0.6;" in text
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"code": "EC8", "ag": 0.2, "ground": "B"}, "type 1"),
+        ({"code": "EC8", "ag": 0.2, "ground": "B", "type": 1}, ""),
+        ({"code": "NTC-2018", "ag": 0.2, "f0": 2.4, "tc_star": 0.3, "site": "B"}, "topography 1.0"),
+        ({"code": "table", "periods": [0.0, 1.0], "values": [0.1, 0.2]}, ""),
+    ],
+)
+def test_what_a_spectrum_leaves_open_is_named(given, words):
+    case = af.Case.of({"structure": COLUMN, "assessment": {"spectrum": given}})
+    assert describe_spectrum_defaults(case) == words
+    found = [(each.words, each.key) for each in list_defaults(case) if each.subject == "spectrum"]
+    assert found == [(words, f"assessment.spectrum.{words.split(' ')[0]}")] * bool(words)
+    # that of the assessment is the site's, even where the target of a suite leaves more open
+    target = {"code": "EC8", "ag": 0.2, "ground": "B"}
+    suite = {"target": target, "pairs": {"a": {"synthetic": {"seed": 1, "duration": 1.0}}}}
+    case = af.Case.of({**case.settings, "suite": suite})
+    assert describe_spectrum_defaults(case) == words
+    assert "suite.target.type: type 1: 2 is for sites" in explain_defaults(case)
 
 
 def test_values_that_are_given_are_not():

@@ -929,7 +929,7 @@ def test_a_kinematic_assessment_alone_has_a_report(unplotted, tmp_path, capsys):
 def test_an_assessment_takes_the_fill_of_the_limit_analysis(undrawn, tmp_path, capsys):
     path, folder = tmp_path / "case.toml", tmp_path / "out"
     path.write_text(BRIDGE, encoding="utf-8")
-    assert af.commands.main(["assess", str(path), "--out", str(folder)]) == 3
+    assert af.commands.main(["assess", str(path), "--out", str(folder)]) == 0
     pressed = capsys.readouterr().out
     assert "of the passive pressure, friction angle 35°" in pressed
     margin = (
@@ -942,7 +942,9 @@ def test_an_assessment_takes_the_fill_of_the_limit_analysis(undrawn, tmp_path, c
     assert "assessment: fill that of the limit analysis inferred" in inputs
     assert "limit: fill, mobilisation 0.333 default" in inputs
     code = "by the code horizontal: PGA 0.29 g = 1.16 ag, plateau 0.696 g, T_B 0.147 s, T_C 0.442 s"
-    assert f"assessment: spectrum, {code}, T_D 2.6 s; vertical: PGA 0.169 g" in inputs
+    assert f"assessment: spectrum, {code}, T_D 2.6 s inferred" in inputs  # pushes are horizontal
+    assert "assessment: spectrum topography 1.0 default" in inputs
+    assert "\nspectrum, by default: topography 1.0\n" in pressed
     path.write_text(BRIDGE.replace('fill = { friction_angle = "35 degree" }', ""))
     capsys.readouterr()
     assert af.commands.main(["assess", str(path)]) == 3

@@ -213,7 +213,7 @@ def test_limit_analysis_in_words(ring):
     assert describe_limit(case, endless, lost)[0] is lost
     # 1.15 a_g at the surface
     for case.target, named in (
-        (site, "0.1 g × S 1.15"),
+        (site, "0.1 g × S 1.15 (type 1 by default)"),
         (af.motion.TableSpectrum([0.0, 1.0], [0.1, 0.2]), "0.1 g"),
     ):
         ratio = pushed.factor / float(case.target.horizontal(0.0))

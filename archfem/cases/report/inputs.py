@@ -16,6 +16,7 @@ from archfem.cases.defaults import (
     list_fill_values,
     list_finish_ranges,
     list_materials_and_contacts,
+    list_spectrum_defaults,
     value_text,
 )
 from archfem.cases.motion_keys import MADE
@@ -314,7 +315,7 @@ def _command_rows(data: ReportData) -> Iterator[Row]:
 def _further_rows(data: ReportData, section: str, table: Mapping[str, Any]) -> Iterator[Row]:
     """Yield what a spectrum, the fill of an assessment and the vehicle of a rating imply."""
     if section == "assessment" and "spectrum" in table:
-        yield from _spectrum_rows("assessment: spectrum", data.case.assessment.spectrum)
+        yield from _spectrum_rows(data, "assessment", data.case.assessment.spectrum)
     if section == "assessment":
         for key in data.case.assessment.of_limit:
             yield f"assessment: {key}", "that of the limit analysis", "inferred"
@@ -367,13 +368,20 @@ def _target_rows(data: ReportData) -> Iterator[Row]:
     """Yield the target spectrum of a suite, which may be the demand of static analyses alone."""
     target = data.case.settings.get("suite", {}).get("target")
     yield "target spectrum", describe_value(target) if target else "none", _mark(bool(target))
-    yield from _spectrum_rows("target spectrum", data.case.target)
+    yield from _spectrum_rows(data, "suite", data.case.target)
 
 
-def _spectrum_rows(name: str, spectrum: Any) -> Iterator[Row]:
-    """Yield what follows from the code of a spectrum."""
+def _spectrum_rows(data: ReportData, section: str, spectrum: Any) -> Iterator[Row]:
+    """Yield the default values of a spectrum, and what follows from its code."""
+    name = {"assessment": "assessment: spectrum", "suite": "target spectrum"}[section]
+    for each in list_spectrum_defaults(data.case):
+        if each.key.startswith(section):
+            yield name, each.words, "default"
     if isinstance(spectrum, CodeSpectrum):
-        yield f"{name}, by the code", spectrum.describe(), "inferred"
+        text = spectrum.describe()
+        if section == "assessment" or data.is_static:
+            text = text.partition("; vertical")[0]  # pushes are horizontal
+        yield f"{name}, by the code", text, "inferred"
 
 
 def _source_rows(motions: Sequence[Mapping[str, Any]]) -> Iterator[Row]:
