@@ -14,6 +14,7 @@ from archfem.limit.collapse import describe_crushing
 from archfem.limit.instability import explain_instability, geometric_factor
 from archfem.limit.thickness import minimum_thickness
 from archfem.masonry.ring_thickness import Ring
+from archfem.masonry.standing import find_bodies
 from archfem.masonry.structure import Structure, describe_spans, join_names
 from archfem.units import format_mm
 
@@ -50,12 +51,19 @@ def describe_depths(structure: Structure) -> str:
     )
 
 
+def _has_bond(structure: Structure) -> bool:
+    """Return whether stones are in bond, and not pieces of fill alone."""
+    pairs = structure.pairs[structure.heads]
+    return any(not structure.blocks[number].grain for number in pairs.ravel())
+
+
 def _name_slivers(structure: Structure, share: float = 0.25) -> str:
     """Return a line on stones of a wall in bond that are far shorter than most; else nothing."""
-    lengths = {each.name: np.ptp(each.points[:, 0]) for each in structure.blocks if not each.fixed}
+    stones = [each for each in structure.blocks if not (each.fixed or each.grain)]
+    lengths = {each.name: np.ptp(each.points[:, 0]) for each in stones}
     usual = float(np.median([*lengths.values()]))
     slivers = [f"'{k}' ({format_mm(x)})" for k, x in lengths.items() if x < share * usual]
-    if not slivers or not structure.heads.any():
+    if not slivers or not _has_bond(structure):
         return ""
     return (
         f"\nstones shorter than {share:g} of the usual {format_mm(usual)}: {join_names(slivers)}; "
@@ -68,7 +76,11 @@ def _describe_bearing(structure: Structure) -> str:
     found, beds = [], np.flatnonzero(~structure.heads)
     pairs = structure.pairs[beds]
     above = pairs[np.arange(len(beds)), structure.centroids[pairs, 1].argmax(axis=1)]
-    for number in np.unique(above) if structure.heads.any() else ():
+    bodies = find_bodies(structure)
+    for number in np.unique(above) if _has_bond(structure) else ():
+        block = structure.blocks[number]
+        if block.grain or block.name in bodies:
+            continue
         ends = np.sort(structure.ends[beds[above == number], :, 0], axis=1)
         ends = ends[ends[:, 0].argsort()]
         gaps = ends[1:, 0] - ends[:-1, 1]
@@ -77,7 +89,7 @@ def _describe_bearing(structure: Structure) -> str:
             bearing = float((ends[[*edges, -1], 1] - ends[[0, *(edges + 1)], 0]).min())
             # NHBC Standards 2020, 6.1.12, table 5: lintels of steel or concrete
             usual = 0.10 if gaps.max() <= 1.2 else 0.15
-            found.append((bearing / usual, bearing, usual, structure.blocks[number].name))
+            found.append((bearing / usual, bearing, usual, block.name))
     if not found:
         return ""
     share, bearing, usual, name = min(found)

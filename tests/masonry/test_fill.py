@@ -9,6 +9,7 @@ import shapely
 from backfilled import arch_bridge
 
 import archfem as af
+from archfem.cases.structure_text import describe_depths
 from archfem.masonry import BACKFILL, SOIL_TO_STONE, jointed_fill
 from archfem.masonry.backfill import _incentre, _merge_slivers, _Piece, _tile_box
 from archfem.masonry.stiffness_ratio import find_soft_blocks, find_yielding_blocks
@@ -212,6 +213,7 @@ def test_of_a_vehicle_on_given_fill_no_pieces_lock_whether_it_is_cut_or_not(capl
     assert np.isinf(factors[0]).any()
     assert factors[1] == pytest.approx(factors[0], rel=1e-6)
     assert "lock" not in caplog.text
+    assert "lintel" not in describe_depths(pieces)
 
 
 @pytest.mark.slow

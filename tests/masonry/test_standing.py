@@ -8,6 +8,7 @@ import pytest
 from backfilled import arch_bridge, rectangle, row_of_stones
 
 import archfem as af
+from archfem.cases.structure_text import describe_depths
 from archfem.limit import Fill
 from archfem.masonry import StandingBody, carrying
 
@@ -155,6 +156,8 @@ def test_a_body_on_a_wall_overturns_about_its_own_base():
     found = af.collapse_factor(carrying(wall, [body]), live=af.BodyForce(1.0), friction=None)
     assert found.factor == pytest.approx(0.2)
     assert found.hinge_names == (f"{wall.blocks[-1].name} to statue",)
+    bond = af.shapes.wall(breadth=4.0, height=2.0, eaves=2.0, course=0.25, stone=0.5, width=1.0)
+    assert "lintel" not in describe_depths(carrying(bond, [replace(TRUCK, width=None)]))  # its gaps
 
 
 def test_a_body_stands_on_all_that_is_level_below_it_and_on_other_bodies():
