@@ -34,7 +34,7 @@ from archfem.limit.fill_strength import Fill, PlasticFill, as_pressure, has_back
 from archfem.limit.mechanism_count import Mechanism, duration_text
 from archfem.limit.rating import Rating
 from archfem.masonry.loads import Action, Settlement, describe_massless
-from archfem.masonry.standing import describe_carried, find_bodies
+from archfem.masonry.standing import describe_carried, describe_widths, find_bodies
 from archfem.masonry.structure import (
     CLEAR_TURNS,
     UNCHECKED_ACROSS,
@@ -342,7 +342,7 @@ def note_masses(
     parapets: float = 0.0,
 ) -> list[str]:
     """Return notes on loads that are not pushed as weights are, and on masses at other heights."""
-    words = [describe_massless(live, dead), describe_carried(structure)]
+    words = [describe_massless(live, dead), describe_carried(structure), describe_widths(structure)]
     if parapets and not any("parapet" in name.lower() for name in find_bodies(structure)):
         points = np.concatenate([structure.blocks[number].points for number in structure.free])
         weight = parapets * float(np.ptp(points[:, 0]))

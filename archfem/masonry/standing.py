@@ -22,7 +22,7 @@ from archfem.masonry.block import Block, as_point
 from archfem.masonry.materials import COURSE_LENGTH, SOIL_TO_STONE, Contact, Material
 from archfem.masonry.stiffness_ratio import list_stones
 from archfem.masonry.structure import CONTACT_TOLERANCE, Joint, Structure, join_names
-from archfem.units import GPa
+from archfem.units import GPa, kN
 
 
 def parse_axles(axles: float | Sequence[float], spacings: Sequence[float]) -> Array:
@@ -186,6 +186,19 @@ def describe_carried(structure: Structure) -> str:
         "where it is higher, the structure moves at less than computed; as blocks of its own, or "
         "in an assessment as [assessment] loads, it acts at its height"
     )
+
+
+def describe_widths(structure: Structure) -> str:
+    """Describe at which weight bodies on less than the whole width count; empty for none."""
+    _, arguments = structure.origin or ("", {})
+    words = [
+        f"'{body.name}' of {body.total / kN:.4g} kN counts as "
+        f"{body.total / kN * structure.width / body.width:.4g} kN: by the whole width of "
+        f"{structure.width:g} m over its {body.width:g} m"
+        for body in arguments.get("standing", ())
+        if body.width and body.width < structure.width
+    ]
+    return "; ".join(words)
 
 
 @validate_arguments

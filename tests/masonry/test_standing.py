@@ -8,6 +8,7 @@ import pytest
 from backfilled import arch_bridge, rectangle, row_of_stones
 
 import archfem as af
+from archfem.cases.result_text import note_masses
 from archfem.cases.structure_text import describe_depths
 from archfem.limit import Fill
 from archfem.masonry import StandingBody, carrying
@@ -36,6 +37,9 @@ def test_a_body_has_its_weight_at_its_centre_of_gravity_on_a_joint_to_the_road()
     assert block.centroid == pytest.approx([4.0, road + 0.8])
     # 50 kN on half a metre of a width of two
     assert loaded.weight - bridge.weight == pytest.approx(200e3)
+    line = "note: 'lorry' of 50 kN counts as 200 kN: by the whole width of 2 m over its 0.5 m"
+    assert note_masses(loaded) == [line]
+    assert note_masses(carrying(bridge, [replace(LORRY, width=None)])) == []
     assert (joint.name, joint.part, joint.role) == ("backfill to lorry", "lorry", "other")
     assert np.sort(joint.ends[:, 0]) == pytest.approx([3.25, 4.75])
     assert (loaded.blocks[:-1], loaded.joints[:-1]) == (bridge.blocks, bridge.joints)
