@@ -167,16 +167,16 @@ def _compare_rigid_blocks(
 
 
 def state_rigid_falls(doubt: Doubt, falls: Sequence[tuple[float, Sequence[Doubt]]]) -> Doubt:
-    """Return the doubt that rigid blocks stand with the scale from which they fall too.
+    """Return the doubt that rigid blocks stand with a larger scale at which they fall too, if any.
 
-    Falls are by their scale, with the doubts of each; other doubts are returned as they are.
+    Falls that were compared are by their scale, with the doubts of each; other doubts are returned
+    as they are.
     """
-    if doubt.words != RIGID_STAND:
-        return doubt
     alone = [scale for scale, doubts in falls if any(x.words == RIGID_STAND for x in doubts)]
-    if not (both := [scale for scale, _ in falls if scale > max(alone, default=0.0)]):
-        return replace(doubt, words=f"{doubt.words}; nor do they at a larger scale that was run")
-    words = f"{doubt.words}; where it falls at {{:#.3g}} × the motion and more, they fall too"
+    both = [scale for scale, _ in falls if scale > max(alone, default=0.0)]
+    if doubt.words != RIGID_STAND or not both:
+        return doubt
+    words = f"{doubt.words}; where it falls at {{:#.3g}} × the motion, they fall too"
     return replace(doubt, words=words, values=(*doubt.values, min(both)))
 
 

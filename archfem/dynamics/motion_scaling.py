@@ -11,7 +11,7 @@ from archfem._display import call_late_bound
 from archfem._files import align_columns
 from archfem._validation import validate_arguments, validate_methods
 from archfem.dynamics.analysis import Analysis, takes_analysis, takes_falling_analysis
-from archfem.dynamics.collapse_state import doubt_soft_blocks, name_stones
+from archfem.dynamics.collapse_state import FALLEN_STATES, doubt_soft_blocks, name_stones
 from archfem.dynamics.events import EveryMechanism, applicable_definitions
 from archfem.dynamics.fall import state_rigid_falls
 from archfem.dynamics.history import Ending, History, first_mechanisms, partial_history
@@ -129,6 +129,17 @@ def _run_as_far(model: Model | Analysis, motion: Motion, **options: Any) -> Hist
         return history
 
 
+def _shake_until_lost(shake: Callable[..., History]) -> tuple[History, bool]:
+    """Return a run, which a fall ends with its first lost block, and whether it is whole."""
+    run = shake(record=Record(whole_fall=False))
+    if "fall_step" not in run.dataset.attrs:  # no block became loose
+        return run, True
+    fell = run.fall is not None and run.fall.kind in FALLEN_STATES
+    if fell or run.ending is Ending.INTERRUPTED:
+        return run, False
+    return shake(), True  # where none was lost, several lengths of steps count
+
+
 @validate_methods
 @dataclass(frozen=True)
 class CollapseScale:
@@ -222,12 +233,17 @@ class CollapseScale:
             if high == inf:
                 words, ends = "a time step finds a fall at {:#.3g} ×, and another none", (low, low)
             doubts.append(Doubt(words, "", (ends,)))
-        longer = {dt: x for dt, x in self.longer.items() if x[COLLAPSE_DEFINITION].upper == low}
-        every = {**longer, **self.searches}
+        every = {
+            dt: replace(search, runs=(run,))
+            for dt, search in self.longer.items()
+            if (run := search[COLLAPSE_DEFINITION].run) and run.scale == low
+        }
+        every |= self.searches
         searches = {f"by {1e3 * dt:g} ms": search for dt, search in every.items()}
         of_runs = doubt_searches(searches, COLLAPSE_DEFINITION)
         doubts += [x for x in of_runs if replace(x, place="") not in self.of_model]
-        falls = [(run.scale, run.doubts) for run in self._runs if run.fails(COLLAPSE_DEFINITION)]
+        whole = (run for run in self._runs if run.fails(COLLAPSE_DEFINITION) and run.whole)
+        falls = [(run.scale, run.doubts) for run in whole]
         return tuple(state_rigid_falls(doubt, falls) for doubt in doubts)
 
     @property
@@ -386,11 +402,12 @@ class CollapseScale:
                 "as given",
                 f"{fall.kind}{fall.dislocated_stones}" if fall else "no answer",
                 f"{fall.time:.2f} s" if fall and fall.time is not None else "-",
-                f"{fall.residual:.3g} m" if fall else "-",
+                f"{fall.residual:.3g} m" if fall and run.whole else "-",
             ]
             for dt, search in self._every.items()
             for run in search.runs
-            for fall in [run.fall]
+            # a fall that was not followed may be of more parts
+            for fall in [run.fall if run.whole or not run.fall else replace(run.fall, kind="falls")]
         ]
         return ["step", "scale", "properties", "the structure", "at", "residual"], rows
 
@@ -403,13 +420,19 @@ class CollapseScale:
 SearchStep = Callable[[float, Sequence[float], MechanismScales | None], MechanismScales]
 
 
-def _search_steps(search: SearchStep, steps: Sequence[float]) -> dict[float, MechanismScales]:
-    """Search with each time step, and again around a fall that another one has jumped over."""
+def _search_steps(
+    search: SearchStep, steps: Sequence[float], shortens: bool
+) -> dict[float, MechanismScales]:
+    """Search with each time step, and again around a fall that another one has jumped over.
+
+    A first step that is too long for sliding ends it, where shorter ones come after.
+    """
     searches: dict[float, MechanismScales] = {}
     first = 1.0
     for step in steps:
         searches[step] = search(step, [first], None)
-        if searches[step].interrupted:
+        too_long = shortens and _admissible_step(searches) < steps[0]
+        if searches[step].interrupted or too_long:
             return searches
         # the next search begins near this fall, and its scales lie between those of this one
         least = searches[step][COLLAPSE_DEFINITION].upper
@@ -496,14 +519,25 @@ def collapse_scale(
     if not steps:
         raise InvalidInput("dt = () has no step: give one or two")
 
+    known = dict[tuple[float, float], ScaledRun]()
+
     def run_scaled(step: float, scale: float) -> ScaledRun:
-        if kept := (made or {}).get((step, scale)):
-            return kept
-        run = _run_as_far(model, motion.scaled(scale), start=begin, damping=damping, dt=step)
+        key = step, scale
+        again = known.get(key)  # to its end
+        if (kept := again or (made or {}).get(key)) and (kept.whole or again is None):
+            return known.setdefault(key, kept)
+        # one that hardly falls is not broken off first
+        held = (run.scale for run in known.values() if run.survives(COLLAPSE_DEFINITION))
+        to_end = again or scale <= max(held, default=0.0)
+        given = {"start": begin, "damping": damping, "dt": step}
+        shake = partial(_run_as_far, model, motion.scaled(scale), **given)
+        run, whole = (shake(), True) if to_end else _shake_until_lost(shake)
         met, follows = run.mechanisms, run.dataset.attrs.get("admissible_step", inf)
         # one too small to matter does not move the structure
         met = {name: found and found.decisive for name, found in met.items()}
-        return ScaledRun(scale, met, run.ending, run.outcome, run.fall, run.doubts, follows)
+        ended = run.ending, run.outcome, run.fall, run.doubts, follows, whole
+        known[key] = ScaledRun(scale, met, *ended)
+        return known[key]
 
     limits, limit = admissible_range(between, motion), (COLLAPSE_DEFINITION,)
 
@@ -511,11 +545,11 @@ def collapse_scale(
         run = partial(run_scaled, step)
         return search_scales(run, limit, precision, limits, at, found, motion.name)
 
-    searches, longer = _search_steps(search, steps), dict[float, MechanismScales]()
+    searches, longer = _search_steps(search, steps, shortens), dict[float, MechanismScales]()
     while shortens and (shorter := _admissible_step(searches)) < steps[0]:
         longer |= searches
         steps = [shorter, 0.5 * shorter]
-        searches = _search_steps(search, steps)
+        searches = _search_steps(search, steps, shortens)
     largest = max([limits[0], *(run.scale for x in searches.values() for run in x.runs)])
     as_one = find_first_fall(model.structure, motion, (limits[0], largest))
     return CollapseScale(searches, motion.pga, doubt_soft_blocks(model.structure), longer, as_one)

@@ -3,7 +3,8 @@
 Incremental dynamic analysis: runs at increasing and decreasing scales until each limit state is
 bracketed, then at the geometric mean of the widest bracket. A structure may stand at a larger scale
 than one at which it falls. Hence runs also fill the gaps between scales below the smallest fall;
-where one falls, the search continues below it.
+where one falls, the search continues below it. A run that falls ends with its first lost block. The
+smallest fall is then repeated to its end, with the checks of a whole fall.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -47,6 +48,7 @@ class ScaledRun:
     fall: CollapseState | None = None  # state of collapse; None for small displacements
     doubts: tuple[Doubt, ...] = ()
     admissible_step: float = inf  # that follows sliding, where that of the run does not [s]
+    whole: bool = True  # whether its fall was followed beyond the first lost block
 
     def has_answer(self, definition: str) -> bool:
         """Return whether the run decides on a limit state: on a fall by a state of collapse."""
@@ -140,8 +142,9 @@ class MechanismScales:
         return {(self.dt, run.scale): run for run in self.runs}
 
     def with_run(self, run: ScaledRun) -> "MechanismScales":
-        """Return the search with one more run."""
-        return replace(self, runs=tuple(sorted([*self.runs, run], key=lambda each: each.scale)))
+        """Return the search with one more run, in place of one at its scale."""
+        others = [each for each in self.runs if each.scale != run.scale]
+        return replace(self, runs=tuple(sorted([*others, run], key=lambda each: each.scale)))
 
     def __getitem__(self, definition: str) -> Bracket:
         """Bracket of a definition; without bounds if the structure has too few joints for it."""
@@ -262,7 +265,8 @@ def search_scales(
 
     Nor is the gap below the smallest dislocation, where falls are searched.
 
-    The first ones are at `begin`; those that were `found` before are kept.
+    The first ones are at `begin`; those that were `found` before are kept. The smallest fall is run
+    again if it is not whole.
     """
     scales, made = found or MechanismScales(definitions), ""
     try:
@@ -313,7 +317,17 @@ def _next_below_fall(scales: MechanismScales, precision: float, smallest: float)
 def _next_scale(
     scales: MechanismScales, precision: float, between: tuple[float, float], begin: Sequence[float]
 ) -> float | None:
-    """Return the scale of the next run, or None."""
+    """Return the scale of the next run, which repeats the smallest fall at last, or None."""
+    if (scale := _next_new_scale(scales, precision, between, begin)) is not None:
+        return scale
+    fall = scales[COLLAPSE_DEFINITION].run
+    return None if fall is None or fall.whole else fall.scale
+
+
+def _next_new_scale(
+    scales: MechanismScales, precision: float, between: tuple[float, float], begin: Sequence[float]
+) -> float | None:
+    """Return a scale that was not run, or None."""
     runs, (smallest, largest) = scales.runs, between
     ratio, max_runs = sqrt(2.0), 40  # ratio of scales before bisection
     first = [min(max(scale, smallest), largest) for scale in begin]
