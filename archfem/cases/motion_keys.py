@@ -228,11 +228,12 @@ def _parse_source(table: Any, keys: Table, section: str) -> dict[str, Any]:
     if source in MADE:
         keys = declared_keys(MADE[source])
         settings[source] = check_table(settings[source], keys, f"{section}.{source}")
-        read_object(MADE[source], settings[source], f"{section}.{source}")
     # Keys that describe a file are errors beside another source; samples have a step.
     of_files = {"column", "units", "response"} | ({"dt"} if source in MADE else set())
     if unused := sorted(of_files & set(settings) if source != "file" else ()):
         raise InvalidInput(f"{section}.{unused[0]} belongs to a file, not to {source}")
+    if source == "held":  # its keys depend on each other, and one has no default
+        read_object(MADE[source], settings[source], f"{section}.{source}")
     if source == "samples" and "dt" not in settings:
         raise InvalidInput(f'{section}.samples needs the time between them, e.g. dt = "5 ms"')
     return settings

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import archfem as af
+from archfem.cases import motion_keys
 from archfem.cases.provenance import hash_inputs, hash_sections
 from archfem.cases.structure_keys import cached_structure
 from archfem.dynamics import StiffnessDamping
@@ -92,7 +93,7 @@ def test_motions_are_read_once_at_any_scale_and_scaled_as_by_the_case(monkeypatc
         made.append(given)
         return synthetic(**given)
 
-    monkeypatch.setattr(af.Motion, "synthetic", noted)
+    monkeypatch.setitem(motion_keys.MADE, "synthetic", noted)
     cases = [case(motion__scale=scale) for scale in (0.3, 1.7)]
     found = [cache.ground_motion(each) for each in cases]
     assert len(made) == 1

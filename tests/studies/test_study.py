@@ -691,7 +691,7 @@ def test_what_is_not_proved_least_is_marked(tmp_path, capsys):
     shapes = {
         "stack": 'shape = "column"\nbreadth = 1.0\nheights = [1.0, 1.0]\n',
         "bond": 'shape = "wall"\nbreadth = 0.5\nheight = 0.6\nstone = 0.5\n'
-        "course = 0.3\nwidth = 1.0\n",
+        "course = 0.3\nwidth = 0.5\n",
     }
     path, folder, cases = tmp_path / "study.toml", tmp_path / "out", ""
     for name, keys in shapes.items():
