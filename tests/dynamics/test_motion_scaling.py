@@ -676,7 +676,7 @@ def test_a_search_continues_from_its_runs(monkeypatch, large):
     made, compute = [], motion_scaling.time_history
 
     def shake(*given, **settings):
-        made.append(settings["dt"])
+        made.append((settings["dt"], given[1].pga, "record" in settings))
         if len(made) == 3:
             raise KeyboardInterrupt
         return compute(*given, **settings)
@@ -687,7 +687,9 @@ def test_a_search_continues_from_its_runs(monkeypatch, large):
     assert len(begun.kept_runs) == 2
     found = search(model, tap, made=begun.kept_runs, **options)
     assert not found.interrupted
-    assert len(made) == 1 + len(found.kept_runs)
+    # none twice but the one that was interrupted, and falls that are repeated to their end
+    assert len(made) == 1 + len(set(made))
+    assert len({(dt, pga) for dt, pga, _ in made}) == len(found.kept_runs)
     assert found == search(model, tap, **options)
     if large == "large":  # after Ctrl-C no shorter step is tried, either
         del made[2:], options["dt"]
