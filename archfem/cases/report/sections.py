@@ -495,7 +495,7 @@ def build_source_section(data: ReportData) -> Section:
     rows = [("computed with", text) for text in made]
     rows += [] if made == [own] else [("report written with", own)]
     rows += [
-        (f"SHA-256 of case, files and program: {name}", str(run.dataset.attrs["inputs"]))
+        (f"SHA-256 of the inputs: {name}", str(run.dataset.attrs["inputs"]))
         for name, run in runs
         if "inputs" in run.dataset.attrs
     ]

@@ -74,3 +74,11 @@ def test_text_in_columns_breaks_anywhere(lines, kept):
     page = Document("", "", [], [Section("", [TextBlock(f"title\n\n{table}", "lines")])]).page
     assert page.count('<span class="table">') == kept
     assert page.count('<pre class="long">') == 1 - kept
+
+
+@pytest.mark.parametrize(("letters", "kept"), [(60, 1), (100, 0)])
+def test_a_list_of_terms_of_more_than_a_few_lines_breaks(letters, kept):
+    """Kept whole it would leave a third of a page empty, as digests of inputs did."""
+    rows = [("SHA", "0" * letters)] * 6
+    page = Document("", "", [], [Section("", [Grid((), rows)])]).page
+    assert page.count('class="terms whole"') == kept
