@@ -160,13 +160,14 @@ def test_outlines_by_place_can_be_left_out(tmp_path):
     assert (len(survey.blocks), survey.ignored["keystone"]) == (17, 1)
 
 
-def case(tmp_path, **structure):
-    given = {"shape": "outlines", "file": "x.geojson"} | structure
-    return af.Case.of({"structure": given, "contacts": {"pad": PAD}, "materials": RUBBER}, tmp_path)
-
-
-PAD = {"normal_stiffness": 1e9, "shear_stiffness": 1e8}
+PAD = {"pad": {"normal_stiffness": 1e9, "shear_stiffness": 1e8}}
 RUBBER = {"rubber": {"young": 1e8, "poisson": 0.4, "unit_weight": 12e3}}
+ON_PADS = {"contacts": PAD, "materials": RUBBER}
+
+
+def case(tmp_path, properties=ON_PADS, **structure):
+    given = {"shape": "outlines", "file": "x.geojson"} | structure
+    return af.Case.of({"structure": given, **properties}, tmp_path)
 
 
 def test_case_of_a_survey(tmp_path):
@@ -198,7 +199,7 @@ def test_soil_meets_stone_as_the_preset_says(tmp_path):
     table = json.loads(path.read_text())
     table["features"][0]["properties"]["material"] = "stone"
     path.write_text(json.dumps(table))
-    for joints in (case(tmp_path).structure.joints, af.masonry.surveyed(path).joints):
+    for joints in (case(tmp_path, {}).structure.joints, af.masonry.surveyed(path).joints):
         assert [joint.contact for joint in joints] == [
             af.masonry.SOIL_TO_STONE,
             af.masonry.STONE_TO_STONE,

@@ -194,7 +194,7 @@ class RigidBlockSimulation:
         steps = int(np.ceil((end - start.time) / dt - 1e-6))
         anchor, since = start.poses, start.time
         still = 0.0 if motion is None else end - motion.duration
-        after = f" ({still:.3g} s after the motion)" * (still > 0.0)
+        after = f" ({still:.3g} s after the motion)" * bool(still > 0.0)
         with ProgressReport("loose blocks", end - start.time, rarely=True) as progress:
             for first, last in pairwise([*range(0, steps, stride), steps]):
                 middles = start.time + dt * (np.arange(first, last) + 0.5)
