@@ -642,7 +642,9 @@ def _find_failing(
     least = 1e-6 * blocks.largest_displacement(motion)  # above the round-off of the programme
     intrados, extrados, slip = blocks.gaps(motion)
     dilation = np.where(abs(slip) > 0.0, blocks.structure.friction, 0.0) * abs(slip)
-    apart = np.minimum(intrados, extrados) - dilation > least
+    # sliding faces touch flat, or ride up by associated flow
+    gap = np.minimum(intrados, extrados)
+    apart = (gap > least) & (abs(gap - dilation) > least)
     turning = (abs(extrados - intrados) > least) & ~apart
     hinges = tuple(
         (regions.joints[j], "intrados" if intrados[j] < extrados[j] else "extrados")

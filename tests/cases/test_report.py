@@ -759,7 +759,7 @@ def test_stiffness_by_a_finish_is_inferred_and_numbers_have_their_units():
     ]
     held = af.Case.of({**tables, "motion": {"held": {"push": "3 m/s**2"}}})
     rows = tabulate_inputs(report_data.ReportData(held, {})).rows
-    assert [row for row in rows if row[0].startswith("motion")] == [
+    assert [row for row in rows if row[0] == "motion, held"] == [
         ("motion, held", "push 3 m/s²", "given"),
         ("motion, held", "rise 1 s; duration 10 s; dt 0.005 s", "default"),
     ]

@@ -517,6 +517,9 @@ def test_a_wedge_of_a_wall_in_bond_has_the_linear_check_alone(wedge, verified):
     expected = {"alpha_0": factor, "e_star": share, "a_0_star": acceleration}
     expected["M_star"] = share * weights[moves].sum() / G
     check_values(found, expected, verified, "wedge of a wall in bond", 1e-6)
+    # joints that have come apart, by less than μ of their slip too, neither slide nor turn
+    assert set(limit.sliding) == set(found.sliding)
+    assert {k for k, _ in limit.hinges} - set(limit.sliding) == {k for k, _ in found.hinges}
     associated = af.collapse_factor(wall, live=af.BodyForce(1.0)).factor
     assert found.alpha_0 == pytest.approx(limit.factor, rel=1e-9)
     assert found.alpha_0 < 0.999 * associated
