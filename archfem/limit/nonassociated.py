@@ -62,7 +62,10 @@ MAX_BOUND_ROUNDS, MIN_BOUND_CHANGE = 50, 1e-5
 # Relative gap that counts as zero [-]: programmes are solved to 1e-9
 GAP_TOLERANCE = 1e-7
 
-# The same with crushing, whose cuts leave objectives uncertain by 2e-5 or so [-]
+# Relative gap of the nearest iterate that stands in where no start leads to a solution [-]
+NEAR_GAP_TOLERANCE = 1e-3
+
+# Relative gap that counts as zero with crushing, whose cuts leave objectives uncertain by 2e-5 [-]
 CRUSHING_GAP_TOLERANCE = 1e-4
 
 # Preference for a weak objective, as a share of it, first and where that holds the gap open [-]
@@ -91,7 +94,10 @@ class AlternatingIterate:
 def find_solution(
     programme: Programme, forces: Array, max_alternations: int = 30
 ) -> AlternatingIterate | None:
-    """Find a solution without dilatancy from given forces; None if the duality gap stagnates."""
+    """Find a solution without dilatancy from given forces, or an iterate near one.
+
+    None if the duality gap stagnates above a thousandth of the objective.
+    """
     smallest, preference = np.inf, WEAK_PREFERENCE
     for _ in range(max_alternations):  # most end within three
         iterate = _alternate(programme, programme, forces, preference=preference)
@@ -101,8 +107,9 @@ def find_solution(
         smallest = iterate.gap
         if stagnates:
             # the preference may hold a gap of that share of the objective open
-            if preference < WEAK_PREFERENCE or smallest > preference * abs(iterate.state.value):
-                return None
+            value = abs(iterate.state.value)
+            if preference < WEAK_PREFERENCE or smallest > preference * value:
+                return iterate if smallest <= NEAR_GAP_TOLERANCE * value else None
             smallest, preference = np.inf, LEAST_PREFERENCE
     return None
 
@@ -266,6 +273,8 @@ class NonassociatedBounds:
         if np.isnan(weakest):
             return f"{tried} starting states led to no solution without dilatancy; {limits}"
         least = str(self.agreeing or "a descent below them")
+        if not successful and self.gap > GAP_TOLERANCE:
+            least = f"a state near one, whose work balances within {100.0 * self.gap:.1g} %"
         return (
             f"solutions without dilatancy found from {weakest:.4g}, the least, to {strongest:.4g} "
             f"(by {successful} of {tried} starting states, the least by {least}); {limits}"
@@ -383,7 +392,9 @@ def _search(
             raise
         interrupted = True
     limits = scale * associated, scale * max(associated, found.bound)
-    solutions, successful = [*found.solutions, *found.weaker], len(found.solutions)
+    reached = [*found.solutions, *found.weaker]
+    solutions = [each for each in reached if each.converged] or reached
+    successful = sum(each.converged for each in found.solutions)
     values = [scale * iterate.state.value for iterate in solutions] or [np.nan]
     bounds = NonassociatedBounds(
         (min(limits), max(limits)),
@@ -404,6 +415,8 @@ def _search_solutions(programme: Programme, start: Optimum | None, found: _Searc
     """Bound the objective; unless that proves a solution, search from all starts and descend."""
     joints = len(programme.blocks.structure.depths)
     known = None if start is None else find_solution(programme, start.forces)
+    if known is not None and not known.converged:
+        known = None
     if known is not None:
         found.tried, found.solutions = 1, [known]
     state = start if known is None else known.state
@@ -465,17 +478,20 @@ def _free_head_joints(programme: Programme) -> list[Array]:
 def _find_solutions(
     programme: Programme, starts: Sequence[Array], progress: ProgressReport | None = None
 ) -> list[AlternatingIterate]:
-    """Return the solutions to which given forces lead; Ctrl-C raises with those so far."""
-    solutions, number = list[AlternatingIterate](), 1
+    """Return the solutions to which given forces lead; Ctrl-C raises with those so far.
+
+    Where there is none, the iterate nearest to one stands in.
+    """
+    solutions, near, number = list[AlternatingIterate](), list[AlternatingIterate](), 1
     try:
         for number, forces in enumerate(starts, start=1):
             if progress is not None:
                 progress.show(f"start {number} of {len(starts)}", done=1)
             if (iterate := find_solution(programme, forces)) is not None:
-                solutions.append(iterate)
+                (solutions if iterate.converged else near).append(iterate)
     except KeyboardInterrupt as error:
         raise Interrupted((number - 1, solutions)) from error
-    return solutions
+    return solutions or sorted(near, key=lambda iterate: iterate.gap)[:1]
 
 
 def find_weakest(programme: Programme, starts: Sequence[Array]) -> Optimum | None:

@@ -790,6 +790,49 @@ def test_bounds_are_those_of_the_weakest_and_the_strongest_solution(monkeypatch)
     assert bounds.bracket[1] == pytest.approx(optimum.unknowns[0])
 
 
+def test_a_state_near_a_solution_stands_in_where_there_is_none(monkeypatch):
+    """All starts stagnate at gaps of the work of 0.03 % or more; the least one is stated."""
+    programme, optimum = programmed(ring(voussoirs=5))
+    stalled = iter([3e-4, 1e-4, *[2e-4] * 100])
+
+    def stagnate(*_, **__):
+        return nonassociated.AlternatingIterate(
+            replace(optimum, value=-0.4), 0.4 * next(stalled), False
+        )
+
+    monkeypatch.setattr(nonassociated, "find_solution", stagnate)
+    monkeypatch.setattr(nonassociated, "descend", lambda *given, **options: iter([]))
+    state, bounds = nonassociated.search_nonassociated(programme, optimum, -1.0)
+    assert (state.value, bounds.between, bounds.starts[1]) == (-0.4, (0.4, 0.4), 0)
+    assert bounds.gap == pytest.approx(2e-4)
+    assert "the least by a state near one, whose work balances within 0.02 %" in str(bounds)
+
+
+@pytest.mark.slow
+def test_a_wall_without_a_solution_by_any_start_has_one_below_the_nearest_state():
+    """All starts of a front with doors and a window stagnate; with more friction some do not."""
+    openings = [
+        af.shapes.Opening(left=left, breadth=breadth, head=head, sill=sill, name=name)
+        for name, left, breadth, sill, head in (
+            ("left door", -2.7, 1.4, 0.0, 2.1),
+            ("right door", 1.3, 1.4, 0.0, 2.1),
+            ("window", -0.45, 0.9, 1.1, 2.0),
+        )
+    ]
+    sizes = {"breadth": 8.0, "height": 3.6, "width": 0.65, "course": 0.3, "stone": 0.7}
+    smooth, rougher = (
+        af.collapse_factor(
+            af.shapes.wall(**sizes, openings=openings, contact=rough(friction)),
+            live=SIDEWAYS,
+            friction="nonassociated",
+        )
+        for friction in (0.5, 0.6)
+    )
+    assert smooth.solutions.starts[1] == 0
+    assert smooth.solutions.gap < EXACT
+    assert smooth.factor < rougher.factor
+
+
 def test_round_off_is_no_cost(monkeypatch, few_starts):
     """Slips of joints that stick are 1e-16: as costs they led the simplex method astray.
 
