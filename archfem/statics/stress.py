@@ -23,6 +23,7 @@ from archfem._files import align_columns
 from archfem._typing import Array
 from archfem._validation import validate_arguments
 from archfem.errors import InvalidInput
+from archfem.masonry.materials import STONE
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import Structure
 from archfem.models.model import Cells, Model
@@ -208,11 +209,17 @@ def strength_use_text(use: xr.Dataset) -> str:
     """Return the largest compression and tension of all blocks as text."""
     pressed, pulled = _largest(use, "compression"), _largest(use, "tension")
     share, strength = float(pressed["use"]), float(pressed["strength"]) / MPa
-    of = "" if np.isnan(share) else f" ({share:.2%} of the stones' strength, {strength:.3g} MPa)"
+    of = "" if np.isnan(share) else f" ({share:.2%} of {_say_strength(strength)})"
     return (
         f"largest compression {_in_mpa(pressed['compression'])} in {_block_label(pressed)}{of}, "
         f"largest tension {_in_mpa(pulled['tension'])} in {_block_label(pulled)}"
     )
+
+
+def _say_strength(strength: float) -> str:
+    """Return the strength of stones [MPa] as text, and whether it is that of the preset."""
+    preset = " of the preset" * bool(np.isclose(strength, (STONE.strength or 0.0) / MPa))
+    return f"the stones' strength, {strength:.3g} MPa{preset}"
 
 
 def _in_mpa(stress: xr.DataArray) -> str:
@@ -237,7 +244,7 @@ def utilisation_text(structure: Structure, joints: xr.Dataset) -> str:
     unknown = "; at hinges it is not computed" * bool((joints["hinge"] != 0).any())
     return (
         f"largest compression at the edge of a joint that does not hinge: {stress:.3f} MPa, "
-        f"{largest:.2%} of the stones' strength, {stress / largest:.3g} MPa, in "
+        f"{largest:.2%} of {_say_strength(stress / largest)}, in "
         f"{found['name'].values} at {float(found['time']):.3f} s{unknown}"
     )
 

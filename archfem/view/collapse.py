@@ -331,7 +331,7 @@ def draw_kinematic_assessment(found: KinematicAssessment) -> Figure:
         found: an assessment with a mechanism.
 
     Returns:
-        The figure: blocks at rest and at the displacement d_u* beside a*(d*), divided by the
+        The figure: blocks at rest and at the capacity d_u* beside a*(d*), divided by the
         confidence factor, over the spectrum of the demand; the mechanism alone where it has no
         finite motion.
 
@@ -374,7 +374,7 @@ def _draw_displaced_mechanism(axes: Axes, found: KinematicAssessment) -> None:
         place = min(place, len(path.displacements) - 1)
         blocks = path.blocks.moved(path.displacements[place])
         moved = [k for k in structure.free if np.abs(path.displacements[place, k]).max() > 1e-9]
-        _draw_motion(axes, [blocks.outlines[k] for k in moved], "mechanism at d_u*")
+        _draw_motion(axes, [blocks.outlines[k] for k in moved], "mechanism at the capacity")
     rest = np.zeros((len(structure.blocks), 3))
     _mark_hinges(axes, structure, found, rest, {"label": "hinge at rest", "ms": 6.5})
     _mark_sliding(axes, structure, found.sliding)
@@ -420,10 +420,10 @@ def _title_check(check: AssessmentCheck) -> str:
     """Return outcome and ratio of a check in a few words; assumptions on a fill are in the text."""
     some = check.over_fill is not None and check.over_fill.needed
     outcome = "passes with some assumptions" if some else check.words
-    whole = ""
+    whole, drawn = "", ""
     if check.bodies is not None and check.bodies < 0.999 * check.least:
-        whole = f"{check.bodies:.3g} with one weight a body, as drawn "
-    return f"{check.name}: {outcome}, {whole}ratio {check.ratios}"
+        whole, drawn = f"{check.bodies:.3g} with one weight a body, ", " as drawn"
+    return f"{check.name}: {outcome}, {whole}ratio {check.ratios}{drawn}"
 
 
 def draw_capacity(

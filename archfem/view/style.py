@@ -162,20 +162,23 @@ def panel_grid(count: int) -> tuple[int, int]:
 
 def set_title(axes: Axes, text: str) -> None:
     """Set the title of axes, wrapped to the width of their part of the figure."""
-    place, width = axes.get_subplotspec(), axes.figure.get_figwidth()
+    place, width, indent = axes.get_subplotspec(), axes.figure.get_figwidth(), ""
+    if place is not None and place.get_gridspec().ncols * place.get_gridspec().nrows > 1:
+        indent = "(a) "  # the letter of the panel follows at last
     if place is not None and (columns := place.get_gridspec().ncols) > 1:
         ratios = np.array(place.get_gridspec().get_width_ratios() or np.ones(columns), dtype=float)
         width *= ratios[list(place.colspan)].sum() / ratios.sum()
     width -= 0.3  # labels of the axis at the left shift the panel
     text, letters = " ".join(text.split()), max(int(width / text_width(1, Size.TITLE)), 12)
-    lines = fill(text, letters, break_long_words=False)
+    lines = fill(text, letters, initial_indent=indent, break_long_words=False)
     # capitals are 0.2 of the font size wider than other letters
     room = letters
     while letters > 12 and any(
         len(line) + 0.35 * sum(map(str.isupper, line)) > room for line in lines.splitlines()
     ):
         letters -= 1
-        lines = fill(text, letters, break_long_words=False)
+        lines = fill(text, letters, initial_indent=indent, break_long_words=False)
+    lines = lines.removeprefix(indent)
     axes.set_title(lines, fontsize=Size.TITLE, color=Colour.TEXT, parse_math=False)
 
 

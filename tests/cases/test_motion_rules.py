@@ -121,6 +121,14 @@ def test_motions_without_a_target_are_compared_with_the_spectrum_of_the_assessme
     assert any(check.found == "the case gives none" for check in motion_rules.check_motions(data))
 
 
-def test_other_norms_have_no_rules_here():
-    data = data_of(norm="SIA 261")
+@pytest.mark.parametrize("norm", ["SIA 261", "NTC 2008", "EN 1998-1-1:2024"])
+def test_other_norms_and_editions_have_no_rules_here(norm):
+    data = data_of(norm=norm)
     assert motion_rules.check_motions(data) == motion_rules.tabulate_checks(data) == []
+
+
+def test_the_stationary_part_of_motions_from_files_is_not_checked():
+    data = data_of(pairs=1)
+    data.case.suite["pairs"]["pair 0"] = {"file": "record.csv"}
+    (check,) = motion_rules._check_plateaus(data)
+    assert (check.state, check.rule) == ("not checked", "stationary part of motions from files")

@@ -167,7 +167,8 @@ def test_the_most_loaded_joint_of_a_run_is_named_but_not_a_hinge(stack):
     joints = af.joints.joint_dataset(stack, rows, np.array([0.0, 0.5, 1.0]))
     assert utilisation_text(stack, joints) == (
         "largest compression at the edge of a joint that does not hinge: 0.560 MPa, "
-        "1.00% of the stones' strength, 56 MPa, in joint 1 at 0.500 s; at hinges it is not computed"
+        "1.00% of the stones' strength, 56 MPa of the preset, in joint 1 at 0.500 s; at hinges it "
+        "is not computed"
     )
     rows[2, 0, 2] = 0.0
     flat = af.joints.joint_dataset(stack, rows, np.array([0.0, 0.5, 1.0]))
@@ -184,7 +185,8 @@ def test_the_most_loaded_joint_of_a_long_run_is_found(stack, step, again):
     rows[again, 0, 0], rows[step, 1, 0] = 4e5, 5.6e5
     text = utilisation_text(stack, af.joints.joint_dataset(stack, rows, 0.01 * np.arange(8301)))
     assert text.endswith(
-        f"0.560 MPa, 1.00% of the stones' strength, 56 MPa, in joint 1 at {0.01 * step:.3f} s"
+        "0.560 MPa, 1.00% of the stones' strength, 56 MPa of the preset, in joint 1 at "
+        f"{0.01 * step:.3f} s"
     )
 
 
@@ -244,7 +246,8 @@ def test_tension_and_compression_are_reported_by_part(stack):
     assert use["compression"].values == pytest.approx([2.8 * af.units.MPa, nan], nan_ok=True)
     assert use["tension"].values == pytest.approx([0.014 * af.units.MPa, nan], nan_ok=True)
     assert strength_use_text(use) == (
-        "largest compression 2.800 MPa in column, block 1 (5.00% of the stones' strength, 56 MPa), "
+        "largest compression 2.800 MPa in column, block 1 (5.00% of the stones' strength, 56 MPa "
+        "of the preset), "
         "largest tension 0.014 MPa in column, block 1"
     )
     line = strength_use_table(use).splitlines()[1].split("  ")

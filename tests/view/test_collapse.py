@@ -153,12 +153,12 @@ def test_an_assessment_shows_moved_blocks_curve_and_demand(coarse_ring):
     # the ground acceleration is the nearer bound here: 0.3 g on ground B, S = 1.2
     rest = found.a_0_star / 1.2 / (0.3 * 1.2 * 9.80665)
     title = right.get_title().replace("\n", " ")
-    assert title.endswith(f"ratio {rest:.2f}, at which it begins to move")
+    assert title.endswith(f"ratio {rest:.2f} as drawn, at which it begins to move")
     figure.draw_without_rendering()
     # the curve is that of blocks, and a ratio with one weight a body decides
     less = replace(found, displacement=replace(check, bodies=0.5 * rest))
     title = draw_kinematic_assessment(less).axes[1].get_title().replace("\n", " ")
-    assert f", {0.5 * rest:.3g} with one weight a body, as drawn ratio {rest:.2f}, at" in title
+    assert f", {0.5 * rest:.3g} with one weight a body, ratio {rest:.2f} as drawn, at" in title
     # what is an upper bound is dotted
     bounded = replace(found, curve=found.curve.assign_attrs(holds=3))
     drawn = lines_of(draw_kinematic_assessment(bounded).axes[1])

@@ -229,3 +229,19 @@ def test_panels_have_letters_in_their_order_and_a_single_one_has_none(tmp_path):
     alone.subplots()
     save(alone, tmp_path / "alone.svg")
     assert not any(text.get_text().startswith("(") for text in alone.findobj(Text))
+
+
+def test_a_title_has_room_for_the_letter_of_its_panel(tmp_path):
+    """A first line with its letter is no longer than the other lines may be."""
+    words = "NTC-2018 SLV: passes by an upper bound alone, 1.01 with one weight a body".split()
+    first, others = [], []
+    for skipped in range(len(words)):
+        figure = new_figure(6.9, 4.2)
+        for axes in figure.subplots(1, 2):
+            set_title(axes, " ".join(words[skipped:] + words[:skipped]))
+        save(figure, tmp_path / "titles.svg")
+        lines = figure.axes[1].get_title().splitlines()
+        assert lines[0].startswith("(b) ")
+        first.append(len(lines[0]))
+        others += map(len, lines[1:])
+    assert max(first) <= max(others)

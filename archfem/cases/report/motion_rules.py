@@ -21,6 +21,9 @@ from archfem.view.pages.document import Grid
 # Rules by the words of norms in [report], without spaces
 _NORMS = {"EN1998": "EC8", "EC8": "EC8", "EUROCODE8": "EC8", "NTC": "NTC-2018"}
 
+# Years of editions whose rules are others
+_OTHER_EDITIONS = ("2008", "2024")
+
 # Longest period up to which motions are compared beyond the rule, where blocks rock [s]
 LONGEST_PERIOD = 4.0
 
@@ -48,6 +51,8 @@ class Check(NamedTuple):
 def find_rule(data: ReportData) -> SelectionRule | None:
     """Return the rule for motions of the norm of a report; None if it is of another norm."""
     norm = data.case.report.get("norm", "").replace(" ", "").upper()
+    if any(year in norm for year in _OTHER_EDITIONS):
+        return None
     found = (rule for words, rule in _NORMS.items() if words in norm)
     return SELECTION_RULES.get(next(found, ""))
 
@@ -75,7 +80,8 @@ def _check_spectra(data: ReportData, rule: SelectionRule) -> Iterator[Check]:
         return
     required = f"{rule.lower:g} to {rule.upper:g}" if rule.upper < np.inf else f"≥ {rule.lower:g}"
     ratios = f"{rule.shortest_ratio:g} T₁" if rule.shortest_ratio else f"{rule.shortest:g} s"
-    name = f"mean spectrum over the target, from {ratios} to {rule.longest_ratio:g} T₁"
+    end = f"{rule.longest_ratio:g} T₁" + f", at least {rule.longest:g} s" * (rule.longest > 0.0)
+    name = f"mean spectrum over the target, from {ratios} to {end}"
     period, motions = find_period(data), [*data.motions.values()]
     if period is None:
         yield Check(name, required, "the period T₁ is unknown: run `archfem modes`", None)
@@ -143,6 +149,9 @@ def _check_plateaus(data: ReportData) -> Iterator[Check]:
         found = f"{part:g} s, {share:.0%} of {least:g} s"
         name = "stationary part of artificial motions"
         yield Check(name, f"≥ {MIN_PLATEAU:g} s", found, part >= MIN_PLATEAU)
+    if len(made) < len(tables):
+        name, found = "stationary part of motions from files", "unknown; records need none"
+        yield Check(name, f"≥ {MIN_PLATEAU:g} s if artificial", found, None)
 
 
 def find_period(data: ReportData) -> float | None:
