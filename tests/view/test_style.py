@@ -233,7 +233,8 @@ def test_panels_have_letters_in_their_order_and_a_single_one_has_none(tmp_path):
 
 def test_a_title_has_room_for_the_letter_of_its_panel(tmp_path):
     """A first line with its letter is no longer than the other lines may be."""
-    words = "NTC-2018 SLV: passes by an upper bound alone, 1.01 with one weight a body".split()
+    title = "NTC-2018 SLV: passes by an upper bound alone, 1.01 with one weight a body"
+    words = title.split()
     first, others = [], []
     for skipped in range(len(words)):
         figure = new_figure(6.9, 4.2)
