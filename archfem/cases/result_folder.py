@@ -18,7 +18,6 @@ from archfem.cases.result_text import (
     PushFactors,
     Remark,
     compare_push,
-    compare_with_site,
     describe_pushover,
     note_masses,
 )
@@ -192,11 +191,12 @@ def _read_case(place: Path, inputs: Path | None) -> Case:
         raise type(error)(f"{path}: {error}") from error
 
 
-def limit_files(case: Case, collapse: Collapse, text: str, doubts: Sequence[Doubt]) -> Files:
+def limit_files(
+    case: Case, collapse: Collapse, text: str, site: PushFactors | None, doubts: Sequence[Doubt]
+) -> Files:
     """Return text, joints at collapse and mechanism of a limit analysis."""
     columns = ["name", "N", "V", "M", "eccentricity"]
     joints = collapse.joints.to_dataframe()[columns].to_csv(index=False).rstrip()
-    site = compare_with_site(case, collapse)
     # without a site the factor of a push would be read as one on a demand
     demand = NO_DEMAND if collapse.push else "the given load"
     if not collapse.push and collapse.outcome is Outcome.COLLAPSES:

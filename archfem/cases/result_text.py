@@ -30,6 +30,7 @@ from archfem.dynamics.verdict import ALL_DEFINITIONS, Verdict
 from archfem.errors import filter_log
 from archfem.joints.criteria import assessed_joints, envelope, first_time, longest_duration
 from archfem.limit.collapse import Collapse, Outcome, describe_fill
+from archfem.limit.fill_range import FillRange
 from archfem.limit.fill_strength import Fill, PlasticFill, as_pressure, has_backing
 from archfem.limit.mechanism_count import Mechanism, duration_text
 from archfem.limit.rating import Rating
@@ -318,10 +319,8 @@ def describe_collapse(
     lines += [f"sliding: {slides}"] if sliding else []
     lines += [str(collapse.solutions)] if collapse.solutions else []
     if collapse.over_fill:
-        low, high = collapse.range
         unit, name = abs(collapse.push) or 1.0, " g" * bool(collapse.push)
-        over = collapse.over_fill.describe_states(unit, name=name)
-        lines.append(over + "; all else is of the least" * (collapse.factor == low != high))
+        lines.append(collapse.over_fill.describe_states(unit, name=name))
     crushing = limit.describe_crushing(structure)
     lines += filter(None, [crushing, describe_fill(limit.fill, structure)])
     lines += note_lower_crowns(structure, limit.fill)
@@ -440,9 +439,11 @@ def doubt_rating(found: Rating, limit: LimitAnalysis) -> list[Remark]:
     return [*lines, f"{NOTE_MARK}left out: {join_words(left_out)}"]
 
 
-def describe_limit(case: Case, found: Collapse, opposite: Collapse | None) -> tuple[Collapse, str]:
-    """Return the lesser result of a load in both senses, and the text on both."""
-    others = []
+def describe_limit(
+    case: Case, found: Collapse, opposite: Collapse | None
+) -> tuple[Collapse, str, "PushFactors | None"]:
+    """Return the lesser result of a load in both senses, the text on both, and their multiples."""
+    others, site = [], compare_with_site(case, found, opposite)
     if opposite is not None:
         close = np.allclose(opposite.range, found.range, rtol=1e-4)
         if _order_senses(opposite) < _order_senses(found) and not close:
@@ -450,17 +451,16 @@ def describe_limit(case: Case, found: Collapse, opposite: Collapse | None) -> tu
         rank = _compare_senses(found, opposite)
         others.append(f"in the other sense: {opposite.sentence} ({rank})")
     others += filter(None, [describe_fill_defaults(case)])
-    site = compare_with_site(case, found)
     others += [f"it begins to move at {site} times {site.site}"] if site else []
     text = describe_collapse(case.structure, found, case.limit, case.parapets)
-    return found, "\n".join([text, *others])
+    return found, "\n".join([text, *others]), site
 
 
-def _order_senses(found: Collapse) -> tuple[int, float]:
+def _order_senses(found: Collapse) -> tuple[float, ...]:
     """Return the order of a sense: the least found, then the least bound, then one without end."""
     if found.outcome is Outcome.BRACKETED:
         return 1, found.upper
-    return 2 * int(np.isinf(found.range[0])), found.range[0]
+    return 2 * int(np.isinf(found.range[0])), *found.range
 
 
 def _compare_senses(found: Collapse, opposite: Collapse) -> str:
@@ -507,18 +507,21 @@ class PushFactors(NamedTuple):
         return f"{text} ({proved})"
 
 
-def compare_with_site(case: Case, found: Collapse) -> PushFactors | None:
+def compare_with_site(case: Case, *senses: Collapse | None) -> PushFactors | None:
     """Return the multiple of the site's ground acceleration at collapse; None if unknown.
 
-    It is that of a push by the weight, over the assumptions on a fill.
+    It is that of a push by the weight, the least of its senses under each assumption on a fill.
     """
-    if not found.push or found.outcome is not Outcome.COLLAPSES:
+    pushed = [x for x in senses if x and x.push and x.outcome is not Outcome.BRACKETED]
+    if not (ends := [x for x in pushed if np.isfinite(x.range[0])]):
         return None
-    factors, searched = compare_push(case, *found.range, abs(found.push)), found.solutions
-    if factors and searched and searched.may_be_less and found.over_fill is None:
-        # the search may have missed a weaker solution
-        share = factors.least / found.range[0]
-        factors = factors._replace(proved=max(searched.bracket[0] * share, 0.0))
+    over = [x.over_fill for x in ends if x.over_fill]
+    low, high = FillRange.least_of(over).ends if over else np.min([x.range for x in ends], axis=0)
+    factors = compare_push(case, low, high, abs(ends[0].push))
+    searched = [x.solutions for x in ends if x.solutions and x.solutions.may_be_less and not over]
+    if factors and searched:  # the search may have missed a weaker solution
+        proved = min(each.bracket[0] for each in searched) * factors.least / low
+        factors = factors._replace(proved=max(proved, 0.0))
     return factors
 
 

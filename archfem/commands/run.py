@@ -211,8 +211,8 @@ def limit(options: argparse.Namespace) -> int:
     """Find the collapse factor of the loads in [limit], and the mechanism."""
     case = Case.read(options.case, options.changes)
 
-    def show(found: Collapse, text: str, doubts: Sequence[Doubt]) -> None:
-        files = partial(results.limit_files, case, found, text, doubts)
+    def show(found: Collapse, text: str, *others: Any) -> None:
+        files = partial(results.limit_files, case, found, text, *others)
         write_results("limit", case, options.out, f"{case.title}\n{text}", files)
 
     with result_text.record_doubts(case.structure) as doubts:
@@ -502,12 +502,10 @@ def _print_across(structure: Structure, motions: Mapping[str, Motion]) -> str:
     return falls
 
 
-def _print_limit(
-    case: Case, folder: Path, found: Collapse, text: str, doubts: Sequence[Doubt]
-) -> None:
+def _print_limit(case: Case, folder: Path, found: Collapse, text: str, *others: Any) -> None:
     """Print limit analysis, and write its files."""
     print(text)
-    write(results.limit_files(case, found, text, doubts), folder)
+    write(results.limit_files(case, found, text, *others), folder)
 
 
 def _print_first_modes(at_rest: DeadLoadResult, folder: Path, max_modes: int = 4) -> None:

@@ -77,7 +77,7 @@ def _check_case(options: argparse.Namespace) -> int:
     if case.limit.live and case.limit.friction == "nonassociated":
         print("limit analysis: `archfem limit` searches sliding without dilatancy, in both senses")
     elif case.limit.live:
-        show_both_senses(case, case.limit.solve(case.structure), lambda _, text, __: print(text))
+        show_both_senses(case, case.limit.solve(case.structure), lambda _, text, *__: print(text))
     # Unreadable records are errors before the dead load is computed.
     case.check_ground()
     at_rest = DeadLoadResult.of(case)
@@ -175,7 +175,7 @@ def example(options: argparse.Namespace) -> None:
 def show_both_senses(
     case: Case,
     first: Collapse,
-    show: Callable[[Collapse, str, Sequence[Doubt]], None],
+    show: Callable[[Collapse, str, result_text.PushFactors | None, Sequence[Doubt]], None],
     doubts: Sequence[Doubt] = (),
 ) -> None:
     """Show a result of limit analysis beside that of the other sense, each at its least end.
@@ -196,9 +196,9 @@ def show_both_senses(
             opposite = opposite.least or opposite
             left = ""
     finally:
-        found, text = result_text.describe_limit(case, first, opposite)
+        found, text, site = result_text.describe_limit(case, first, opposite)
         once = [*dict.fromkeys(doubts)]  # both senses may have the same
-        show(found, "\n".join([f"{text}{left}", *result_text.mark_remarks(once)]), once)
+        show(found, "\n".join([f"{text}{left}", *result_text.mark_remarks(once)]), site, once)
 
 
 def print_motions(suite: Suite) -> None:

@@ -107,8 +107,8 @@ class Collapse(ResultDisplay):
         upper: bound that no state of equilibrium exceeds: the factor itself, with a `PlasticFill`
             the bound from above. `factor` is the bound from below then, as `lower` is.
         over_fill: factors over all assumptions on a `Fill` that is pushed sideways; else None.
-        least: the result under the assumption with the least factor; None where it is this one, or
-            where nothing stands under the least.
+        least: the result under the assumption with the least factor, the fall at rest where nothing
+            stands under it; None where it is this one.
         notes: what is in doubt about this factor, and not about the least.
         strength: compressive strength at which joints crush [Pa]; infinite where they do not.
         live: the growing actions, or the settlement.
@@ -168,12 +168,17 @@ class Collapse(ResultDisplay):
 
     @property
     def sentence(self) -> str:
-        """The outcome, and the load at collapse where there is one."""
+        """The outcome, and the load at collapse where there is one, with the end that moves so."""
+        unit = abs(self.push) or 1.0
+        if self.over_fill and self.outcome is Outcome.INFEASIBLE:
+            state = min(self.over_fill.values, key=self.over_fill.values.__getitem__)
+            most = f"else at up to {unit * self.range[1]:.4g}{self._name_load()}"
+            words = f"{self.outcome.sentence} (fill: {state._replace(inertia='')})"
+            return f"{words}: {self.mechanism_name}; {most}"
         if self.outcome is Outcome.UNBOUNDED and self.over_fill and np.isfinite(self.range[0]):
             return f"{self.outcome.sentence}, or does {self.describe_range()}"
         if self.outcome not in (Outcome.COLLAPSES, Outcome.BRACKETED):
             return self._headline
-        unit = abs(self.push) or 1.0
         ends = self.range if self.outcome is Outcome.COLLAPSES else (self.lower, self.upper)
         low, high = (f"{unit * bound:.4g}" for bound in ends)
         place, words = f"at {low}" if low == high else f"at {low} to {high}", self._name_load()
@@ -186,7 +191,9 @@ class Collapse(ResultDisplay):
             return f"{self._headline}; it is {place}{words}"
         if self.solutions and self.solutions.may_be_less:
             place, words = place.replace("at ", "at ≤ ", 1), f"{words} (least found)"
-        return f"{self._headline}, {place}{words}"
+        of = {ends[0]: "of the least", ends[1]: "of the most"}.get(self.factor, "between")
+        shown = f" ({of})" * bool(self.over_fill and low != high)
+        return f"{self._headline}{shown}, {place}{words}"
 
     @property
     def mechanism_name(self) -> str:
@@ -355,7 +362,7 @@ def _solve_range(given: tuple[Any, Any, Any, Any, Any], fill: Fill) -> Collapse:
             result = _solve_loads(*given, fill)
         over = None if np.isnan(result.factor) else _vary_assumptions(result, *given[3:], fill)
         result = replace(result, over_fill=over)
-        if over is None or over.ends[0] in (0.0, result.factor):
+        if over is None or over.ends[0] == result.factor:
             return result
         _, assumed = vary_fill(fill)[min(over.values, key=over.values.__getitem__)]
         of_given = said

@@ -831,7 +831,7 @@ pier = { breadth = "1.2 m", height = "2 m", course = "1 m" }
         (
             "limit",
             ["--set", "limit.horizontal=1.0"],
-            "Limit analysis: four-hinge mechanism, at 0.5143 to 0.8787 g",
+            "Limit analysis: four-hinge mechanism (of the least), at 0.5143 to 0.8787 g",
         ),
     ],
 )

@@ -12,6 +12,7 @@ from mechanisms import FOUR, twitching
 
 import archfem as af
 from archfem.cases.analysis_keys import parse_limit
+from archfem.cases.result_folder import limit_files
 from archfem.cases.result_text import (
     _mechanism_cell,
     describe_collapse,
@@ -28,6 +29,7 @@ from archfem.cases.result_text import (
 from archfem.cases.toml_file import format_tables
 from archfem.commands.cli import main
 from archfem.limit.collapse import Outcome, describe_fill
+from archfem.limit.fill_range import FillAssumption, FillRange
 from archfem.limit.mechanism_count import duration_text
 
 
@@ -183,7 +185,7 @@ def test_limit_analysis_in_words(ring):
     case.assessment = SimpleNamespace(spectrum=None, options={})
     for factor, rank in ((0.9, "higher"), (1.1, "higher"), (0.99999, "the same")):
         other = replace(mirrored, factor=factor * pushed.factor, upper=factor * pushed.factor)
-        least, words = describe_limit(case, pushed, other)
+        least, words, _ = describe_limit(case, pushed, other)
         first, second = (other, pushed) if factor == 0.9 else (pushed, other)
         assert least is first
         assert words.startswith(f"limit analysis: {first.sentence}\n")
@@ -198,7 +200,7 @@ def test_limit_analysis_in_words(ring):
     ends = {"factor": 0.0, "motion": 0.0 * pushed.motion}
     lost = replace(mirrored, outcome=Outcome.BRACKETED, upper=2.0 * pushed.factor, **ends)
     for given_first in ((lost, pushed), (pushed, lost)):
-        least, words = describe_limit(case, *given_first)
+        least, words, _ = describe_limit(case, *given_first)
         assert least is pushed
         bound = (
             f"no state without dilatancy was found; it is between 0 and {2.0 * lost.upper:.4g} g"
@@ -238,6 +240,38 @@ def test_limit_analysis_in_words(ring):
         "joints do not crush: no strength of the stones counts (56 MPa of the preset is not given)"
     )
     assert describe_collapse(slab, lifted, parse_limit({})).splitlines() == [first, last]
+
+
+@pytest.mark.parametrize(
+    ("right", "left", "low", "high"),
+    [((0.0, 0.87), (0.0, 0.39), 0.0, 0.39), ((0.1, 0.9), (0.4, 0.2), 0.1, 0.2)],
+)
+def test_a_push_is_compared_with_the_site_by_the_lesser_sense_of_each_state(
+    ring, right, left, low, high
+):
+    """Ranges of the senses may overlap, or begin alike where a state does not stand."""
+    states = [FillAssumption("at the feet", x) for x in ("none of its pressure", "all of it")]
+    push = af.collapse_factor(ring, live=af.BodyForce(1.0))
+    senses = [
+        replace(
+            push,
+            factor=max(each),
+            upper=max(each),
+            live=(af.BodyForce(sense),),
+            over_fill=FillRange(dict(zip(states, each, strict=True))),
+        )
+        for sense, each in ((1.0, right), (-1.0, left))
+    ]
+    case = SimpleNamespace(structure=ring, limit=parse_limit({}), target=None, settings={})
+    case.limit = replace(case.limit, demand=0.23 * 9.80665)
+    case.assessment, case.parapets = SimpleNamespace(spectrum=None, options={}), 0.0
+    for first, other in (senses, senses[::-1]):
+        found, words, site = describe_limit(case, first, other)
+        assert (site.least, site.most) == pytest.approx((low / 0.23, high / 0.23))
+        assert words.endswith(f"\nit begins to move at {site} times the demand of 0.23 g")
+        assert found.push == (-1.0 if low == 0.0 else 1.0)
+        files = limit_files(case, found, words, site, [])
+        assert json.loads(files["limit.json"])["rows"][0][4]["most"] == site.most
 
 
 def test_point_loads_without_a_strength_are_stated_by_an_assumed_one_too(ring):

@@ -101,6 +101,7 @@ def test_a_stone_turns_into_a_fill_at_a_factor_by_each_assumption(verified):
     # what is drawn is the lower end
     settings = LimitAnalysis((live,), None, fill=fill)
     least = settings.solve(buried_stone()).least
+    assert f" (of the least), at {low:.4g} to {high:.4g} g" in least.sentence
     assert (least.factor, *least.range) == pytest.approx((low, low, high))
     assert least.least is None
     down = af.collapse_factor(buried_stone(), live=af.BodyForce(0.0, 1.0), fill=fill)
@@ -233,6 +234,18 @@ def test_what_does_not_stand_without_pressure_says_so():
     assert found.range == (0.0, found.factor)
     assert found.describe_range().startswith(f"at 0 g ({CENTROIDS}, {NONE}; it does not stand) to")
     assert found.describe_range().endswith(f"({FEET}, all of its passive pressure)")
+    # the mechanism of the least is the fall at rest: the upper stone about the edge of the lower
+    (hinge,) = found.least.hinges
+    joint = structure.joints[hinge[0]]
+    assert {structure.blocks[k].name for k in joint.blocks} == {"stone", "leaning"}
+    assert getattr(joint, hinge[1])[0] == pytest.approx(1.0)
+    most = f"else at up to {found.factor:.4g} g, pushed to the right"
+    state = f"it does not stand under its own weight (fill: {NONE})"
+    assert found.least.sentence == f"{state}: {found.least.mechanism_name}; {most}"
+    assert describe_collapse(
+        structure, found.least, LimitAnalysis((af.BodyForce(1.0),), None, fill=fill)
+    ).startswith(f"limit analysis: {state}: ")
+    assert f" (of the most), at 0 to {found.factor:.4g} g" in found.sentence
     checks = af.kinematic_assessment(structure, SITE, friction=None, fill=fill).checks
     assert [check.over_fill.ends[0] for check in checks] == [0.0, 0.0]
 
