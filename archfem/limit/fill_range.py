@@ -24,7 +24,7 @@ WEAKER_FILLS: Mapping[str, Sequence[str]] = {
     "full_pressure": ("by_pressure", "factor", "without_backing"),
 }
 
-_NONE = "no backing"
+BACKED, _NONE = "the backing", "no backing"
 _FALLS = "; it does not stand"
 
 
@@ -62,7 +62,7 @@ def _vary_backing(fill: Fill | None) -> dict[str, Fill | None]:
     """Return a fill as it is and, where backing is given, without it, by words."""
     if fill is None or not has_backing(fill):
         return {"": fill}
-    return {"the backing": fill, _NONE: change_fill(fill, backing=None, backing_height=None)}
+    return {BACKED: fill, _NONE: change_fill(fill, backing=None, backing_height=None)}
 
 
 def vary_pressure(fill: Fill) -> dict[str, Fill]:

@@ -43,6 +43,7 @@ from archfem.joints.criteria import (
     part_roles,
 )
 from archfem.limit.collapse import Outcome
+from archfem.limit.fill_range import BACKED, FillRange
 from archfem.limit.mechanism_count import Mechanism
 from archfem.masonry.structure import suggest_name
 from archfem.models.model import Doubt, write_doubts
@@ -207,9 +208,10 @@ def scales_of(result: DeadLoadResult, motion: Motion, **options: Any) -> Finding
 def evaluate_limit(case: Case) -> Findings:
     """Return the collapse factor of a case by limit analysis, and the size of its mechanism.
 
-    `least_push` is over both senses and the states of the fill. An infinite factor never makes a
-    mechanism; NaN is that of a case which does not stand, or of one without a state without
-    dilatancy, which `factor_at_most` bounds. `upper_bounds` names findings not proved least.
+    `least_push` is over both senses and the states of the fill, `least_push_on_backing` over those
+    with a backing that is given. An infinite factor never makes a mechanism; NaN is that of a case
+    which does not stand, or of one without a state without dilatancy, which `factor_at_most`
+    bounds. `upper_bounds` names findings not proved least.
     """
     with record_doubts(case.structure) as doubts:
         collapse = case.limit.solve(case.structure)
@@ -229,7 +231,11 @@ def evaluate_limit(case: Case) -> Findings:
         least, site = push * float(np.min(factors)), site_acceleration(case)
         findings |= {"push": push * float(collapse.factor), "least_push": least}
         findings |= {"least_push_over_site": least / site} if site > 0.0 else {}
-        bounds += ["push"] * searched[0] + ["least_push", "least_push_over_site"] * any(searched)
+        over = FillRange.least_of([x.over_fill for x in senses if x.over_fill]).values
+        backed = [push * value for key, value in over.items() if key.backing == BACKED]
+        findings |= {"least_push_on_backing": min(backed)} if backed else {}
+        least_of = "least_push", "least_push_over_site", "least_push_on_backing"
+        bounds += ["push"] * searched[0] + [x for x in least_of if x in findings and any(searched)]
     return findings | _name_bounds(bounds) | _state_doubts(doubts)
 
 
@@ -329,7 +335,7 @@ NAMED_EVALUATORS: Mapping[str, Callable[..., Findings]] = {
 
 # SI units of findings by function; findings without one are ratios, counts or words
 FINDING_UNITS: Mapping[Callable[..., Mapping[str, Any]], Mapping[str, str]] = {
-    evaluate_limit: {"push": "g", "least_push": "g"},
+    evaluate_limit: dict.fromkeys(("push", "least_push", "least_push_on_backing"), "g"),
     evaluate_rating: {"position": "m"},
     evaluate_history: {
         "rotation": "rad",

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from itertools import product
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from archfem.cases.analysis_keys import LimitAnalysis
 from archfem.cases.result_text import describe_collapse
 from archfem.limit import collapse
 from archfem.limit.fill_range import FillAssumption, FillRange, vary_fill
+from archfem.studies.evaluators import evaluate_limit
 
 SITE = af.Eurocode8(ag=0.25, ground="C")
 BREADTH, HEIGHT, DEPTH = 1.0, 2.0, 1.5
@@ -157,6 +159,17 @@ def test_a_stone_turns_into_a_fill_with_and_without_its_backing(verified):
     assert f"({FEET}, {THIRD}, the backing)" in str(found)
     settings = LimitAnalysis((af.BodyForce(1.0),), None, fill=fill)
     assert settings.solve(buried_stone()).least.factor == pytest.approx(least)
+    # to the left the active pressure turns it, which backing has not
+    site = {"assessment": SimpleNamespace(spectrum=None), "target": None}
+    case = SimpleNamespace(structure=buried_stone(), limit=settings, **site)
+    studied = evaluate_limit(case)
+    high = weights @ [HEIGHT / 2.0, HEIGHT + DEPTH / 2.0]
+    whole = SOIL.unit_weight * (top * HEIGHT**2 / 2.0 - HEIGHT**3 / 3.0)
+    for name, active in (("least_push", whole), ("least_push_on_backing", above)):
+        left = (weights.sum() * BREADTH / 2.0 - active / passive) / high
+        assert studied[name] == pytest.approx(left, rel=1e-6)
+    case.limit = replace(settings, fill=replace(fill, backing=None))
+    assert "least_push_on_backing" not in evaluate_limit(case)
     # a reader takes the state that is known, at the worse place of the inertia
     line = describe_collapse(buried_stone(), found, settings).splitlines()[2]
     for state in product((THIRD, NONE), ("the backing", "no backing")):
