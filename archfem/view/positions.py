@@ -7,11 +7,13 @@ import numpy as np
 import xarray as xr
 
 from archfem._typing import Array, Numbers
-from archfem.dynamics.history import History
+from archfem.dynamics.collapse_state import FALLEN_STATES
+from archfem.dynamics.history import Ending, History
 from archfem.dynamics.rigid_body.bodies import make_bodies
 from archfem.joints.criteria import Criteria, assessed_joints
 from archfem.limit.mechanism_count import counted_mechanism, leave_out_walls
 from archfem.masonry.block import measure_polygon, rotate
+from archfem.masonry.standing import list_own_stones
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import Structure
 
@@ -26,10 +28,14 @@ def block_kinds(structure: Structure) -> list[str]:
 
 
 def decisive_instant(run: History) -> float:
-    """Return the time of collapse, else first mechanism, else largest |e| of a joint [s]."""
-    if "fall_pose" in run.dataset:
-        return float(run.dataset["fall_time"][0])
-    return first_motion_instant(run)
+    """Return when blocks came loose, else the first mechanism, else largest |e| of a joint [s]."""
+    return float(run.dataset["fall_time"][0]) if _falls(run) else first_motion_instant(run)
+
+
+def _falls(run: History) -> bool:
+    """Return whether blocks came loose in a motion or fell after it, and did not merely rock on."""
+    fallen = run.fall is not None and run.fall.kind in FALLEN_STATES
+    return "fall_pose" in run.dataset and (fallen or run.ending is not Ending.FINISHED)
 
 
 def first_motion_instant(run: History) -> float:
@@ -67,8 +73,14 @@ def recorded_fields(run: History) -> tuple[Array, Array]:
 
 def peak_instant(run: History) -> float | None:
     """Return the time of the largest displacement [s]; None if it is unknown, or blocks fall."""
-    if "peak_displacement" not in run.dataset or "fall_pose" in run.dataset:
+    if "peak_displacement" not in run.dataset or _falls(run):
         return None
+    if "fall_pose" in run.dataset:  # a tail after the motion, of which places are not kept
+        if run.structure is None:
+            return None
+        largest = run.dataset["largest_displacement"].values[list_own_stones(run.structure)].max()
+        if run.dataset.attrs["displacement"] > 1.01 * largest:
+            return None
     return float(run.dataset["peak_displacement"].attrs["time"])
 
 

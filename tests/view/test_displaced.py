@@ -4,8 +4,15 @@ import numpy as np
 
 import archfem as af
 from archfem.view.pages.player_data import Scene
-from archfem.view.positions import peak_displacements, peak_instant, peak_joint_ends
+from archfem.view.positions import (
+    decisive_instant,
+    peak_displacements,
+    peak_instant,
+    peak_joint_ends,
+)
 from archfem.view.structure import draw_critical, draw_during
+
+TIMES = np.linspace(0.0, 2.0, 201)  # of a swing, in half periods
 
 
 def labelled(figure, gid):
@@ -97,3 +104,24 @@ def test_a_run_without_fields_is_drawn_at_its_largest_displacement():
 def test_a_run_that_ends_in_a_fall_is_drawn_at_its_collapse(column, toppled):
     assert peak_instant(toppled) is None
     assert len(draw_critical(column.structure, toppled, column).axes) == 1
+
+
+def test_a_stack_that_rocks_on_after_its_record_is_drawn_like_one_that_has_come_back():
+    """A record ends at 0.75 s, in rocking, so that stones are followed as loose: none falls."""
+    stones, swing = af.column(breadth=0.4, heights=[0.8, 0.8]), 4.5 * np.sin(np.pi * TIMES)
+    whole, cut = (shake(stones, af.Motion(swing[:n], 0.005))[1] for n in (201, 151))
+    assert "fall_pose" in cut.dataset
+    assert "fall_pose" not in whole.dataset
+    assert decisive_instant(cut) == decisive_instant(whole) == whole.mechanisms["verified"].time
+    assert peak_instant(cut) == peak_instant(whole)
+    assert len(draw_critical(stones, cut).axes) == 2
+
+
+def test_a_largest_displacement_after_the_record_is_not_drawn():
+    """It rocks out after its record, by 0.24 m rather than 0.20 m, and comes back."""
+    stone = af.column(breadth=0.4, heights=[0.8])
+    _, run = shake(stone, af.Motion(5.2 * np.sin(np.pi * TIMES), 0.005))
+    assert run.fall.kind == "stands"
+    assert run.fall.displacement > 1.1 * run.dataset["largest_displacement"].values.max()
+    assert peak_instant(run) is None
+    assert decisive_instant(run) == run.mechanisms["verified"].time
