@@ -4,6 +4,7 @@ Limit analysis of the weight is repeated with one property relaxed at a time. Th
 lets the structure stand is the cause, and the least change of it the remedy.
 """
 
+from bisect import bisect_left
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -59,7 +60,7 @@ def explain_instability(structure: Structure) -> str | None:
     if cut := _name_cut_ring(structure):
         return f"{moves}: {cut}"
     if _stands(dead, friction=unlimited):
-        least = _least_value(dead, "friction", float(dead.blocks.structure.friction.min()), 10.0)
+        least = _least_friction(dead, "friction", float(dead.blocks.structure.friction.min()), 10.0)
         text = f"joints slide ({sliding}): {_say_friction(least)}"
         if end := name_free_end(rigid, falling):
             return f"{text}; {end}"
@@ -97,7 +98,7 @@ def least_friction(structure: Structure) -> float | None:
     None where it does not stand with its own, or limit analysis does not apply.
     """
     most = min(float(structure.friction.max(initial=0.0)), 1e3)
-    return _find_least(structure, "cap", _LITTLE_FRICTION, most, precision=5e-3)
+    return _find_least(structure, "cap", _LITTLE_FRICTION, most)
 
 
 @lru_cache(maxsize=8)
@@ -124,20 +125,19 @@ def geometric_factor(structure: Structure) -> float | None:
         1.89
     """
     check_type(structure, Structure, "structure", "give one, e.g. circular_arch(…)")
-    least = _find_least(structure, "depth", _LITTLE_DEPTH, 1.0, precision=1e-3)
+    least = _find_least(structure, "depth", _LITTLE_DEPTH, 1.0)
     return None if least is None else 1.0 / least
 
 
-def _find_least(
-    structure: Structure, name: str, low: float, high: float, precision: float
-) -> float | None:
+def _find_least(structure: Structure, name: str, low: float, high: float) -> float | None:
     """Return the least value of a property with which it stands, from `low` on."""
     try:
         refuse_bonds(structure)
         _, dead = self_weight_programme(structure, "coulomb", np.inf, None)
         if _stands(dead, **{name: low}):
             return low
-        return _least_value(dead, name, low, high, precision) if _stands(dead) else None
+        find = _least_friction if name == "cap" else _least_value
+        return find(dead, name, low, high) if _stands(dead) else None
     except (InvalidInput, DidNotConverge):  # soft bodies, bonds
         return None
 
@@ -161,8 +161,8 @@ def describe_geometric_factor(structure: Structure) -> str:
 
 
 def _say_friction(least: float) -> str:
-    """Say from which friction it stands, rounded up: with a thousandth less it might not."""
-    return f"it stands from a coefficient of friction of {np.ceil(1e3 * least) / 1e3:g}"
+    """Say from which friction it stands."""
+    return f"it stands from a coefficient of friction of {least:g}"
 
 
 def name_free_end(structure: Structure, falling: Collection[int]) -> str:
@@ -266,8 +266,16 @@ def _stands(
     return is_balanced(relaxed.minimise_residual(), relaxed)
 
 
+def _least_friction(dead: Programme, name: str, lower: float, upper: float) -> float:
+    """Return the least thousandth of friction with which blocks stand, whatever the range."""
+    first, last = (int(np.ceil(1e3 * value)) for value in (lower, upper))
+    tried = range(first, last)
+    found = bisect_left(tried, True, key=lambda k: _stands(dead, **{name: k / 1e3}))
+    return (first + found) / 1e3
+
+
 def _least_value(
-    dead: Programme, name: str, lower: float, upper: float, precision: float = 2e-3
+    dead: Programme, name: str, lower: float, upper: float, precision: float = 1e-3
 ) -> float:
     """Return the least value of a property with which blocks stand, by bisection."""
     while upper > (1.0 + precision) * max(lower, precision):

@@ -166,8 +166,8 @@ fidelity = "rigid"
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("friction", "least"), [(None, "0.442"), (0.45, "0.441")])
-def test_the_friction_from_which_it_stands_is_said(friction, least, tmp_path, capsys):
+@pytest.mark.parametrize("friction", [None, 0.45])
+def test_the_friction_from_which_it_stands_is_said(friction, tmp_path, capsys):
     """By checks, thicknesses and reports, with a note where the case leaves it open."""
     given = "" if friction is None else f'[contacts."stone to stone"]\nfriction = {friction}\n'
     (path := tmp_path / "arch.toml").write_text(HORSESHOE + given)
@@ -175,7 +175,7 @@ def test_the_friction_from_which_it_stands_is_said(friction, least, tmp_path, ca
     for command in (["check"], ["thickness", "--out", str(out)]):
         assert af.commands.main([command[0], str(path), *command[1:]]) in (0, 3)
         said = capsys.readouterr().out
-        assert f"it stands from a coefficient of friction of {least}\n" in said
+        assert "it stands from a coefficient of friction of 0.441\n" in said
         note = "note: friction decides whether it stands: dry stone has 0.4 to 0.8"
         assert (note in said) == (friction is None)
     moving = "hinge (joints 0, 3, 7, 12 and 15)" if friction is None else "slide (joints 0 and 15)"
@@ -184,7 +184,7 @@ def test_the_friction_from_which_it_stands_is_said(friction, least, tmp_path, ca
     page = (out / "report.html").read_text()
     for words in (
         ">least thickness<",
-        f"stands from a coefficient of friction of {least}",
+        "stands from a coefficient of friction of 0.441",
         "without sliding 159 mm",
         "fixed to it: &#39;left abutment&#39;, &#39;right abutment&#39;<",
         *["Friction decides"][: friction is None],

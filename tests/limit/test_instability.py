@@ -106,6 +106,16 @@ def test_a_block_on_a_slope_stands_with_the_friction_that_is_printed(slope):
     assert af.stands(on_a_bed(cube, friction=said, tilt=np.arctan(slope)))
 
 
+@pytest.mark.parametrize("friction", [0.351, 0.3604, 0.5, 0.65, np.inf])
+def test_the_least_friction_does_not_depend_on_that_given(friction):
+    """Of a block on a slope of 0.3504, in thousandths, as from a friction that is too small."""
+    cube = [[0.0, 0.0], [1.0, 0.0], [1.0, 0.5], [0.0, 0.5]]
+    stone, smooth = (on_a_bed(cube, friction=f, tilt=np.arctan(0.3504)) for f in (friction, 0.3))
+    assert least_friction(stone) == 0.351
+    for words in (describe_friction(stone), explain_instability(smooth)):
+        assert value(r"coefficient of friction of ([\d.]+)", words) == 0.351
+
+
 def test_a_block_that_leans_out_needs_a_bed_up_to_its_centroid():
     """A parallelogram, its centroid 0.8 m from the middle of a bed of half a metre to each side."""
     leaning = [[0.0, 0.0], [1.0, 0.0], [2.6, 2.0], [1.6, 2.0]]
