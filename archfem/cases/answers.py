@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -259,6 +260,8 @@ def state_assessments(
             # its values are those of the ratio that decides
             split = result.of_bodies if ratios.bodies is not None else None
             shown = check if split is None else split.checks[number]
+            if ratios.floor is not None:
+                shown = replace(check, capacity=ratios.floor * check.demand)
             same = checks.setdefault((str(check), str(ratios)), (check, shown, ratios, []))
             same[3].append(direction)
     last = [str(result.checks[-1]) for result in found.values()]

@@ -77,7 +77,7 @@ from archfem.statics.first_mechanism import (
     select_joints,
     take_fill_as_loads,
 )
-from archfem.units import STANDARD_GRAVITY, kN
+from archfem.units import STANDARD_GRAVITY, format_ratio, kN
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -583,9 +583,11 @@ class _Oscillator:
                     "this mechanism slides without turning and alpha does not fall as it moves; "
                     "the end of the faces or of the ground in the drawing is no capacity"
                 )
+            least = self.linear.floor or replace(self, by_body=True).linear.ratio
             found.append(
-                f"{why}: there is no displacement check, and what it withstands beyond its start, "
-                "1/q of the linear ratio, rests on q alone; a time history computes it"
+                f"{why}: there is no displacement check; it moves from "
+                f"{format_ratio(least / self.given.q)} times the spectrum on (q = 1), and what it "
+                "withstands beyond rests on q alone; a time history computes it"
             )
         elif self.path.end is not PathEnd.FALLS:
             found.append(

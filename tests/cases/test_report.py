@@ -297,6 +297,14 @@ def test_a_check_that_passes_at_rest_says_so():
     assert answers.Ratios(**row.numbers) == answers.Ratios("a code", ["right"], 1.5, 1.5, moved=0.5)
 
 
+def test_capacity_is_that_of_the_ratio_with_all_weight_in_motion_where_it_decides():
+    check = replace(CHECKS[0], capacity=10.0, demand=2.5, ratio=4.0, floor=3.0, bodies=3.5)
+    found = SimpleNamespace(checks=[check], direction=1.0, notes=(), doubts=(), of_bodies=None)
+    (row,) = answers.state_assessments({"right": found}, []).rows
+    factor = "3 with e* = 1 (3.5 of the mechanism found; 4 with the weights apart)"
+    assert row[1:4] == ("2.5 m/s²", "7.5 m/s², passes", factor)
+
+
 def test_results_of_another_case_are_named_and_not_stated(kept, undrawn):
     write_stated(kept, af.Hazard.power(0.02116, 3.0))
     with replace_results(kept, "limit", "other") as draft:

@@ -469,6 +469,16 @@ def test_sliding_has_no_capacity_of_displacement(friction):
     assert "one of many" not in str(turning)
 
 
+def test_without_a_displacement_check_the_spectrum_of_the_start_is_said():
+    """A slab slides from μ g on, over FC and the ground acceleration; q raises all above it."""
+    slab = af.column(breadth=2.0, heights=[1.0], contact=af.Contact(1e9, 1e9, friction=0.6))
+    for q in (1.0, 2.0):
+        found = af.kinematic_assessment(slab, SPECTRUM, q=q)
+        start = 0.6 * G / 1.35 / found.linear.demand
+        assert found.linear.ratio == pytest.approx(q * start)
+        assert f"; it moves from {start:.3g} times the spectrum on (q = 1), and" in found.notes[0]
+
+
 @pytest.fixture(scope="module")
 def wedge():
     """A wall in bond whose wedge no finite motion follows, and the weakest mechanism found."""
@@ -535,6 +545,7 @@ def test_a_wedge_of_a_wall_in_bond_has_the_linear_check_alone(wedge, verified):
     assert f"the spectrum may be {ends} times as strong" in str(found)
     assert found.linear.floor == pytest.approx(least, rel=1e-6)
     assert find_margin([found]) == pytest.approx(least, rel=1e-6)
+    assert f"it moves from {0.5 * least:.3g} times the spectrum on (q = 1)" in found.notes[0]
     apart = found.linear.bodies and f"; {found.linear.ratio:.3g} with the weights apart"
     own = f"{found.linear.bodies or found.linear.ratio:.3g} of the mechanism found{apart or ''}"
     assert describe_margin([found]).startswith(f"least margin {least:.3g} with e* = 1 ({own}), by")
