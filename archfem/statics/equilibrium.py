@@ -34,6 +34,7 @@ from archfem.masonry.block import Block, as_point, say_place
 from archfem.masonry.construction import Stage, resolve_stages
 from archfem.masonry.loads import BodyForce
 from archfem.masonry.parts import find_undivided
+from archfem.masonry.standing import find_bodies
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import (
     Joint,
@@ -512,7 +513,25 @@ def structure_doubts(structure: Structure) -> list[Doubt]:
     remedy = "if so, give it that part, in a drawing by its layer"
     parts = [Doubt(cause, remedy) for cause in structure.misplaced.values()]
     sizes = [*_doubt_slope(structure), *_doubt_depth(structure), *_doubt_undivided(structure)]
-    return [*fixed, *parts, *sizes, *doubt_whole_fill(structure)]
+    return [*fixed, *parts, *sizes, *_doubt_ties(structure), *doubt_whole_fill(structure)]
+
+
+def _doubt_ties(structure: Structure, most: int = 3) -> Iterator[Doubt]:
+    """Doubt bodies that lie on many stones of a wall in bond, and tie them to one another."""
+    heads, blocks = structure.pairs[structure.heads], structure.blocks
+    stones = [number for number in heads.flat if blocks[number].role == "pier"]
+    bonded = np.isin(structure.pairs, stones).any(axis=1)
+    for name in find_bodies(structure):
+        number = structure.block_number(name)
+        below = bonded & (structure.pairs == number).any(axis=1)
+        # axles leave gaps between their wheels
+        lies = structure.depths[below].sum() > 0.9 * np.ptp(blocks[number].points[:, 0])
+        if lies and below.sum() > most:
+            yield Doubt(
+                f"'{name}' lies on {below.sum()} stones of a wall as one rigid body, which ties "
+                "them together: below pieces they may resist less",
+                "cut it into pieces of about a stone's length, or add its weight to the stones",
+            )
 
 
 def _doubt_depth(structure: Structure) -> list[Doubt]:

@@ -12,6 +12,7 @@ from archfem.cases.result_text import note_masses
 from archfem.cases.structure_text import describe_depths
 from archfem.limit import Fill
 from archfem.masonry import StandingBody, carrying
+from archfem.statics.equilibrium import structure_doubts
 
 NO_PRESSURE = Fill(friction_angle=30.0, mobilisation=0.0, active=0.0)
 
@@ -325,3 +326,31 @@ def test_an_axle_beyond_the_end_of_a_bridge_is_named_with_its_place():
     said = f"stands on 0.2 m of its 0.3 m, as the structure ends at x = {end:.4g} m: make the side"
     with pytest.raises(af.errors.InvalidInput, match=said):
         carrying(bridge, [single])
+
+
+def test_a_body_on_many_stones_of_a_wall_in_bond_is_a_doubt():
+    """It ties them together: cut into pieces, the same weight falls at less."""
+    wall = af.shapes.wall(breadth=3.0, height=1.5, width=0.5, course=0.25, stone=0.5)
+
+    def roof(left, right):
+        size = {"x": 0.5 * (left + right), "length": right - left}
+        weight = 20e3 * (right - left)
+        return StandingBody(**size, weight=weight, centre_of_gravity=0.2, name=f"roof {left}")
+
+    pieces = [roof(left, left + 0.5) for left in np.arange(-1.5, 1.4, 0.5)]
+    axles = {"axles": [10e3] * 4, "spacings": [0.6] * 3, "length": 0.1}
+    truck = StandingBody(x=0.0, **axles, centre_of_gravity=0.5, name="truck")
+    bodies = {"whole": [roof(-1.5, 1.5)], "pieces": pieces, "axles": [truck]}
+    walls = {key: carrying(wall, own) for key, own in bodies.items()}
+    found = {key: structure_doubts(each) for key, each in walls.items()}
+    assert (found["pieces"], found["axles"]) == ([], [])
+    (doubt,) = found["whole"]
+    stones = [x for x in wall.blocks if np.isclose(x.points[:, 1].max(), 1.5)]
+    assert doubt.cause.startswith(f"'roof -1.5' lies on {len(stones)} stones of a wall")
+    factors = [
+        af.collapse_factor(walls[key], live=af.BodyForce(1.0)).factor for key in ("whole", "pieces")
+    ]
+    assert factors[0] > 1.1 * factors[1]
+    # the fill of a bridge has no bond
+    road = replace(LORRY, length=8.0, width=None)
+    assert structure_doubts(carrying(arch_bridge(width=2.0), [road])) == []
