@@ -291,13 +291,15 @@ class Rating(ResultDisplay):
         if not (spans and stand):
             return f"at x = {self.moving.position:.3g} m (the vehicle's middle)"
         sense = 1.0 if self.moving.direction == "right" else -1.0
-        every = {float(self.moving.position + sense * ahead) for ahead in axles[:, 1]}
-        others = _name_places(every - {*stand})
+        every = {float(self.moving.position + sense * ahead): load for load, ahead in axles}
+        others = _name_places(every.keys() - {*stand})
         only = [name.strip("'") for name in over] if over else list(spans)
         apart = _name_places([x - spans[only[0]][0] for x in stand])
         clear = f", {apart} m from the left clear springing" if len(only) == 1 else ""
         count = f"{len(stand)} axle{'s'[: len(stand) - 1]}"
         count += f" of {len(axles)}" if len(axles) > len(stand) else ""
+        loads = [f"{every[x] / kN:.4g}" for x in sorted(stand)]
+        count += f" ({join_words(loads)} kN)" * (len({*loads}) > 1 and len(loads) < 5)
         ends = np.array([*spans.values()])
         beside = over and not all(((x >= ends[:, 0]) & (x <= ends[:, 1])).any() for x in stand)
         name = f" over {'or beside ' if beside else ''}{join_names(list(over))}" if over else ""

@@ -666,6 +666,9 @@ def test_places_of_axles_are_of_the_span_that_is_loaded(monkeypatch):
     sense = 1.0 if found.moving.direction == "right" else -1.0
     tractor = found.moving.position + 2.5 * sense
     assert f" springing (the other at {tractor:.2f} m), " in repr(found)
+    unlike = af.rate(bridge, Vehicle("lorry", (60e3, 115e3), (0.5,)))
+    loads = "60 and 115" if unlike.moving.direction == "left" else "115 and 60"
+    assert f"with 2 axles ({loads} kN) over " in repr(unlike)
     monkeypatch.setattr(rating, "_places_along", lambda *_: (min(inner) - 20.0,))
     found = af.rate(bridge, Vehicle("long", (1e3, 1e3, 1e3), (2.0, 40.0)))
     assert f"with 1 axle of 3 over 'right arch' at x = {min(inner) + 1.0:.2f} m" in repr(found)
