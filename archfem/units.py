@@ -270,7 +270,8 @@ def _convert(text: str, unit: str, key: str) -> float:
             ) from error
         hint = f" ({question})" if (question := _suggest_unit(text, unit)) else f": {error}"
         reason = f"is not in a unit like {target}{hint}"
-        plain = f'has no unit: write a number, or "{text} {target}"'
+        usual = "kN" if target == "N" else target  # of axles and other loads
+        plain = f'has no unit: write a number in {target}, or "{text} {usual}"'
         words = plain if str(error.units1) == "dimensionless" else reason
         raise InvalidInput(f"{key} = {text!r} {words}") from error
     except Exception as error:  # also of pint's tokenizer

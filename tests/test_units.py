@@ -62,6 +62,8 @@ def test_an_acceleration_as_a_multiple_of_g_is_refused_with_its_number():
 def test_a_number_as_a_text_is_refused_with_its_remedy():
     with pytest.raises(af.InvalidInput, match=r"x = '2\.25' has no unit: .* or \"2\.25 m\""):
         af.units.in_unit("2.25", "m", "x")
+    with pytest.raises(af.InvalidInput, match=r"write a number in N, or \"60 kN\""):
+        af.units.in_unit("60", "N", "axles")
 
 
 @pytest.mark.parametrize(
