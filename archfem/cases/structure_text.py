@@ -15,8 +15,8 @@ from archfem.limit.instability import explain_instability, geometric_factor
 from archfem.limit.thickness import minimum_thickness
 from archfem.masonry.ring_thickness import Ring
 from archfem.masonry.standing import find_bodies
-from archfem.masonry.structure import Structure, describe_spans, join_names
-from archfem.units import format_mm
+from archfem.masonry.structure import Structure, describe_spans, join_names, list_first
+from archfem.units import format_mm, mm
 
 
 def describe_supports(structure: Structure, max_names: int = 4) -> str:
@@ -57,23 +57,25 @@ def _has_bond(structure: Structure) -> bool:
     return any(not structure.blocks[number].grain for number in pairs.ravel())
 
 
-def _name_slivers(structure: Structure, share: float = 0.25) -> str:
-    """Return a line on stones of a wall in bond that are far shorter than most; else nothing."""
-    stones = [each for each in structure.blocks if not (each.fixed or each.grain)]
-    lengths = {each.name: np.ptp(each.points[:, 0]) for each in stones}
-    usual = float(np.median([*lengths.values()]))
-    slivers = [f"'{k}' ({format_mm(x)})" for k, x in lengths.items() if x < share * usual]
-    if not slivers or not _has_bond(structure):
-        return ""
-    return (
-        f"\nstones shorter than {share:g} of the usual {format_mm(usual)}: {join_names(slivers)}; "
-        "put jambs of openings further apart"
-    )
+def _name_slivers(structure: Structure) -> str:
+    """Return lines on stones of a wall in bond that are far shorter or less high than most."""
+    bodies, lines = find_bodies(structure), ""
+    stones = [x for x in structure.blocks if not (x.fixed or x.grain or x.name in bodies)]
+    stones = [each for each in stones if each.role != "ring"] if _has_bond(structure) else []
+    remedies = "put jambs of openings further apart", "give nearly equal heads and sills one level"
+    kinds = zip(("shorter", "less high"), (0.25, 0.5), remedies, strict=True)
+    for axis, (word, share, remedy) in enumerate(kinds):
+        sizes = {each.name: np.ptp(each.points[:, axis]) for each in stones}
+        usual = float(np.median([*sizes.values()] or [0.0]))
+        slivers = [f"'{k}' ({format_mm(x)})" for k, x in sizes.items() if x < share * usual]
+        listed = f"{share:g} of the usual {format_mm(usual)}: {list_first(slivers, 3)}"
+        lines += f"\nstones {word} than {listed}; {remedy}" * bool(slivers)
+    return lines
 
 
 def _describe_bearing(structure: Structure) -> str:
-    """Return a line on the lintel of a wall in bond with the least bearing for its gap, if any."""
-    found, beds = [], np.flatnonzero(~structure.heads)
+    """Return a line on the lintels of a wall in bond with the least and most bearing, if any."""
+    found, most, beds = [], 0.0, np.flatnonzero(~structure.heads)
     pairs = structure.pairs[beds]
     above = pairs[np.arange(len(beds)), structure.centroids[pairs, 1].argmax(axis=1)]
     bodies = find_bodies(structure)
@@ -86,7 +88,8 @@ def _describe_bearing(structure: Structure) -> str:
         gaps = ends[1:, 0] - ends[:-1, 1]
         edges = np.flatnonzero(gaps > 0.01)  # wider than gaps of a survey
         if len(edges):
-            bearing = float((ends[[*edges, -1], 1] - ends[[0, *(edges + 1)], 0]).min())
+            bearings = ends[[*edges, -1], 1] - ends[[0, *(edges + 1)], 0]
+            bearing, most = float(bearings.min()), max(most, float(bearings.max()))
             # NHBC Standards 2020, 6.1.12, table 5: lintels of steel or concrete
             usual = 0.10 if gaps.max() <= 1.2 else 0.15
             found.append((bearing / usual, bearing, usual, block.name))
@@ -94,7 +97,8 @@ def _describe_bearing(structure: Structure) -> str:
         return ""
     share, bearing, usual, name = min(found)
     short = f", less than the {format_mm(usual)} of lintels in new houses" if share < 1.0 else ""
-    return f"\nleast bearing of a lintel: {format_mm(bearing)}, of '{name}'{short}"
+    more = f"; most {format_mm(most)}" * (most > bearing + 1.0 * mm)
+    return f"\nleast bearing of a lintel: {format_mm(bearing)}, of '{name}'{short}{more}"
 
 
 def describe_thickness(case: Case, ring: Ring) -> tuple[list[Row], list[str]]:

@@ -134,6 +134,31 @@ def test_stones_far_shorter_than_most_are_named():
     assert "shorter than" not in "".join(whole)
 
 
+@pytest.mark.parametrize(("head", "count"), [(2.0, 9), (1.9, 0), (2.1, 0)])
+def test_courses_far_less_high_than_most_are_named(head, count):
+    """Heads 0.1, 0.2 and 0 m apart; a door's lintel bears on 0.65 and 0.85 m by default."""
+    lengths = {"breadth": 8.0, "height": 3.6, "width": 0.65, "course": 0.3, "stone": 0.7}
+    openings = [lay_opening(left, left + 1.4, 0.0, 2.1, f"{left}") for left in (-2.7, 1.3)]
+    openings.append(lay_opening(-0.45, 0.45, 1.1, head, "window"))
+    wall = af.shapes.wall(**lengths, openings=openings)
+    low = [x.name for x in wall.blocks if np.ptp(x.points[:, 1]) < 0.14]
+    assert len(low) == count
+    says = describe_depths(wall)
+    words = f"\nstones less high than 0.5 of the usual 300 mm: '{(low or [''])[0]}' (100 mm), "
+    assert (words in says) == ("less high" in says) == bool(low)
+    assert ("' (100 mm) and 6 more; give nearly equal heads and sills one level" in says) is bool(
+        low
+    )
+    if head == 2.0:
+        assert says.endswith(
+            "least bearing of a lintel: 425 mm, of 'course 8, stone 5'; most 850 mm"
+        )
+        # a body on the wall is no stone of it
+        roof = {"x": 0.0, "length": 0.6, "weight": 1e3, "centre_of_gravity": 0.05}
+        body = af.masonry.carrying(wall, [af.masonry.StandingBody(**roof, name="roof")])
+        assert "(100 mm) and 6 more;" in describe_depths(body)
+
+
 def lay_front(bearing=None, extra=()):
     """A door and two windows below three upper windows on nearly the same axes."""
     places = [(-2.9, 1.0, 0.0, 2.1), (-0.6, 0.9, 0.9, 2.1), (1.6, 0.9, 0.9, 2.1)]
