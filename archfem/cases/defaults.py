@@ -27,7 +27,7 @@ _OF_STRESS = (
     "of stress alone, as only a strength that is given counts in limit analyses and ratings"
 )
 
-_OF_FRICTION = "dry stone has {:g} to {:g}; 0.6 is customary".format(*DRY_FRICTION)
+_OF_DRY = "dry stone has {:g} to {:g}".format(*DRY_FRICTION)
 
 # Values of materials and contacts that decide: name in texts, unit as number and text, and source
 DECIDING_VALUES = {
@@ -39,7 +39,7 @@ DECIDING_VALUES = {
     "contacts": {
         "normal_stiffness": ("k_n", 1e9, " MPa/mm", f"{_PAPER}; measured ones differ tenfold"),
         "shear_stiffness": ("k_s", 1e9, " MPa/mm", f"{_PAPER}; measured ones differ tenfold"),
-        "friction": ("μ", 1.0, "", _OF_FRICTION),
+        "friction": ("μ", 1.0, "", f"{_OF_DRY}; 0.6 is customary"),
     },
 }
 
@@ -257,15 +257,16 @@ def _has_default_vertical(case: Case) -> bool:
 
 def describe_margins_at_rest(case: Case, structure: Structure) -> list[str]:
     """Describe from which friction and depth of joints it stands, with a note on friction."""
-    if not (sentence := describe_friction(structure)):
-        return []
-    least = least_friction(structure) or 0.0
     contacts = {joint.contact for joint in structure.joints}
+    most = max((x.coefficient for x in contacts if x.coefficient < inf), default=0.0)
+    high = [f"{NOTE_MARK}a coefficient of friction is {most:g}, and {_OF_DRY}"] * (most > 1.0)
+    if not (sentence := describe_friction(structure)):
+        return high
+    least = least_friction(structure) or 0.0
     open_ones = [each.name for each in contacts if "friction" in list_default_keys(case, each)]
-    lines = [f"as rigid blocks {sentence}", describe_geometric_factor(structure)]
+    lines = [f"as rigid blocks {sentence}", describe_geometric_factor(structure), *high]
     if open_ones and least > DRY_FRICTION[0]:
         names = join_names([f'contacts."{name}"' for name in sorted(open_ones)])
-        low, high = DRY_FRICTION
-        words = f"friction decides whether it stands: dry stone has {low:g} to {high:g}"
+        words = f"friction decides whether it stands: {_OF_DRY}"
         lines.append(f"{NOTE_MARK}{words}, and the case gives none in {names}")
     return lines

@@ -9,6 +9,7 @@ import archfem as af
 from archfem.cases.case import case_of
 from archfem.cases.defaults import (
     describe_defaults,
+    describe_margins_at_rest,
     describe_spectrum_defaults,
     explain_defaults,
     list_default_keys,
@@ -241,6 +242,15 @@ def test_check_explains_a_finish_with_its_range_in_place_of_defaults():
         low, usual, high = (f"{value / unit:.2g}" for value in sorted(values))
         assert f"{usual} ({low} to {high})" in line
     assert "Bandis" in line
+
+
+@pytest.mark.parametrize("friction", [6.0, 1.0, None])
+def test_a_friction_of_more_than_dry_stone_has_is_noted(friction):
+    contact = af.Contact(1e9, 4e8, friction=friction)
+    stack = af.column(breadth=0.6, heights=[1.2], contact=contact)
+    lines = describe_margins_at_rest(af.Case.of(BARE), stack)
+    note = "note: a coefficient of friction is 6, and dry stone has 0.4 to 0.8"
+    assert (note in lines) == any("dry stone" in each for each in lines) == (friction == 6.0)
 
 
 def test_courses_of_other_weights_state_equal_defaults_once(tmp_path):
