@@ -28,7 +28,12 @@ from archfem.errors import DidNotConverge, InvalidInput
 from archfem.joints.contact_law import LARGEST_CLOSING, ContactLaw
 from archfem.joints.criteria import assessed_joints
 from archfem.joints.resultants import joint_dataset, select_joint
-from archfem.limit.instability import explain_instability, name_free_end
+from archfem.limit.instability import (
+    describe_friction,
+    explain_instability,
+    least_friction,
+    name_free_end,
+)
 from archfem.limit.linear_programme import NoEquilibrium
 from archfem.masonry.block import Block, as_point, say_place
 from archfem.masonry.construction import Stage, resolve_stages
@@ -285,6 +290,12 @@ def _describe_failure(model: Model, error: DidNotConverge, newton: Newton | None
         return f"as rigid blocks it stands, but not with joints that open: {pieces}; {error}"
     soft = "joints are" if model.fidelity == "rigid" else "joints and blocks are"
     text = f"as rigid blocks it stands, but its {soft} too soft for its depth"
+    friction = float(model.structure.friction.max())
+    if friction < 1.1 * (least_friction(model.structure) or 0.0):
+        text = (
+            f"as rigid blocks {describe_friction(model.structure)}, which is too near its "
+            f"{friction:g} for joints that deform (give more of it, or stiffer joints)"
+        )
     part = _find_carried_part(model, newton)
     if part is None:
         return f"{text}: compare with stiffer joints; {error}"

@@ -734,6 +734,27 @@ def test_the_error_also_states_that_a_ring_carries_a_thousandth_of_its_weight():
         dead_load(thin_ring(1.48e9))
 
 
+@pytest.mark.slow
+def test_friction_at_its_limit_is_named_rather_than_soft_joints_alone(monkeypatch):
+    """With a tenth more friction the same joints carry it."""
+
+    def ring(friction):
+        sizes = {"radius": 1.0, "thickness": 0.24, "embrace": 200.0, "voussoirs": 15}
+        arch = af.circular_arch(**sizes, contact=af.Contact(1e9, 4e8, friction))
+        return af.build(arch, fidelity="rigid", displacements="large")
+
+    monkeypatch.setattr(equilibrium, "_find_carried_part", lambda *_: 0.08)
+    with pytest.raises(af.DidNotConverge) as caught:
+        dead_load(ring(0.45))
+    assert str(caught.value).startswith(
+        "as rigid blocks it stands from a coefficient of friction of 0.441, which is too near its "
+        "0.45 for joints that deform (give more of it, or stiffer joints): it stands if they are 13"
+    )
+    assert dead_load(ring(0.495)).steps >= 1
+    assert af.stands(ring(0.441).structure)
+    assert not af.stands(ring(0.44).structure)
+
+
 def test_with_cohesion_no_needed_stiffness_is_stated():
     contact = af.Contact(1e11, 0.2e11, 0.6, cohesion=0.05)
     ring = thin_ring(1e11).structure
