@@ -235,6 +235,14 @@ def describe_dislocation(structure: Structure) -> str:
     )
 
 
+def explain_residual(structure: Structure, fall: CollapseState | None) -> str:
+    """Return how to find whether a residual of a hundredth of the depth is one of soft joints."""
+    small = 0.1 * DISLOCATION * shallowest_part(structure)[0]
+    if fall is None or fall.time is not None or fall.residual < small:
+        return ""
+    return " and may decide the residual: compare with rigid joints, `archfem verdict CASE.toml`"
+
+
 def doubt_soft_blocks(*structures: Structure) -> tuple[Doubt, ...]:
     """Return the doubts of falls with fill in one piece, or with soft stones as rigid bodies."""
     named: tuple[list[str], list[str]] = [], []  # of fill, and of stones

@@ -15,7 +15,12 @@ from archfem._display import ResultDisplay, call_late_bound
 from archfem._netcdf import read_dataset, write_dataset
 from archfem._typing import Array
 from archfem._validation import check_type, validate_arguments, validate_methods
-from archfem.dynamics.collapse_state import COLLAPSE_STATES, CollapseState, describe_dislocation
+from archfem.dynamics.collapse_state import (
+    COLLAPSE_STATES,
+    CollapseState,
+    describe_dislocation,
+    explain_residual,
+)
 from archfem.dynamics.export import write_vtk, write_xdmf
 from archfem.dynamics.verdict import (
     ALL_DEFINITIONS,
@@ -330,7 +335,9 @@ class History(ResultDisplay):
         if mechanisms["any joints at once"] is not None:
             remarks.append(total_duration_remark(joints))
         if self.structure is not None and (law := describe_closing(self.structure)):
-            remarks.append(f"{law}, which was not varied")
+            remarks.append(
+                f"{law}, which was not varied{explain_residual(self.structure, self.fall)}"
+            )
         return Verdict(
             outcome=classify_outcome(self),
             doubts=self.doubts,

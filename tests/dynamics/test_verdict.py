@@ -11,7 +11,8 @@ from portals import DRY, box
 
 import archfem as af
 from archfem.dynamics import MECHANISM_DEFINITIONS, verdict
-from archfem.dynamics.collapse_state import describe_dislocation
+from archfem.dynamics.collapse_state import CollapseState, describe_dislocation
+from archfem.dynamics.history import with_fall
 from archfem.dynamics.verdict import total_duration_remark
 from archfem.joints.criteria import find_failed_joints
 from archfem.limit import mechanism_over_record
@@ -43,6 +44,18 @@ def test_the_words_are_written_from_the_fields(run):
     assert f"{describe_closing(run.structure)}, which was not varied" in lines
     assert repr(verdict) == f"Verdict({first!r})"
     assert verdict.headline in repr(run)
+
+
+def test_a_residual_of_a_hundredth_of_the_depth_is_compared_with_rigid_joints(run):
+    """Joints of presumed stiffness may ratchet, where rigid blocks stay; a fall has no residual."""
+    depth, remedy = (
+        run.structure.depths[0],
+        "compare with rigid joints, `archfem verdict CASE.toml`",
+    )
+    np.testing.assert_allclose(run.structure.depths, depth)
+    for share, time, said in ((0.011, None, True), (0.009, None, False), (0.011, 1.0, False)):
+        fall = CollapseState("stands", time, (), 0.02, share * depth, True)
+        assert (remedy in str(with_fall(run, fall).verdict)) == said
 
 
 def test_largest_rotation_and_slip_are_those_of_the_record(run):
