@@ -8,7 +8,7 @@ import hashlib
 import inspect
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, wraps
 from itertools import pairwise
@@ -536,8 +536,40 @@ class Structure(ResultDisplay):
             pushes[words] = 0.5 * self.width / float(arm)
         if self.heads.any():
             pushes["a strip from bottom to top"] = self.width / float(np.ptp(ends[:, :, 1]))
+        for pier, arm in self._find_piers(blocks):
+            words = f"the pier at x = {pier:.3g} m, with what it carries,"
+            pushes[words] = 0.5 * self.width / (arm - ground)
         body = min(pushes, key=pushes.__getitem__)
         return pushes[body], body
+
+    def _find_piers(self, blocks: Sequence[Block]) -> Iterator[tuple[float, float]]:
+        """Yield x of each pier between openings of a wall, and y of its centre of weight [m].
+
+        It carries the wall up to the middle of the openings beside it, but what is below these.
+        """
+        import shapely
+
+        rows: list[list[float]] = []  # left and right of openings above one another, and least head
+        for each in sorted((self.origin or ("", {}))[1].get("openings", ()), key=lambda x: x.left):
+            if rows and each.left < rows[-1][1]:
+                least = min(rows[-1][2], each.head)
+                rows[-1][1:] = max(rows[-1][1], each.right), least
+            else:
+                rows.append([each.left, each.right, each.head])
+        polygons = [shapely.Polygon(block.points) for block in blocks]
+        unit_weights = np.array([block.material.unit_weight for block in blocks])
+        far = 1e4  # beyond any wall
+        for (left, one, head), (other, right, beyond) in pairwise(rows):
+            halves = (
+                (0.5 * (left + one), head, one, far),
+                (other, beyond, 0.5 * (other + right), far),
+            )
+            boxes = [shapely.box(*each) for each in ((one, -far, other, far), *halves)]
+            cut = shapely.intersection(polygons, shapely.union_all(boxes))
+            met = shapely.area(cut) > 0.0
+            weights = shapely.area(cut[met]) * unit_weights[met]
+            heights = shapely.get_y(shapely.centroid(cut[met]))
+            yield 0.5 * (one + other), float(np.average(heights, weights=weights))
 
     @property
     def transverse_remark(self) -> str:

@@ -279,6 +279,26 @@ def test_a_wall_across_its_plane_is_a_strip_and_the_whole_less_its_openings():
     assert wall.transverse_push == (pytest.approx(min(pushes)), "all of it")
 
 
+@pytest.mark.parametrize("upper", [False, True])
+def test_a_pier_between_openings_overturns_before_the_wall_does(upper):
+    """A door and a window: half of the wall above each, and none of that below the window."""
+    given = {"head": 2.0, "breadth": 1.0}
+    openings = [af.shapes.Opening(left=-1.5, **given, name="door")]
+    openings.append(af.shapes.Opening(left=0.5, sill=1.0, **given, name="window"))
+    # pier 1 m broad and 3 m high, and half a metre at both sides above 2 m
+    areas, heights = np.array([3.0, 1.0]), np.array([1.5, 2.5])
+    if upper:  # on the same axis, half of 0.6 m is of this pier
+        high = {"left": 0.7, "breadth": 0.6, "sill": 2.5, "head": 2.75}
+        openings.append(af.shapes.Opening(**high, name="upper window"))
+        areas, heights = np.append(areas, -0.3 * 0.25), np.append(heights, 2.625)
+    wall = af.shapes.wall(breadth=6.0, height=3.0, width=0.5, course=0.25, openings=openings)
+    push, body = wall.transverse_push
+    assert body == "the pier at x = 0 m, with what it carries,"
+    assert push == pytest.approx(0.25 / (areas @ heights / areas.sum()))
+    whole = af.masonry.columns_across(wall)["whole"]
+    assert push < af.collapse_factor(whole, live=af.BodyForce(1.0), friction=None).factor
+
+
 @pytest.mark.parametrize(
     ("breadths", "levels"),
     [((3.0, 1.0), [0.0, 1.0, 2.0, 3.0]), ((2.0, 2.0), [0.0, 1.0, 1.4, 2.0, 2.6, 3.0])],
