@@ -515,8 +515,9 @@ class Structure(ResultDisplay):
         """Push across the plane that begins to overturn a body [g], and which body, in words.
 
         All blocks above a level turn as one body about the edge of the width there, held by nothing
-        else; or a strip of a wall in bond from bottom to top. The push is undefined (NaN) for a
-        single stack, which may be drawn across its plane.
+        else; or a strip of a wall in bond from bottom to top, or a pier between openings of the
+        shape `wall`. The push is undefined (NaN) for a single stack, which may be drawn across its
+        plane.
         """
         blocks = [self.blocks[number] for number in self.free]
         ends = np.array([[block.points.min(axis=0), block.points.max(axis=0)] for block in blocks])
