@@ -62,8 +62,9 @@ def find_first_failures(data: ReportData) -> Iterator[tuple[str, str]]:
     for state in ("falls", "dislocated", "mechanism"):
         first = {x.motion: (x.states[state], x.pga) for x in searches if state in x.states}
         first |= {name: (1.0, peak) for name, (found, peak) in unscaled.items() if found == state}
-        scales = [scale for scale, _ in first.values()]
-        scales += [x.all_steps for x in searches if x.all_steps and state == "falls"]
+        every = [*first.values()]
+        every += [(x.all_steps, x.pga) for x in searches if x.all_steps and state == "falls"]
+        scales = [scale for scale, _ in every]
         if not first or min(scales) >= least:  # a dislocation beyond a fall says nothing
             continue
         least, ends = min(scales), Ends.of(scales)
@@ -73,7 +74,7 @@ def find_first_failures(data: ReportData) -> Iterator[tuple[str, str]]:
         notes += [f"{ends:#.3g} × over {over}"] * (f"{ends[0]:#.3g}" != f"{ends[1]:#.3g}")
         notes += some[-1:] * (UNFINISHED in some)
         motion = f"'{name}'" if several or count > 1 else "the motion"
-        peaks = Ends.of(scale * peak for scale, peak in first.values())
+        peaks = Ends.of(scale * peak for scale, peak in every)
         beside = f" ({', '.join(notes)})" * bool(notes)
         verb = _say_state(state, stones.get(name, ""), first=True)
         words = f"{verb} at {least:#.3g} × {motion}, {peaks:.3g} g{beside}"
