@@ -33,6 +33,9 @@ from archfem.units import in_si_unit
 # Environment variable with the permitted modules; "*" permits those of all cases
 OWN_CODE_VARIABLE = "ARCHFEM_OWN_CODE"
 
+# Sections of a case that define its structure
+STRUCTURE_SECTIONS = ("structure", "materials", "contacts")
+
 # SHA-256 of each loaded module, by its name
 _loaded: dict[str, str] = {}
 

@@ -4,8 +4,9 @@ A point is one case of the study: a case and the keys in which it differs.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from copy import deepcopy
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import chain, product
 from math import isfinite, log2
 from pathlib import Path
@@ -15,15 +16,16 @@ import numpy as np
 from scipy import stats
 from scipy.stats import qmc
 
+from archfem._files import hash_value
 from archfem._validation import check_choice, check_integer, short_repr
 from archfem.cases.analysis_tables import complete_path
 from archfem.cases.case import Case
-from archfem.cases.provenance import hash_sections
+from archfem.cases.provenance import STRUCTURE_SECTIONS, hash_sections
 from archfem.cases.toml_file import apply_change, check_table, refuse_unknown
-from archfem.errors import InvalidInput
+from archfem.errors import ArchfemError, InvalidInput
 
 # Sections of a case that define its model
-MODEL_SECTIONS = ("structure", "materials", "contacts", "model", "dead_load")
+MODEL_SECTIONS = (*STRUCTURE_SECTIONS, "model", "dead_load")
 
 # Key that selects the one pair of the suite under which a point is evaluated
 PAIR_KEY = "suite.pair"
@@ -265,6 +267,16 @@ def list_varied_keys(points: Iterable[StudyPoint]) -> list[str]:
     keys = {key for point in cases for key, _ in point.changes}
     keys |= {key for each in tables for key in each if any(each[key] != t.get(key) for t in tables)}
     return sorted(keys)
+
+
+def list_structures(points: Iterable[StudyPoint]) -> list[str]:
+    """Return the digests of the structures of points, and of the cases that they change."""
+    cases = [point for point in points if isinstance(point, Point)]
+    found = {hash_sections(x.settings, x.folder, STRUCTURE_SECTIONS) for x in cases}
+    for point in {id(x.base): x for x in cases}.values():
+        with suppress(ArchfemError):  # some are no cases without changes
+            found.add(hash_value(replace(point, changes=()).case.structure))
+    return sorted(found)
 
 
 def flatten_tables(tables: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:

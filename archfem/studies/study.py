@@ -38,6 +38,7 @@ from archfem.studies.parameter_space import (
     check_points,
     describe_changes,
     group_by_model,
+    list_structures,
     list_varied_keys,
     parameter_axes,
 )
@@ -236,7 +237,8 @@ class Study:
         digests = [str(number) for number in range(len(self.points))]
         if store is not None:
             digests = [self.evaluator.digest(point) for point in self.points]
-            store.write_plan({**self._attributes, "points": digests})
+            plan = {**self._attributes, "points": digests}
+            store.write_plan({**plan, "structures": list_structures(self.points)})
             rows = store.load_rows(digests)
             _log_stored(store, digests, rows)
         # points of the same digest are evaluated once

@@ -11,6 +11,7 @@ import xarray as xr
 from loose_blocks import BREADTH, HEIGHT, G, overturns, sine
 
 import archfem as af
+from archfem._files import read_sealed_json, write_sealed_json
 from archfem.cases import answers
 from archfem.cases.report import conclusion, demands, doubts, report_data, sections
 from archfem.cases.report.outcomes import sentence
@@ -387,7 +388,9 @@ def test_the_answer_has_displacements_the_first_fall_and_the_checks(case):
     assert facts["in doubt"] == "scale of the motion"
     pieces = conclusion.build_conclusion(data).pieces
     over = "1.30 to 1.51 × over motions and time steps"
-    assert pieces[0].text == f"It first falls at 1.30 × 'a', 0.26 to 0.302 g ({over})."  # 1.51 × 0.2 g
+    assert (
+        pieces[0].text == f"It first falls at 1.30 × 'a', 0.26 to 0.302 g ({over})."
+    )  # 1.51 × 0.2 g
     texts = [getattr(piece, "text", "") for piece in pieces]
     # the head lists what stands as in doubt below, and no more
     assert "Note, kinematic assessment: The curve is an upper bound." in texts
@@ -462,7 +465,8 @@ def test_an_upper_bound_is_no_doubt_about_a_study_whose_cases_all_fail_by_it(cas
         ([], bound, ["study"]),
     ):
         data = data_of(case)
-        vars(data)["studies"] = [SimpleNamespace(worst={"least_margin": margins}, doubts=[doubt])]
+        found = SimpleNamespace(worst={"least_margin": margins}, doubts=[doubt], is_own=True)
+        vars(data)["studies"] = [found]
         assert doubts.list_decisive_doubts(data, [(doubts.STUDIES, doubt)]) == listed
 
 
@@ -1143,3 +1147,35 @@ def test_variations_that_miss_the_run_have_no_range_of_displacements(case):
         said = [x for x in texts if "argest displacements are 1.2 mm to 4 mm" in x]
         listed = str([*conclusion._capacity_rows(data)])
         assert (bool(said), "largest displacements 1.2 mm to 4 mm" in listed) == (stated, stated)
+
+
+def test_a_study_of_another_structure_has_no_part_in_the_answer(case, tmp_path):
+    """A block begins to move at the ratio of its sides; sites are of 0.2 g."""
+    sides = {"own": "0.5", "a point": "0.4", "other": "0.4"}
+    text = format_tables({**case.settings, "assessment": SPECTRUM, "limit": {"horizontal": 1.0}})
+    (tmp_path / "case.toml").write_text(text)
+    folders = [tmp_path / name for name in sides]
+    for folder, (name, side) in zip(folders, sides.items(), strict=True):
+        vary = "[0.5, 0.3]" if name == "a point" else "[0.35, 0.3]"
+        study = tmp_path / f"{name}.toml"
+        study.write_text(
+            f'title = "{name}"\ncase = "case.toml"\nset = ["structure.breadth={side}"]\n'
+            f'compute = "limit"\n[vary]\nstructure.breadth = {vary}\n'
+        )
+        command = ["study", str(study), "--out", str(folder), "--workers", "1"]
+        assert af.commands.main(command) == 0
+    given = af.Case.read(tmp_path / "case.toml")
+    push = PushFactors(1.25, 1.25, "the site's 0.2 g")
+    for shown, least in ((folders[:1], "own"), (folders[1:2], "a point"), (folders[2:], "")):
+        data = ReportData(given, {}, study_folders=shown)
+        vars(data)["statements"] = {"limit": state("limit", push)}
+        facts = dict(conclusion.list_facts(data))
+        said = f"In the study '{least}' the least push is 0.75 times the site's acceleration"
+        assert (said in facts["verdict"]) == ("study" in facts["verdict"]) == bool(least)
+        words = "The study 'other': none of its cases is known to have the structure of this report"
+        texts = [getattr(each, "text", "") for each in conclusion.build_conclusion(data).pieces]
+        assert any(f"In doubt, study: {words}." in text for text in texts) != bool(least)
+    # a plan without structures is of an earlier version
+    plan = folders[0] / "study.json"
+    write_sealed_json(plan, {"points": read_sealed_json(plan, "study")["points"]})
+    assert not ReportData(given, {}, study_folders=folders[:1]).own_studies

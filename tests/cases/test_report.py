@@ -1194,7 +1194,10 @@ def test_a_study_stands_in_a_report(kept, unplotted, tmp_path, capsys):
     assert "Study: Breadths." in shown
     assert "structure.breadth push [g] 0.5 0.25 1 0.5" in shown
     conclusion = " ".join(words_of(kept / "report.html").split())
-    assert "In the study the push is least, 0.25 g, at structure.breadth = 0.5." in conclusion
+    assert (
+        "In the study 'Breadths' the push is least, 0.25 g, at structure.breadth = 0.5."
+        in conclusion
+    )
     assert "Lengths" not in conclusion.partition("were not varied")[0]
     assert af.commands.main(["report", str(kept), "--study", str(tmp_path)]) == 1
     assert "has no study.txt: run `archfem study`" in capsys.readouterr().err
@@ -1214,6 +1217,7 @@ def test_studies_have_names_and_their_doubts_stand_in_a_report(kept, unplotted, 
         (tmp_path / f"{title}.toml").write_text(
             f'title = "{title}"\ncase = "column.toml"\nset = ["limit.horizontal=1"]\n'
             f'compute = "{compute}"\n[cases]\n"as given" = {{}}\n"rough" = {{ set = {rough} }}\n'
+            f'"as reported" = {{ set = {rough.replace("=2", "=0.6")} }}\n'
         )
     folders = {name: str(tmp_path / name) for name in ("Slides", "Pushes")}
     studies = {name: ["study", f"{place}.toml", "--out", place] for name, place in folders.items()}
@@ -1228,7 +1232,7 @@ def test_studies_have_names_and_their_doubts_stand_in_a_report(kept, unplotted, 
     assert af.commands.main(["report", str(kept), *shown]) == 0
     text = " ".join(words_of(kept / "report.html").split())
     head, _, rest = text.partition("What would change the answer?")
-    said = "In the study 'Slides' under 'first' and 'second' none of 2 cases falls"
+    said = "In the study 'Slides' under 'first' and 'second' none of 3 cases falls"
     for part in (head, rest):
         assert said in part
         assert "In the study 'Pushes' none lowers the push of 'as given'" in part

@@ -119,7 +119,7 @@ def _say_plainly(data: ReportData, doubtful: Sequence[str]) -> Iterator[str]:
         yield from _say_survival(data, doubtful, failing)
         yield from _say_first_failures(data)
         yield from say_fragile(data)
-        studied = [next(say_what_changes(each), "") for each in data.studies]
+        studied = [next(say_what_changes(each), "") for each in data.own_studies]
         if data.verdict_ranges or not any(studied):
             yield _say_what_decides(data.verdict_ranges)
         yield from filter(None, studied)
@@ -175,7 +175,7 @@ def _say_less(data: ReportData) -> Iterator[tuple[float, str]]:
         ("least_margin", "the least margin is {:.3g}", margins),
         (OVER_SITE, site, pushes),
     ):
-        least, place, study = find_least(data.studies, name)
+        least, place, study = find_least(data.own_studies, name)
         if least < 0.999 * min(own, default=-np.inf):
             yield least, f"in {study} {words.format(least)}, at {place}"
 
@@ -392,7 +392,7 @@ def _build_paragraphs(data: ReportData, doubtful: Sequence[str]) -> dict[str, li
         answer += [*stated[0]] if len(data.statements) == 1 and stated else [x for x, *_ in stated]
     answer += [*describe_ends(data), *_describe_ranges(data)]
     changes = [*_say_causes(data.verdict_ranges)]
-    changes += [text for study in data.studies for text in say_what_changes(study)]
+    changes += [text for study in data.own_studies for text in say_what_changes(study)]
     if fill := join_names(list_elastic_fill(data)):
         changes.append(f"{fill} is elastic in the runs and carries tension, which soil does not")
     changes += ["the checks of the numbers raise no doubt"] * (bool(data.runs) and not doubtful)

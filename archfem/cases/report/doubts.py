@@ -59,8 +59,14 @@ def list_doubts(data: ReportData) -> list[tuple[str, Doubt]]:
     doubts += [(VARIATIONS, Doubt(words)) for words in _list_unfinished(data)]
     for name, stated in data.statements.items():
         doubts += [(RESULTS[name], doubt) for doubt in _merge_motions(stated.doubts)]
+    known, words = (
+        {doubt.kind for _, doubt in doubts},
+        "is known to have the structure of this report",
+    )
+    others = (each.name for each in data.studies if not each.is_own)
+    doubts += [(STUDIES, Doubt(f"{name}: none of its cases {words}")) for name in others]
     # with their cases as a part of the words: they are of no other result
-    listed = (doubt for study in data.studies for doubt in study.doubts)
+    listed = (x for study in data.own_studies for x in study.doubts if x.kind not in known)
     return [*doubts, *((STUDIES, Doubt(str(replace(doubt, remedy="")))) for doubt in listed)]
 
 
@@ -100,7 +106,7 @@ def list_decisive_doubts(data: ReportData, doubts: Sequence[tuple[str, Doubt]]) 
 
     A bound from above can not change checks that fail by it, nor a study whose cases all do.
     """
-    checks, studies = list_checks(data), [each.worst for each in data.studies if each.doubts]
+    checks, studies = list_checks(data), [each.worst for each in data.own_studies if each.doubts]
     margins = [worst.get("least_margin", [1.0]) for worst in studies]
     failed = {
         RESULTS["assessment"]: bool(checks) and all(check.most < 1.0 for check in checks),
@@ -210,7 +216,7 @@ def list_elastic_fill(data: ReportData) -> list[str]:
 
 def list_unvaried(data: ReportData) -> list[str]:
     """Return what was not varied, without which "no doubt" says little."""
-    studied = {each for study in data.studies for each in list_studied(study)}
+    studied = {each for study in data.own_studies for each in list_studied(study)}
     if not data.runs:
         static = {"limit", "assessment", "pushover"} & data.statements.keys()
         return [each for each in ("lengths", "friction") if static and each not in studied]

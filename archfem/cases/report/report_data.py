@@ -10,10 +10,18 @@ from typing import Any
 import xarray as xr
 
 from archfem._display import DOUBT_MARK
-from archfem._files import check_listed, describe_deleted, group_of, path_inside, read_file_list
+from archfem._files import (
+    check_listed,
+    describe_deleted,
+    group_of,
+    hash_value,
+    path_inside,
+    read_file_list,
+)
 from archfem.cases.answers import RESULTS, Statement, cut_remedy
 from archfem.cases.case import Case
-from archfem.cases.report.study_findings import StudyFindings, read_studies
+from archfem.cases.provenance import STRUCTURE_SECTIONS
+from archfem.cases.report.study_findings import StudyFindings, read_study
 from archfem.cases.run import CASE_FILE, MOTION_VARIABLE, RATING_FILE
 from archfem.cases.toml_file import Table, parse_tables
 from archfem.dynamics.history import History
@@ -49,9 +57,17 @@ class ReportData:
 
     @cached_property
     def studies(self) -> list[StudyFindings]:
-        """Findings of the studies."""
+        """Findings of the studies, also of other structures."""
         own = [self.folder] if self.folder and (self.folder / "study.txt").is_file() else []
-        return read_studies(self.study_folders or own)
+        case = self.case
+        # a case in a folder of results has the blocks of its drawing
+        given = hash_value(case.structure), case.hash_sections(STRUCTURE_SECTIONS)
+        return [read_study(place, given) for place in self.study_folders or own]
+
+    @property
+    def own_studies(self) -> list[StudyFindings]:
+        """Findings of the studies of the structure of the case."""
+        return [each for each in self.studies if each.is_own]
 
     @cached_property
     def dead(self) -> xr.Dataset | None:

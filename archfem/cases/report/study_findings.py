@@ -1,7 +1,7 @@
 """Findings of a study in a report: the worst point of each case, falls first, and what decides."""
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from archfem._files import read_listed
+from archfem._files import hash_json, path_inside, read_file_list, read_listed, read_sealed_json
 from archfem._netcdf import read_dataset
 from archfem.cases.result_text import STATED_DOUBTS, UPPER_BOUNDS, mark_bound
 from archfem.dynamics.collapse_state import COLLAPSE_STATES, FALLEN_STATES
@@ -71,7 +71,8 @@ class StudyFindings:
     # DataFrame of the cases in the order of the study; `falls`, `dislocated` and `failed` of `runs`
     worst: Any
     folder: Path = Path()
-    name: str = "the study"  # with its title if it is one of several
+    name: str = "the study"  # with its title in a report
+    is_own: bool = True  # whether one of its cases, or their base, has the report's structure
 
     @cached_property
     def numbers(self) -> xr.Dataset:
@@ -126,15 +127,8 @@ def _merge_cases(doubts: Sequence[Doubt]) -> Doubt:
     return merge_doubts(doubts, places)
 
 
-def read_studies(folders: Sequence[Path]) -> list[StudyFindings]:
-    """Read the studies in some folders."""
-    found = [_read_study(place) for place in folders]
-    names = [f"the study '{each.title}'" if len(found) > 1 else each.name for each in found]
-    return [replace(each, name=name) for each, name in zip(found, names, strict=True)]
-
-
-def _read_study(place: Path) -> StudyFindings:
-    """Read the study in a folder."""
+def read_study(place: Path, structure: Collection[str]) -> StudyFindings:
+    """Read the study in a folder for a report of a structure, of which there are digests."""
     if not (place / "study.txt").is_file():
         begun = (place / "progress.json").is_file()
         words = "its study is not finished: run it again, which continues it"
@@ -142,7 +136,12 @@ def _read_study(place: Path) -> StudyFindings:
         raise InvalidInput(f"{place} has no study.txt: {words}")
     title, _, text = read_listed(place, "study.txt").decode("utf-8").strip().partition("\n\n")
     found = collect_findings(title, text, read_dataset(place / "results.nc", "table"))
-    return replace(found, folder=place)
+    plan, listed = path_inside(place, "study.json"), read_file_list(place).get("study")
+    kept = read_sealed_json(plan, "study") if plan.is_file() else {}
+    # the plan is rewritten before its table
+    fits = listed is not None and listed.inputs == hash_json(kept.get("points"))
+    is_own = fits and not {*structure}.isdisjoint(kept.get("structures", ()))
+    return replace(found, folder=place, name=f"the study '{title}'", is_own=is_own)
 
 
 def collect_findings(title: str, text: str, table: xr.Dataset) -> StudyFindings:
