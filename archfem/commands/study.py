@@ -55,7 +55,11 @@ def study(options: argparse.Namespace) -> int:
 
 def _write_results(definition: "Study", table: xr.Dataset, folder: Path) -> list[Doubt]:
     """Print, write and draw the table of a study, with comparisons, and return its doubts."""
-    from archfem.cases.report.study_findings import collect_findings, say_what_changes
+    from archfem.cases.report.study_findings import (
+        collect_findings,
+        say_below_site,
+        say_what_changes,
+    )
     from archfem.studies.comparison import file_name, study_table, write_finding
     from archfem.studies.study import NOT_COMPUTED, Comparison
     from archfem.view.studies import draw_findings, draw_study
@@ -68,7 +72,8 @@ def _write_results(definition: "Study", table: xr.Dataset, folder: Path) -> list
     if isinstance(definition, Comparison) and definition.statements:
         text = f"{definition.answers(table)}\n\n{text}"
     found = collect_findings(definition.title, text, table)
-    said = [*say_what_changes(found), *(f"{DOUBT_MARK}{doubt}" for doubt in found.doubts)]
+    said = [*say_what_changes(found), *say_below_site(found)]
+    said += [f"{DOUBT_MARK}{doubt}" for doubt in found.doubts]
     text = "\n\n".join(filter(None, [text, "\n".join(said)]))
     print(text)
     left = table["error"].values.ravel().tolist().count(NOT_COMPUTED)

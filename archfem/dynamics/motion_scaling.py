@@ -50,6 +50,7 @@ from archfem.masonry.structure import Structure, join_names
 from archfem.models.model import Doubt, Model
 from archfem.motion.motion import Motion, admissible_range
 from archfem.statics.equilibrium import Equilibrium, dead_load
+from archfem.units import Ends
 
 # Step of a search that is given none, and the least to which it is shortened for sliding [s]
 OWN_STEP, LEAST_STEP = 0.005, 0.0005
@@ -175,8 +176,9 @@ class CollapseScale:
             none = f"{len(unanswered)} have none, the first at {min(unanswered):#.3g} ×"
             met = f"falls in no run that has an answer ({none})"
         if least < last:
-            at = f"first falls at {last:#.3g} ×" if last < inf else "falls at no scale"
-            met = f"{met}, {'the other' if len(self._every) == 2 else 'the last'} time step {at}"
+            at = f"first at {last:#.3g} ×" if last < inf else "at no scale"
+            ends = {dt: each[COLLAPSE_DEFINITION].upper for dt, each in self._finished.items()}
+            met = f"{met}, by steps of {1e3 * max(ends, key=ends.__getitem__):g} ms {at}"
         if self.above:
             met = f"{met}, and {say_again(self.above)}"
         if self.dislocated < inf:
@@ -229,10 +231,10 @@ class CollapseScale:
         doubts = [*self.of_model]
         low, high = self.first_falls
         if len(self._finished) > 1 and _disagreeing(self._finished):
-            words, ends = "its time steps find the first fall at {:#.3g} × the motion", (low, high)
+            words = f"its time steps find the first fall at {Ends((low, high)):#.3g} × the motion"
             if high == inf:
-                words, ends = "a time step finds a fall at {:#.3g} ×, and another none", (low, low)
-            doubts.append(Doubt(words, "", (ends,)))
+                words = f"a time step finds a fall at {low:#.3g} ×, and another none"
+            doubts.append(Doubt(words))  # ranges of several motions are none of steps
         every = {
             dt: replace(search, runs=(run,))
             for dt, search in self.longer.items()

@@ -17,7 +17,7 @@ from archfem.cases.report import conclusion, demands, doubts, report_data, secti
 from archfem.cases.report.outcomes import sentence
 from archfem.cases.report.report_data import ReportData
 from archfem.cases.report.study_findings import collect_findings
-from archfem.cases.result_text import PushFactors, site_acceleration
+from archfem.cases.result_text import UPPER_BOUNDS, PushFactors, site_acceleration
 from archfem.cases.run import MOTION_VARIABLE
 from archfem.cases.toml_file import format_tables
 from archfem.commands import margin
@@ -365,10 +365,9 @@ def test_the_answer_has_displacements_the_first_fall_and_the_checks(case):
         scales("a", 1.1, falls=1.3),
         scales("b", 1.1, falls=1.41, all_steps=1.51),
     )
-    steps, rigid = "its time steps find the first fall at {:.3g} ×", Doubt("none falls as rigid")
-    scaled = [
-        Doubt(steps, "", (ends,), name) for name, ends in (("a", (1.3, 1.38)), ("b", (1.4, 1.51)))
-    ]
+    steps, rigid = "its time steps find the first fall at", Doubt("none falls as rigid")
+    ends = ("a", "1.3 to 1.38"), ("b", "1.4 to 1.51")
+    scaled = [Doubt(f"{steps} {found} ×", place=name) for name, found in ends]
     scaled += [Doubt(rigid.words, place=name) for name in "ab"]
     bound = Doubt("the curve is {}", "", (UPPER_BOUND,))
     check = answers.Ratios("damage", ["right", "left"], 0.592, 0.592, bodies=0.488)
@@ -398,8 +397,8 @@ def test_the_answer_has_displacements_the_first_fall_and_the_checks(case):
         x for x in texts if "steps find" in x
     ]
     assert (
-        "In doubt, scale of the motion: Under 'a' and 'b': its time steps find the first fall at "
-        "1.3 to 1.51 ×. Under 'a' and 'b': none falls as rigid."
+        f"In doubt, scale of the motion: Under 'a': {steps} 1.3 to 1.38 ×. Under 'b': {steps} "
+        "1.4 to 1.51 ×. Under 'a' and 'b': none falls as rigid."
     ) in texts
     assert any("The doubts below, on scale of the motion, may change this." in x for x in texts)
     for at, said in (1.2, True), (1.35, False):
@@ -761,7 +760,7 @@ def test_the_head_of_a_push_says_when_it_begins_to_move(case):
     ("result", "finding", "words"),
     [
         ("limit", "least_push_over_site", "push is 0.4 times the site's acceleration"),
-        ("assessment", "least_margin", "margin is 0.4"),
+        ("assessment", "least_margin", "margin is ≤ 0.4"),
     ],
 )
 def test_a_study_that_finds_less_is_named_beside_the_result(
@@ -776,10 +775,12 @@ def test_a_study_that_finds_less_is_named_beside_the_result(
     data = data_of(case)
     vars(data)["case"] = af.Case.of({**case.settings, "assessment": SPECTRUM})
     table = xr.Dataset({finding: ("x", [0.7, least, np.nan])}, {"x": [1.0, 2.0, 3.0]})
+    bounds = "least_margin" * (result == "assessment")
+    table[UPPER_BOUNDS] = "x", [bounds] * 3
     vars(data)["studies"] = [collect_findings("", "", table)]
     margin = say_margin(data, **{result: stated})
     (verdict,) = [text for name, text in conclusion.list_facts(data) if name == "verdict"]
-    lower = f"in the study the least {words}, at {place}"
+    lower = f"in the study the least {words}, at {place}{', where the check fails' * bool(bounds)}"
     assert [x for x in margin if "study" in x] == [lower] * bool(place)
     assert (sentence(lower) in verdict) == ("study" in verdict) == bool(place)
 

@@ -228,7 +228,9 @@ def test_of_factors_the_least_is_the_worst():
     )
     found = study_findings.collect_findings("", "", pushed)
     assert [*study_findings.say_what_changes(found)] == [
-        "in the study 'd' lowers the push most, from 0.25 g to 0.2 g",
+        "in the study 'd' lowers the push most, from 0.25 g to 0.2 g"
+    ]
+    assert [*study_findings.say_below_site(found)] == [
         "1 of 4 cases begins to move below the site's acceleration: 'd', at 0.926 of it",
     ]
     assert study_findings.tabulate_study(found).head == [

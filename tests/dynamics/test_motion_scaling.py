@@ -418,7 +418,8 @@ def test_the_smallest_fall_of_any_step_is_the_one_that_is_stated(monkeypatch):
     assert float(first) == least["fallen"]
     assert found.first_falls == (found.states["falls"], last)
     assert found.states["dislocated"] == moved.scale == pytest.approx(least["dislocated"], rel=5e-3)
-    assert f" ({first} × the motion), the last time step first falls at {last:#.3g} ×" in str(found)
+    steps = [f"by steps of {1e3 * dt:g} ms first at {last:#.3g} ×" for dt in found.searches]
+    assert any(f" ({first} × the motion), {step}" in str(found) for step in steps)
     assert [*map(str, found.doubts)] == [
         f"its time steps find the first fall at {first} to {last:#.3g} × the motion",
         f"at {first} × by 5 ms: slip is wrong",
@@ -533,8 +534,8 @@ def test_collapse_is_between_a_stable_and_a_falling_run_at_every_step():
     assert found.above == (2.7, 3.0)
     assert found.bracket(0.005).upper == 2.5
     assert str(found) == (
-        "stands at 1.00 × the motion, falls at 2.00 × the motion, the other time step first falls "
-        "at 2.50 ×, and stands again at some scales from 2.70 to 3.00 ×; stands at every "
+        "stands at 1.00 × the motion, falls at 2.00 × the motion, by steps of 5 ms first at "
+        "2.50 ×, and stands again at some scales from 2.70 to 3.00 ×; stands at every "
         "smaller scale that was run: from 0.500 × on they are up to a factor of 2.00 apart, and "
         "none between was run; varied were the scale and the time step (10, 5 ms), and no property"
     )
@@ -579,13 +580,13 @@ def test_collapse_is_between_a_stable_and_a_falling_run_at_every_step():
     never = CollapseScale({0.01: fallen(1.0, -2.0), 0.005: fallen(1.0, 2.0)})
     assert (never.lower, never.upper, never.above) == (1.0, inf, ())
     assert str(never) == (
-        "stands at 1.00 × the motion, falls at 2.00 × the motion, the other time step falls at no "
-        "scale; varied were the scale and the time step (10, 5 ms), and no property"
+        "stands at 1.00 × the motion, falls at 2.00 × the motion, by steps of 5 ms at no scale; "
+        "varied were the scale and the time step (10, 5 ms), and no property"
     )
     (doubt,) = never.doubts
     assert str(doubt) == "a time step finds a fall at 2.00 ×, and another none"
     three = CollapseScale({dt: fallen(1.0, -upper) for dt, upper in enumerate((2.0, 2.2, 2.1))})
-    assert "2.00 × the motion, the last time step first falls at 2.20 ×" in str(three)
+    assert "2.00 × the motion, by steps of 1000 ms first at 2.20 ×" in str(three)
 
 
 def test_smaller_scales_at_which_it_is_dislocated_are_said():

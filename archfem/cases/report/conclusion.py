@@ -170,14 +170,15 @@ def _say_less(data: ReportData) -> Iterator[tuple[float, str]]:
     """Yield the least margin and the least push of studies where they are below the result's."""
     margins = [x.decisive for x in read_numbers(Ratios, data.statements.get("assessment"))]
     pushes = [x.least for x in read_numbers(PushFactors, data.statements.get("limit")) if x.site]
-    site = "the least push is {:.3g} times the site's acceleration"
+    site = "the least push is {} times the site's acceleration"
     for name, words, own in (
-        ("least_margin", "the least margin is {:.3g}", margins),
+        ("least_margin", "the least margin is {}", margins),
         (OVER_SITE, site, pushes),
     ):
-        least, place, study = find_least(data.own_studies, name)
-        if least < 0.999 * min(own, default=-np.inf):
-            yield least, f"in {study} {words.format(least)}, at {place}"
+        least, text, place, study = find_least(data.own_studies, name)
+        fails = ", where the check fails" * (name == "least_margin" and least < 1.0)
+        if least < 0.999 * min(own, default=np.inf):
+            yield least, f"in {study} {words.format(text)}, at {place}{fails}"
 
 
 def _say_ratings(data: ReportData, stated: Statement) -> Iterator[str]:

@@ -59,12 +59,10 @@ def list_doubts(data: ReportData) -> list[tuple[str, Doubt]]:
     doubts += [(VARIATIONS, Doubt(words)) for words in _list_unfinished(data)]
     for name, stated in data.statements.items():
         doubts += [(RESULTS[name], doubt) for doubt in _merge_motions(stated.doubts)]
-    known, words = (
-        {doubt.kind for _, doubt in doubts},
-        "is known to have the structure of this report",
-    )
+    known = {doubt.kind for _, doubt in doubts}
+    words = "none of its cases is known to have the structure of this report"
     others = (each.name for each in data.studies if not each.is_own)
-    doubts += [(STUDIES, Doubt(f"{name}: none of its cases {words}")) for name in others]
+    doubts += [(STUDIES, Doubt(f"{name}: {words}")) for name in others]
     # with their cases as a part of the words: they are of no other result
     listed = (x for study in data.own_studies for x in study.doubts if x.kind not in known)
     return [*doubts, *((STUDIES, Doubt(str(replace(doubt, remedy="")))) for doubt in listed)]

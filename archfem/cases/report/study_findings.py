@@ -252,6 +252,11 @@ def say_what_changes(found: StudyFindings) -> Iterator[str]:
     if counted or compared:
         said = then.join(filter(None, ["; ".join(counted), compared]))
         yield f"in {found.name}{found.under} {said}"
+
+
+def say_below_site(found: StudyFindings) -> Iterator[str]:
+    """Yield a sentence on the cases of a study that move below the site's acceleration, if any."""
+    rows = found.worst.to_dict("records")
     # undefined without a demand
     below = [row for row in rows if row.get(OVER_SITE, np.nan) < 1.0]
     if below:
@@ -260,15 +265,18 @@ def say_what_changes(found: StudyFindings) -> Iterator[str]:
         yield f"{count} below the site's acceleration: {list_first(listed, MAX_NAMES, '; ')}"
 
 
-def find_least(studies: Sequence[StudyFindings], name: str) -> tuple[float, str, str]:
-    """Return the least value of a finding in studies, infinite without one, its case and study."""
+def find_least(studies: Sequence[StudyFindings], name: str) -> tuple[float, str, str, str]:
+    """Return the least value of a finding in studies, its words, its case and its study.
+
+    It is infinite without one.
+    """
     rows = [
-        (row[name], found.label(row), found.name)
+        (row[name], mark_bound(row, name, f"{row[name]:.3g}"), found.label(row), found.name)
         for found in studies
         if name in found.names
         for row in found.worst.to_dict("records")
     ]
-    return min((row for row in rows if row[0] == row[0]), default=(np.inf, "", ""))
+    return min((row for row in rows if row[0] == row[0]), default=(np.inf, "", "", ""))
 
 
 def _find_reached_ends(found: StudyFindings, row: Any) -> list[str]:
