@@ -141,7 +141,8 @@ def _say_unchecked(data: ReportData) -> tuple[list[str], bool]:
     if data.across[0] or not _build_transverse(data):
         return [], False
     push, demand = data.case.structure.transverse_push[0], find_largest_demand(data)
-    falls = f", where it may overturn from {push:.3g} g on" * (push < demand)
+    falls = f", where it may overturn from {push:.3g} g on (demand {demand:.3g} g)"
+    falls *= push == push  # unknown of a single stack
     return [f"across the plane of the drawing it was not checked{falls}"], push < demand
 
 
@@ -225,7 +226,13 @@ def _say_survival(
     moved = f", and moves by {Ends.of(sizes):mm}" if known else ""
     beside = any(scale <= 1.0 for scale, *_ in _say_across(data))
     lead = f"in its plane{in_doubt} it" if beside else f"{answer}: it"
+    norm, checks = data.case.report.get("norm", ""), check_motions(data) if survives else []
+    missed = [f"{x.rule} is {x.found}, not {x.required}" for x in checks if x.met is False]
+    if missed and not reason:
+        lead = f"it{in_doubt}"
     yield f"{lead} {'; it '.join(describe_outcomes(data))}{moved}"
+    if missed and not reason:
+        yield f"the motions do not meet {norm}, as known from memory: {missed[0]}"
     yield from () if survives else failed
     ranges = sorted(data.verdict_ranges, key=lambda x: (x.falls.sum(), x.dislocated.sum()))
     for found in ranges[-1:]:
@@ -555,6 +562,10 @@ def _capacity_rows(data: ReportData) -> Iterator[tuple[str, Row]]:
         falls = describe_first_fall(first, data.motions[name].pga)
         outcome = f"as one rigid body it {falls}, held by nothing else"
         yield "", Row(f"across the plane, {key}", demand, outcome, factor, {})
+    (push, _), demand = data.case.structure.transverse_push, find_largest_demand(data)
+    if push == push and demand and not data.across[0] and _build_transverse(data):
+        outcome = f"not checked; held by nothing else it may overturn from {push:.3g} g on"
+        yield "", Row("across the plane", f"{demand:.3g} g", outcome, f"{push / demand:.3g}", {})
     for result, statement in data.statements.items():
         of = f" of {name_spectrum(data)}" if result == "assessment" else ""
         for row in sorted(statement.rows, key=lambda x: not _is_of_norm(data, x.demand)):
