@@ -288,7 +288,7 @@ def test_a_mechanism_is_stated_once(runs, piers):
         verdict = replace(runs[name].verdict, mechanisms=mechanisms, outcome="fallen")
         dataset, joints = runs[name].dataset, runs[name].joints
         found[name] = SimpleNamespace(verdict=verdict, dataset=dataset, joints=joints, fall=None)
-    data = report_data.ReportData(SimpleNamespace(structure=piers, suite=None), found)
+    data = report_data.ReportData(made_case(piers), found)
     (text,) = response._build_mechanism(data, found["first"])
     assert "Mechanism: verified, local mechanism of arch at 2.000 s by joint 1" in text.text
     other = SimpleNamespace(mechanisms={"verified": None, "any joints at once": hit})

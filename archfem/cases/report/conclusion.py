@@ -136,13 +136,23 @@ def _say_plainly(data: ReportData, doubtful: Sequence[str]) -> Iterator[str]:
     yield from [] if data.runs and overturns else unchecked
 
 
+def _find_unchecked_push(data: ReportData) -> tuple[float, float] | None:
+    """Return which push may overturn it across its plane, and the demand; None if it was checked.
+
+    The push is NaN where it is unknown, as of a single stack [g].
+    """
+    if data.across[0] or not _build_transverse(data):
+        return None
+    return data.case.structure.transverse_push[0], find_largest_demand(data)
+
+
 def _say_unchecked(data: ReportData) -> tuple[list[str], bool]:
     """Say that nothing was checked across the plane, and whether the demand may overturn it."""
-    if data.across[0] or not _build_transverse(data):
+    if (found := _find_unchecked_push(data)) is None:
         return [], False
-    push, demand = data.case.structure.transverse_push[0], find_largest_demand(data)
-    falls = f", where it may overturn from {push:.3g} g on (demand {demand:.3g} g)"
-    falls *= push == push  # unknown of a single stack
+    push, demand = found
+    beside = f" (demand {demand:.3g} g)" * (demand > 0.0)
+    falls = f", where it may overturn from {push:.3g} g on{beside}" * (push > 0.0)
     return [f"across the plane of the drawing it was not checked{falls}"], push < demand
 
 
@@ -562,10 +572,10 @@ def _capacity_rows(data: ReportData) -> Iterator[tuple[str, Row]]:
         falls = describe_first_fall(first, data.motions[name].pga)
         outcome = f"as one rigid body it {falls}, held by nothing else"
         yield "", Row(f"across the plane, {key}", demand, outcome, factor, {})
-    (push, _), demand = data.case.structure.transverse_push, find_largest_demand(data)
-    if push == push and demand and not data.across[0] and _build_transverse(data):
-        outcome = f"not checked; held by nothing else it may overturn from {push:.3g} g on"
-        yield "", Row("across the plane", f"{demand:.3g} g", outcome, f"{push / demand:.3g}", {})
+    overturns, site = _find_unchecked_push(data) or (np.nan, 0.0)
+    if overturns > 0.0 and site > 0.0:
+        outcome = f"not checked; held by nothing else it may overturn from {overturns:.3g} g on"
+        yield "", Row("across the plane", f"{site:.3g} g", outcome, f"{overturns / site:.3g}", {})
     for result, statement in data.statements.items():
         of = f" of {name_spectrum(data)}" if result == "assessment" else ""
         for row in sorted(statement.rows, key=lambda x: not _is_of_norm(data, x.demand)):

@@ -59,10 +59,12 @@ class ReportData:
     def studies(self) -> list[StudyFindings]:
         """Findings of the studies, also of other structures."""
         own = [self.folder] if self.folder and (self.folder / "study.txt").is_file() else []
-        case = self.case
+        folders, case = self.study_folders or own, self.case
+        if not folders:
+            return []
         # a case in a folder of results has the blocks of its drawing
         given = hash_value(case.structure), case.hash_sections(STRUCTURE_SECTIONS)
-        return [read_study(place, given) for place in self.study_folders or own]
+        return [read_study(place, given) for place in folders]
 
     @property
     def own_studies(self) -> list[StudyFindings]:
