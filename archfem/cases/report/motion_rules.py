@@ -80,7 +80,9 @@ def _check_spectra(data: ReportData, rule: SelectionRule) -> Iterator[Check]:
         return
     required = f"{rule.lower:g} to {rule.upper:g}" if rule.upper < np.inf else f"≥ {rule.lower:g}"
     ratios = f"{rule.shortest_ratio:g} T₁" if rule.shortest_ratio else f"{rule.shortest:g} s"
-    end = f"{rule.longest_ratio:g} T₁" + f", at least {rule.longest:g} s" * (rule.longest > 0.0)
+    end = f"{rule.longest_ratio:g} T₁"
+    if rule.longest > 0.0:
+        end = f"the longer of {end} and {rule.longest:g} s"
     name = f"mean spectrum over the target, from {ratios} to {end}"
     period, motions = find_period(data), [*data.motions.values()]
     if period is None:
