@@ -414,10 +414,9 @@ def _search(
 def _search_solutions(programme: Programme, start: Optimum | None, found: _SearchState) -> None:
     """Bound the objective; unless that proves a solution, search from all starts and descend."""
     joints = len(programme.blocks.structure.depths)
-    known = None if start is None else find_solution(programme, start.forces)
-    if known is not None and not known.converged:
-        known = None
-    if known is not None:
+    near = None if start is None else find_solution(programme, start.forces)
+    known = near if near and near.converged else None
+    if known:
         found.tried, found.solutions = 1, [known]
     state = start if known is None else known.state
     associated = -np.inf if state is None else state.value

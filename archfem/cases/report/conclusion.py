@@ -26,7 +26,7 @@ from archfem.cases.report.doubts import (
     peak_of_ground,
     spans_run,
 )
-from archfem.cases.report.motion_rules import check_motions, find_rule
+from archfem.cases.report.motion_rules import find_missed, find_rule
 from archfem.cases.report.outcomes import (
     describe_ends,
     describe_outcomes,
@@ -236,13 +236,13 @@ def _say_survival(
     moved = f", and moves by {Ends.of(sizes):mm}" if known else ""
     beside = any(scale <= 1.0 for scale, *_ in _say_across(data))
     lead = f"in its plane{in_doubt} it" if beside else f"{answer}: it"
-    norm, checks = data.case.report.get("norm", ""), check_motions(data) if survives else []
-    missed = [f"{x.rule} is {x.found}, not {x.required}" for x in checks if x.met is False]
-    if missed and not reason:
+    missed = find_missed(data) if survives and not reason else []
+    if missed:
         lead = f"it{in_doubt}"
     yield f"{lead} {'; it '.join(describe_outcomes(data))}{moved}"
-    if missed and not reason:
-        yield f"the motions do not meet {norm}, as known from memory: {missed[0]}"
+    for rule in missed[:1]:
+        norm, words = data.case.report["norm"], f"{rule.rule} is {rule.found}, not {rule.required}"
+        yield f"the motions do not meet {norm}, as known from memory: {words}"
     yield from () if survives else failed
     ranges = sorted(data.verdict_ranges, key=lambda x: (x.falls.sum(), x.dislocated.sum()))
     for found in ranges[-1:]:
@@ -307,7 +307,7 @@ def _say_test(data: ReportData) -> str:
         return "time histories with large displacements under motions of this spectrum can test it"
     if objection := object_to_motions(data):
         return f"the runs do not decide, for {objection}"
-    count, missed = len(data.runs), ", ".join(x.rule for x in check_motions(data) if x.met is False)
+    count, missed = len(data.runs), ", ".join(x.rule for x in find_missed(data))
     motions = f"the {count} motions" if count > 1 else "the motion"
     of = "matched to" if (data.case.suite or {}).get("matched") else "of"
     decide = f"decide{'s' * (count == 1)}" + f" (rule not met: {missed})" * bool(missed)

@@ -67,6 +67,11 @@ def check_motions(data: ReportData) -> list[Check]:
     return [number, *_check_spectra(data, rule), *_check_plateaus(data)]
 
 
+def find_missed(data: ReportData) -> list[Check]:
+    """Return the rules of the norm that the motions of a report do not meet."""
+    return [check for check in check_motions(data) if check.met is False]
+
+
 def find_target(data: ReportData) -> DesignSpectrum | None:
     """Return the spectrum that motions are compared with: of their suite, or of an assessment."""
     return data.case.target or data.case.assessment.spectrum
@@ -175,9 +180,7 @@ def tabulate_checks(data: ReportData) -> list[Grid]:
 
 def note_checks(data: ReportData) -> list[str]:
     """Return a note on the rules of the norm that the motions do not meet."""
-    missed = [
-        f"{x.rule}, {x.required}, is {x.found}" for x in check_motions(data) if x.met is False
-    ]
+    missed = [f"{x.rule}, {x.required}, is {x.found}" for x in find_missed(data)]
     rules = "a rule" if len(missed) == 1 else f"{len(missed)} rules"
     norm = data.case.report.get("norm", "")
     words = f"the motions do not meet {rules} of {norm}, as known from memory: {'; '.join(missed)}"
