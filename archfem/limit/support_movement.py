@@ -64,17 +64,19 @@ class Stage:
             translation by 1 m, the thrust on the support along it, in N.
         hinges: joints that are open, with the face where the blocks stay in contact.
         names: names of these joints.
+        faces: the same faces in words, left or right in a pier.
     """
 
     share: float
     work: float
     hinges: tuple[tuple[int, str], ...]
     names: tuple[str, ...]
+    faces: tuple[str, ...]
 
     def __str__(self) -> str:
         """Describe the share of the movement, the work, and the hinges, in one line."""
-        sides = zip(self.hinges, self.names, strict=True)
-        hinges = [f"{name} at the {side}" for (_, side), name in sides]
+        sides = zip(self.names, self.faces, strict=True)
+        hinges = [f"{name} at the {face}" for name, face in sides]
         return (
             f"from {self.share:.4f} of the movement, work {self.work:.4g} N m: "
             f"hinges: {join_names(hinges, '; ') or 'none'}"
@@ -347,5 +349,7 @@ class _MovementPath:
         hinges = tuple(
             (int(j), "intrados" if intrados[j] < extrados[j] else "extrados") for j in open_joints
         )
-        names = tuple(self.structure.joints[j].name for j, _ in hinges)
-        return Stage(share, float(blocks.force_unit * (cost @ state.forces)), hinges, names)
+        turning = [(self.structure.joints[j], side) for j, side in hinges]
+        names = tuple(joint.name for joint, _ in turning)
+        faces = tuple(joint.name_face(side) for joint, side in turning)
+        return Stage(share, float(blocks.force_unit * (cost @ state.forces)), hinges, names, faces)

@@ -326,6 +326,21 @@ def test_the_words_name_the_joints():
     assert found.stages[-1].names == ("joint 1", "joint 4", "joint 7")
 
 
+@pytest.mark.parametrize(("turn", "face"), [(0.002, "right"), (-0.002, "left")])
+def test_a_pier_stands_on_the_side_of_a_foundation_that_rises(turn, face, monkeypatch):
+    """The arches hold its head: of a foundation that turns anticlockwise that is the right one."""
+    monkeypatch.setattr(support_movement, "MAX_MOVEMENT_STEP", 0.5)
+    shape = {"span": 3.0, "rise": 1.0, "thickness": 0.4, "voussoirs": 7}
+    arches = [af.shapes.Arch(name=name, **shape) for name in ("left", "right")]
+    bridge = af.bridge(arches=arches, piers=[af.shapes.Pier(breadth=0.9, height=2.0, course=1.0)])
+    foundation = af.Settlement("pier, foundation", (0.0, 0.0, turn))
+    last = largest_movement(bridge, foundation, friction=None).stages[-1]
+    assert f"pier, base at the {face} face; " in str(last)
+    ring = {1: "extrados", -1: "intrados"}[int(np.sign(turn))]  # which the head pushes or leaves
+    assert f"; left, joint 7 at the {ring}; " in str(last)
+    assert {side for _, side in last.hinges} == {"intrados", "extrados"}
+
+
 def test_gaps_of_displaced_blocks_are_rates_of_opening():
     ring = semicircle(0.2, 6)
     chance = np.random.default_rng(2)
