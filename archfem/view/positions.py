@@ -29,10 +29,10 @@ def block_kinds(structure: Structure) -> list[str]:
 
 def decisive_instant(run: History) -> float:
     """Return when blocks came loose, else the first mechanism, else largest |e| of a joint [s]."""
-    return float(run.dataset["fall_time"][0]) if _falls(run) else first_motion_instant(run)
+    return float(run.dataset["fall_time"][0]) if comes_loose(run) else first_motion_instant(run)
 
 
-def _falls(run: History) -> bool:
+def comes_loose(run: History) -> bool:
     """Return whether blocks came loose in a motion or fell after it, and did not merely rock on."""
     fallen = run.fall is not None and run.fall.kind in FALLEN_STATES
     return "fall_pose" in run.dataset and (fallen or run.ending is not Ending.FINISHED)
@@ -73,7 +73,7 @@ def recorded_fields(run: History) -> tuple[Array, Array]:
 
 def peak_instant(run: History) -> float | None:
     """Return the time of the largest displacement [s]; None if it is unknown, or blocks fall."""
-    if "peak_displacement" not in run.dataset or _falls(run):
+    if "peak_displacement" not in run.dataset or comes_loose(run):
         return None
     if "fall_pose" in run.dataset:  # a tail after the motion, of which places are not kept
         if run.structure is None:
@@ -143,6 +143,7 @@ class FallingBlocks:
     level: float  # of the ground [m]
     # grains of fill that fall in its place, with their poses; else empty
     grains: xr.Dataset = field(default_factory=xr.Dataset)
+    state: str = "loose"  # or "rocking", where blocks merely rock on after the motion
 
     @classmethod
     def of(cls, structure: Structure, run: History) -> Self | None:
@@ -151,7 +152,8 @@ class FallingBlocks:
             return None
         times, poses = run.dataset["fall_time"].values, run.dataset["fall_pose"].values
         grains = run.dataset[[key for key in run.dataset if str(key).startswith("grain_")]]
-        return cls(structure, times, poses, make_bodies(structure, 0.0).level, grains)
+        level, state = make_bodies(structure, 0.0).level, "loose" if comes_loose(run) else "rocking"
+        return cls(structure, times, poses, level, grains, state)
 
     @property
     def broken(self) -> Numbers:

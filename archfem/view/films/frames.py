@@ -32,7 +32,7 @@ class Frame:
     places: Array  # displaced points of the cells (m, 2) [m]
     shades: Array  # values of the colour scale, by point (m,) or by cell
     time: float | None = None  # [s]; None for a state without time
-    words: Sequence[str] = ()  # numbers of failed joints, or that blocks are loose
+    words: Sequence[str] = ()  # numbers of failed joints, or that blocks are loose or rock
     marks: Marks = field(default_factory=Marks)  # of the joints, displaced
     # places where hinges were before, displaced (n, 2) [m]
     past: Array = field(default_factory=lambda: np.zeros((0, 2)))
@@ -122,7 +122,7 @@ def frames_of_fall(setup: Setup, falls: FallingBlocks, times: Array) -> Iterator
         grains = falls.grain_outlines(float(time))
         if grains:  # in their place the body, a point within one of them, is not seen
             places[np.isin(cells.block, falls.broken)] = grains[0].mean(axis=0)
-        yield Frame(places, shades, float(time), ["blocks are loose"], grains=grains)
+        yield Frame(places, shades, float(time), [f"blocks are {falls.state}"], grains=grains)
 
 
 def _places_and_values(setup: Setup, q: Array) -> tuple[Array, Array]:

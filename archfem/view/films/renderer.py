@@ -29,7 +29,7 @@ from archfem.view.films.frames import Frame, corner_values, frame_layers
 from archfem.view.films.settings import Scale, Setup
 from archfem.view.histories import draw_ground
 from archfem.view.joint_marks import joint_pairs
-from archfem.view.positions import ground_acceleration
+from archfem.view.positions import comes_loose, ground_acceleration
 from archfem.view.style import Colour, annotate, harpoons, style_colour_bar
 
 
@@ -228,7 +228,8 @@ class FrameLayout:
         times, ground = ground_acceleration(run)
         draw_ground(axes, times, ground, size=self.font_size, width=0.9)
         axes.set_xlabel("time [s]", fontsize=self.font_size)
-        instants = [(run.time[-1], "blocks loose")] if len(times) > len(run.time) else []
+        state = "blocks loose" if comes_loose(run) else "blocks rocking"
+        instants = [(run.time[-1], state)] if len(times) > len(run.time) else []
         if run.mechanism is not None and run.mechanism.time is not None:
             instants.append((run.mechanism.time, "mechanism"))
         width = axes.get_position().width * self._inches[0]

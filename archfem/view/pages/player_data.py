@@ -341,6 +341,7 @@ class Scene:
             "most": self.max_friction_ratio,
             "end": float(run.time[-1] if falls is None else falls.times[-1]),
             "loose": None if falls is None else float(falls.times[0]),
+            "state": None if falls is None else falls.state,
             "level": None if falls is None else falls.level,
             "mechanism": None if mechanism is None else mechanism.time,
             "peak": peak_instant(self.run),

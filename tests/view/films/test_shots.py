@@ -11,6 +11,7 @@ from archfem.view import film, films
 from archfem.view.films.frames import frames_of_fall, frames_of_run
 from archfem.view.films.renderer import FrameLayout
 from archfem.view.films.settings import Setup
+from archfem.view.pages.player_data import Scene
 from archfem.view.positions import FallingBlocks, fields_at
 
 
@@ -63,6 +64,29 @@ def test_joints_are_marked_while_they_hold_and_not_after(setup, toppled, falls):
     assert list(loose.words) == ["blocks are loose"]
     assert not len(loose.marks.links)
     assert not len(loose.past)
+
+
+@pytest.mark.slow
+def test_blocks_that_rock_on_after_a_motion_and_stand_are_not_loose():
+    """A joint parts within a motion, or opens again and again beyond its end."""
+    rocking = af.build(
+        af.column(breadth=0.4, heights=[2.4]), fidelity="rigid", displacements="large"
+    )
+    swing = 5.4 * np.sin(4.0 * np.pi * np.linspace(0.0, 0.5, 101))
+    record = af.Record(fields_every=5)
+    run = af.time_history(rocking, af.Motion(swing, 0.005), dt=0.005, record=record)
+    assert (str(run.ending), run.fall.kind) == ("finished", "stands")
+    assert run.dataset["fall_time"].size > 10
+    data = Scene(rocking.structure, run, rocking).data
+    assert (data["loose"], data["state"]) == (0.5, "rocking")
+    falls = FallingBlocks.of(rocking.structure, run)
+    setup = Setup.of(rocking, run.dataset["q"].values, "displacement", None).with_falls(falls)
+    (frame,) = frames_of_fall(setup, falls, falls.times[-1:])
+    assert list(frame.words) == ["blocks are rocking"]
+    layout = FrameLayout(setup, (480, 320), run.joints, run)
+    words = [text.get_text() for axes in layout._figure.axes for text in axes.texts]
+    assert "blocks rocking" in words
+    assert not any("loose" in word for word in words)
 
 
 def test_pictures_pass_over_into_the_fall(setup, toppled, falls):

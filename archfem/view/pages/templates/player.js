@@ -230,7 +230,7 @@
       const instants = [];
       if (scene.mechanism !== null) instants.push([scene.mechanism, "mechanism"]);
       if (scene.peak !== null) instants.push([scene.peak, ""]);
-      if (scene.loose !== null) instants.push([scene.loose, "blocks loose"]);
+      if (scene.loose !== null) instants.push([scene.loose, `blocks ${scene.state}`]);
       this.instants = instants.map(([time]) => [time, ""]);
       // on a phone a wide chart would have tiny words
       if (matchMedia("screen and (max-width: 44rem)").matches) this.find("ground").setAttribute("viewBox", this.find("e").getAttribute("viewBox"));
@@ -360,7 +360,7 @@
       const failing = Object.entries(counts).filter(([, count]) => count).map(([name, count]) => `${count} ${name}`);
       const scale = this.moves ? (by === 1 ? "true to scale" : `displacements ${times(by)}`) : arrays.opening ? `openings ${times(this.by)}` : "blocks where they stand";
       const peak = scene.peak !== null && Math.abs(scene.peak - this.time) < 2e-3 ? ["largest displacement"] : [];
-      this.find("state").textContent = [`t = ${this.time.toFixed(3)} s`, ...peak, ...(falling ? ["blocks are loose"] : failing), scale].join(" · ");
+      this.find("state").textContent = [`t = ${this.time.toFixed(3)} s`, ...peak, ...(falling ? [`blocks are ${scene.state}`] : failing), scale].join(" · ");
       this.find("time").value = this.time;
       this.find("times").textContent = times(this.by);
       const number = (name, digits, factor = 1) => {
