@@ -56,7 +56,7 @@ from archfem.errors import (
 from archfem.limit.collapse import Collapse, describe_fill
 from archfem.limit.rating import Rating
 from archfem.masonry.ring_thickness import find_ring
-from archfem.masonry.structure import Structure
+from archfem.masonry.structure import Structure, join_words
 from archfem.models.model import Doubt
 from archfem.motion.motion import Motion
 from archfem.motion.suite import Suite
@@ -419,6 +419,9 @@ def report(options: argparse.Namespace) -> None:
     if options.pdf:
         write_progress_line("report", "drawing figures")
     if (history := Path(options.folder)).is_file():
+        folders = {"set": options.changes, "study": options.studies, "inputs": options.inputs}
+        if ignored := join_words([f"--{name}" for name, value in folders.items() if value]):
+            raise InvalidInput(f"{history} takes no {ignored}: give the folder of its results")
         path = History.read(history).report(options.out or history.with_suffix(".html"))
     else:
         found = results.open_results(options.folder, inputs=options.inputs)

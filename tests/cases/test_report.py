@@ -510,6 +510,11 @@ def test_who_signs_is_in_the_head_and_changes_no_result(kept, unplotted, capsys)
     # the results are those of the case without it
     case = af.Case.read(kept / "case.toml")
     assert case.signed(["report.author=A. Mason"]).hash_inputs() == case.hash_inputs()
+    # one history has no folder whose words or studies it could show
+    alone = ["report", str(kept / "first" / "history.nc"), "--study", str(kept), *given]
+    assert af.commands.main(alone) == 1
+    assert "history.nc takes no --set and --study: give the folder" in capsys.readouterr().err
+    assert not (kept / "first" / "history.html").exists()
     capsys.readouterr()
     assert af.commands.main(["report", str(kept), "--set", "structure.breadth=2"]) == 1
     assert "'structure.breadth' changes results: run the case again" in capsys.readouterr().err
