@@ -16,7 +16,7 @@ from archfem.motion.record_selection import SELECTION_RULES, SelectionRule
 from archfem.motion.response_spectra import response_spectrum
 from archfem.motion.signal_processing import PLATEAU
 from archfem.units import STANDARD_GRAVITY
-from archfem.view.pages.document import Grid
+from archfem.view.pages.document import Grid, TextBlock
 
 # Rules by the words of norms in [report], without spaces
 _NORMS = {"EN1998": "EC8", "EC8": "EC8", "EUROCODE8": "EC8", "NTC": "NTC-2018"}
@@ -168,11 +168,14 @@ def find_period(data: ReportData) -> float | None:
     return max(modes)[1] if modes else None
 
 
-def tabulate_checks(data: ReportData) -> list[Grid]:
-    """Tabulate the rules of the norm of a report for its motions, with their source."""
+def tabulate_checks(data: ReportData) -> list[Grid | TextBlock]:
+    """Tabulate the rules of the norm of a report for its motions; without one, say why not."""
     rule, checks = find_rule(data), check_motions(data)
     if rule is None or not checks:
-        return []
+        norm = data.case.report.get("norm")
+        why = f"those of {norm} are unknown" if norm else "[report] names no norm"
+        rules = "number of motions, mean spectrum, stationary part"
+        return [TextBlock(f"Rules for motions ({rules}) were not checked, for {why}.")]
     rows = [(*check[:3], check.state) for check in checks]
     caption = f"Rules for motions. {rule.source}; stationary part from memory"
     return [Grid(("rule", "required", "found", ""), rows, caption, "words")]
