@@ -332,3 +332,25 @@ def test_a_report_is_printed_as_pdf(small, tmp_path):
     assert "fields_every = 8" in page.read_text(encoding="utf-8")
     assert "fields_every = 8" not in text
     assert "largest displacement" in text
+
+
+def test_figures_leave_no_page_of_a_report_half_empty(tmp_path):
+    """The lowest line on each page but the last is below seven tenths of its 265 mm."""
+    pypdf = pytest.importorskip("pypdf")
+    if BROWSER is None:
+        pytest.skip("there is no chromium")
+    *_, run = af.cases.run_case(af.Case.read("meshes/ring.toml"))
+    page = run.report(tmp_path / "report.html")
+    pages = pypdf.PdfReader(print_page(page, tmp_path / "report.pdf")).pages
+    assert 4 < len(pages) <= 8
+    for each in pages[:-1]:
+        heights = []
+
+        def keep(text, cm, tm, *_, kept=heights):
+            if text.strip():
+                kept.append(tm[4] * cm[1] + tm[5] * cm[3] + cm[5])
+
+        each.extract_text(visitor_text=keep)
+        # above the number of the page, in its margin of 17 mm; in points
+        low = min(height for height in heights if height > 17.0 / 25.4 * 72.0)
+        assert (282.0 - low / 72.0 * 25.4) / 265.0 > 0.7
