@@ -12,6 +12,12 @@ VOID = {"br", "hr", "img", "input", "link", "meta", "path", "circle", "rect", "c
 """Elements without a closing tag, and those of SVG that close themselves."""
 
 
+def head_of(facts):
+    """The answer in the head of a report, in one text."""
+    lines = ("verdict", "margin", "depends on", "not checked")
+    return " ".join(text for name, text in facts if name in lines)
+
+
 class Reader(HTMLParser):
     """Keeps the open elements, the addresses that they load, and the text."""
 

@@ -578,7 +578,7 @@ class Structure(ResultDisplay):
         push, body = self.transverse_push
         if np.isnan(push):
             return (
-                f"{UNCHECKED_ACROSS}; if that is the section of a wall, the wall is checked across "
+                f"{UNCHECKED_ACROSS}; if that is the section of a wall, it is checked across "
                 "its own plane here, and in it by a case of its own"
             )
         loaded = any(self.blocks[number].material.stands_for for number in self.free)

@@ -74,8 +74,8 @@ def test_a_short_stationary_part_is_a_note():
     assert states(data)["stationary part of artificial motions"] == "not met"
     (note,) = motion_rules.note_checks(data)
     assert note == (
-        "the motions do not meet a rule of EN 1998-1, as known from memory: stationary part of "
-        "artificial motions, ≥ 10 s, is 3.5 s, 35% of 10 s"
+        "rule of EN 1998-1 that motions do not meet, from memory: stationary part of artificial "
+        "motions, ≥ 10 s, is 3.5 s, 35% of 10 s"
     )
     level = af.motion.signal_processing.intensity_envelope(1001)
     assert np.mean(level == 1.0) == pytest.approx(0.35, abs=0.01)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from matplotlib.figure import Figure
+from pages import head_of
 
 import archfem as af
 from archfem._files import replace_results
@@ -208,16 +209,18 @@ def test_the_first_lines_of_a_report_have_the_largest_of_all_runs(piers, runs):
     data = report_data.ReportData(made_case(piers), runs)
     facts = dict(conclusion.list_facts(data))
     assert facts["structure"] == f"{len(piers.free)} blocks, {len(piers.joints)} joints"
-    assert facts["motions"] == "PGA 0.03 to 0.06 g"
+    assert re.fullmatch(r"Does it withstand motions of PGA 0.03\d to 0.0\d+ g\?", facts["question"])
     doubtful = any(run.verdict.doubts for run in runs.values())
     assert facts.get("in doubt") == ("time histories" if doubtful else None)
-    assert facts["verdict"].startswith("It survives: it forms no mechanism under all 2 motions of")
+    assert head_of(facts.items()).startswith(
+        "It survives: it forms no mechanism under all 2 motions of"
+    )
     one = report_data.ReportData(data.case, {"first": runs["first"]})
-    said = dict(conclusion.list_facts(one))["verdict"]
+    said = head_of(conclusion.list_facts(one))
     assert said.startswith("It survives: it forms no mechanism under the motion 'first' of PGA")
     broken = af.History(runs["first"].dataset.assign_attrs(ended="interrupted"), piers)
     unknown = report_data.ReportData(data.case, {"first": broken})
-    assert dict(conclusion.list_facts(unknown))["verdict"].startswith("It may or may not survive")
+    assert head_of(conclusion.list_facts(unknown)).startswith("It may or may not survive")
     none = report_data.ReportData(data.case, {})
     assert "verdict" not in dict(conclusion.list_facts(none))
 
@@ -240,7 +243,9 @@ def test_the_pga_of_a_report_is_that_of_the_motion_and_not_of_the_steps(piers):
     assert np.abs(run.dataset["ground"]).max() < 1.9
     data = report_data.ReportData(made_case(piers), {"only": run})
     vars(data)["motions"] = {"only": motion}
-    assert dict(conclusion.list_facts(data))["motion"] == "PGA 0.20 g"
+    assert (
+        dict(conclusion.list_facts(data))["question"] == "Does it withstand motions of PGA 0.2 g?"
+    )
 
 
 def test_a_report_of_several_runs_has_a_section_for_each(runs, piers, monkeypatch):

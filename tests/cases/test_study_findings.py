@@ -107,7 +107,7 @@ def test_a_study_of_lengths_says_that_the_limit_of_dislocation_is_that_of_the_ca
     """A tenth of the joints' depth, of which the line in the picture is the one of the case."""
     found = study(cases=3, varied=key)
     data = SimpleNamespace(case=SimpleNamespace(structure=ring))
-    _, figure = sections._build_study(data, found)
+    *_, figure = sections._build_study(data, found)
     limit = f"{100.0 * np.median(ring.depths):.3g} mm"
     assert f"dotted the limit of dislocation of the case, {limit}" in figure.caption
     assert ("; cases of other lengths have others" in figure.caption) is own

@@ -234,8 +234,8 @@ def test_a_push_across_the_plane_overturns_all_from_the_ground_on():
     column = af.column(breadth=0.5, heights=[2.0, 1.0])
     assert np.isnan(column.transverse_push[0])
     assert column.transverse_remark == (
-        "nothing is checked across the plane of the drawing; if that is the section of a wall, the "
-        "wall is checked across its own plane here, and in it by a case of its own"
+        "nothing is checked across the plane of the drawing; if that is the section of a wall, it "
+        "is checked across its own plane here, and in it by a case of its own"
     )
 
 

@@ -10,7 +10,12 @@ from archfem._files import group_of, read_file_list
 from archfem.cases import result_text
 from archfem.cases.answers import RESULTS, Ratios, Row, Statement, read_numbers
 from archfem.cases.case import REPORT_KEYS
-from archfem.cases.report.demands import find_largest_demand, name_spectrum, tabulate_demands
+from archfem.cases.report.demands import (
+    find_largest_demand,
+    list_demands,
+    name_spectrum,
+    tabulate_demands,
+)
 from archfem.cases.report.doubts import (
     HISTORIES,
     STUDIES,
@@ -76,15 +81,21 @@ _BEGUN = {RESULTS["risk"]: "risk_samples.nc"}
 # What is known below the least push that a search has found, if nothing is
 NO_PROOF = "may begin at any less, as no lower bound is known"
 
+# What the ends of a range are of, where stones bear on fill
+OVER_FILL = "; its range is over what is assumed of the fill"
+
+# Lines of the head with the answer, in their order
+HEAD = ("verdict", "margin", "depends on", "not checked")
+
 # Project in the templates of new cases
 PLACEHOLDER = "Name of the project"
 
 # What the factors of results are, as multiples of their demands
 _FACTORS = {
-    "assessment": "at which a check is just passed",
-    **dict.fromkeys(("limit", "pushover", "rating"), "at which a load makes a mechanism"),
-    "scale": "up to which a scaled motion neither fells nor dislocates it",
-    "risk": "at which a fall has a probability of one half",
+    "assessment": "a check is just passed",
+    **dict.fromkeys(("limit", "pushover", "rating"), "a load makes a mechanism"),
+    "scale": "up to it no fall or dislocation",
+    "risk": "half a probability of a fall",
 }
 
 
@@ -96,44 +107,45 @@ def list_facts(data: ReportData) -> list[tuple[str, str]]:
         for key in REPORT_KEYS
         if report.get(key) and key != "demand"  # it stands beside the capacities
     ]
-    runs, structure = list(data.runs.values()), data.case.structure
+    structure = data.case.structure
     blocks = [("structure", f"{len(structure.free)} blocks, {len(structure.joints)} joints")]
     blocks += [("joints", structure.assessment)] if structure.assessment else []
     doubtful = list_decisive_doubts(data, list_doubts(data))
     doubts = [("in doubt", ", ".join(doubtful))] if doubtful else []
-    verdict = " ".join(map(sentence, _say_plainly(data, doubtful)))
-    verdicts = [("verdict", verdict)] if verdict else []
-    peak = [("motions" if len(runs) > 1 else "motion", describe_peaks(runs))] if runs else []
-    return [*signed, *verdicts, *doubts, *blocks, *peak]
+    said: dict[str, list[str]] = {key: [] for key in HEAD}
+    for key, text in _say_plainly(data, doubtful):
+        said[key].append(sentence(text))
+    head = [(key, " ".join(texts)) for key, texts in said.items() if texts]
+    named = [f"{x.partition(',')[0]} of PGA {p:.2g} g" for x, p, _, of in list_demands(data) if of]
+    question = [("question", f"Does it withstand {join_words(named)}?")] if named else []
+    return [*signed, *question, *head, *doubts, *blocks]
 
 
-def _say_plainly(data: ReportData, doubtful: Sequence[str]) -> Iterator[str]:
-    """Yield the answer for a client: whether it survives, from where on not, and what decides."""
+def _say_plainly(data: ReportData, doubtful: Sequence[str]) -> Iterator[tuple[str, str]]:
+    """Yield the answer for a client, in the lines of the head."""
     checks = list_checks(data)
     failed = [check for check in checks if check.least < 1.0]
     found = dict.fromkeys(_judge_check(data, check)[0] for check in failed or checks)
     assessed = [f"by the kinematic assessment {words}" for words in found]
     unchecked, overturns = _say_unchecked(data)
+    answer, margin, depends, left = HEAD
     if data.runs:
         failing = [*assessed * bool(failed), *unchecked * overturns]
-        yield from _say_survival(data, doubtful, failing)
-        yield from _say_first_failures(data)
-        yield from say_fragile(data)
-        studied = [next(say_what_changes(each), "") for each in data.own_studies]
-        if data.verdict_ranges or not any(studied):
-            yield _say_what_decides(data.verdict_ranges)
-        yield from filter(None, studied)
-    yield from [] if data.runs and failed else assessed
+        yield from ((answer, x) for x in _say_survival(data, doubtful, failing))
+        yield from ((margin, x) for x in [*_say_first_failures(data), *say_fragile(data)])
+        yield from ((depends, x) for x in _say_conditions(data))
+    yield from [] if data.runs and failed else ((answer, x) for x in assessed)
     for name, stated in data.statements.items():
-        yield from (pushes := [*_say_pushes(data, name, stated)])
+        pushes = [*_say_pushes(data, name, stated)]
+        yield from ((margin if data.runs else answer, x) for x in pushes)
         if name == "rating":
-            yield from _say_ratings(data, stated)
+            yield from ((answer, x) for x in _say_ratings(data, stated))
         elif name == "risk" or not (data.runs or pushes or name in ("assessment", "scale")):
             for row in stated.rows[:1]:
-                times = f", at {row.factor} times {row.demand}"
-                yield f"{row.result}: {row.outcome}{times * (name != 'risk' and row.factor != '-')}"
-    yield from (words for least, words in _say_less(data) if least < 1.0 or not data.runs)
-    yield from [] if data.runs and overturns else unchecked
+                times = f", at {row.factor} times {row.demand}" * (row.factor != "-")
+                yield answer, f"{row.result}: {row.outcome}{times * (name != 'risk')}"
+    yield from ((margin, x) for least, x in _say_less(data) if least < 1.0 or not data.runs)
+    yield from [] if data.runs and overturns else ((left, x) for x in unchecked)
 
 
 def _find_unchecked_push(data: ReportData) -> tuple[float, float] | None:
@@ -162,8 +174,8 @@ def _say_first_failures(data: ReportData) -> Iterator[str]:
     plane = "in its plane " * bool(across)
     for _, _, falls, body in across:
         yield f"across its plane, held by nothing else, it {falls}: {body} as one rigid body"
-    if failures := [words for words, _ in find_first_failures(data)]:
-        yield f"{plane}it {join_words(failures[::-1])}"  # the least first
+    if failures := [*find_first_failures(data)]:
+        yield from (f"{plane}it {words}" for words in failures[::-1])  # the least first
     elif "scale" not in data.statements and all(scale > 1.0 for scale, *_ in across):
         yield f"from which acceleration on it falls {plane}was not computed"
 
@@ -171,10 +183,8 @@ def _say_first_failures(data: ReportData) -> Iterator[str]:
 def _say_pushes(data: ReportData, name: str, stated: Statement) -> Iterator[str]:
     """Yield where a push begins to move it: beside runs only at less than the site's."""
     for push in read_numbers(PushFactors, stated):
-        if push.site and not data.runs:
+        if push.site and (not data.runs or push.least < 1.0):
             yield next(_describe_push(data, name, push))
-        elif push.site and push.least < 1.0:
-            yield f"pushed steadily it may begin to move at {push.least:.2g} times {push.site}"
 
 
 def _say_less(data: ReportData) -> Iterator[tuple[float, str]]:
@@ -228,27 +238,37 @@ def _say_survival(
     in_doubt = " (in doubt, as below)" * (HISTORIES in doubtful)
     survives, reason = answer.startswith("survives"), _say_why_undecided(data)
     answer = f"{'under its motions ' * bool(survives and failed)}it {answer}{in_doubt}"
-    if survives and reason:
-        answer = f"not decided{in_doubt}, as {reason}"
     yield from failed if survives else ()
+    if survives and reason:
+        yield f"not decided{in_doubt}, as {reason}"
     sizes = [x.displacement for x in verdicts if x.outcome in COLLAPSE_STATES[:2]]
     known = bool(sizes) and np.isfinite(sizes).all()
     moved = f", and moves by {Ends.of(sizes):mm}" if known else ""
     beside = any(scale <= 1.0 for scale, *_ in _say_across(data))
     lead = f"in its plane{in_doubt} it" if beside else f"{answer}: it"
-    missed = find_missed(data) if survives and not reason else []
-    if missed:
-        lead = f"it{in_doubt}"
-    yield f"{lead} {'; it '.join(describe_outcomes(data))}{moved}"
-    for rule in missed[:1]:
-        norm, words = data.case.report["norm"], f"{rule.rule} is {rule.found}, not {rule.required}"
-        yield f"the motions do not meet {norm}, as known from memory: {words}"
+    if survives and (reason or find_missed(data)):
+        lead = f"it{in_doubt * (not reason)}"
+    first, *others = describe_outcomes(data)
+    outcomes = [f"{lead} {first}", *(f"it {each}" for each in others)]
+    yield from [*outcomes[:-1], f"{outcomes[-1]}{moved}"]
     yield from () if survives else failed
+
+
+def _say_conditions(data: ReportData) -> Iterator[str]:
+    """Yield rules that the motions miss, how often it falls otherwise, and what decides."""
+    if missed := join_words([check.rule for check in find_missed(data)]):
+        yield f"the motions do not meet {data.case.report['norm']} by their {missed}"
     ranges = sorted(data.verdict_ranges, key=lambda x: (x.falls.sum(), x.dislocated.sum()))
     for found in ranges[-1:]:
         motion = found.dataset.attrs.get("motion")
         under = f", under '{motion}'" * (len(data.runs) > 1 and bool(motion))
         yield f"with other plausible properties it {found.count}{under}"
+    # the section of a study names its cases
+    every = [text for each in data.own_studies for text in say_what_changes(each)]
+    studied = [text.partition(": ")[0] for text in every]
+    if ranges or not studied:
+        yield _say_what_decides(data.verdict_ranges)
+    yield from studied
 
 
 def _say_why_undecided(data: ReportData) -> str:
@@ -283,7 +303,7 @@ def _judge_check(data: ReportData, check: Ratios) -> tuple[str, str]:
     """Return whether the structure withstands the spectrum by a check, and why its ratio fails."""
     of = name_spectrum(data)
     if check.needed:
-        words = f", passed only with {check.needed}"
+        words = f"; it is passed only with {check.needed}"
         return f"it does not withstand under some assumptions on the fill {of}", words
     if check.least < 1.0:
         return f"it does not withstand {of}", ", which it fails"
@@ -293,9 +313,8 @@ def _judge_check(data: ReportData, check: Ratios) -> tuple[str, str]:
     if check.bounded:
         least = min(each.decisive for each in list_checks(data) if each.bounded)
         bound = f"its ratio, {format_ratio(least)}, is an upper bound"
-        test = _say_test(data)
-        words = f"alone it is not shown to withstand {of}, as {bound}: {test}"
-        return words, f", an upper bound: {test}"
+        words = f"it is not shown to withstand {of}, as {bound}. {_say_test(data)}"
+        return words, ", an upper bound"
     if check.moved and _say_motion(data, check.least, peak_of_spectrum(data.case)):
         return f"it withstands at rest alone, and moves in the runs, {of}", ""
     return f"it withstands {of}", ""
@@ -304,13 +323,13 @@ def _judge_check(data: ReportData, check: Ratios) -> tuple[str, str]:
 def _say_test(data: ReportData) -> str:
     """Say whether the runs decide what a ratio that is an upper bound does not."""
     if not data.runs:
-        return "time histories with large displacements under motions of this spectrum can test it"
+        return "Time histories with large displacements under motions of this spectrum can test it"
     if objection := object_to_motions(data):
-        return f"the runs do not decide, for {objection}"
-    count, missed = len(data.runs), ", ".join(x.rule for x in find_missed(data))
-    motions = f"the {count} motions" if count > 1 else "the motion"
+        return f"The runs do not decide, for {objection}"
+    count = len(data.runs)
+    motions = f"The {count} motions" if count > 1 else "The motion"
     of = "matched to" if (data.case.suite or {}).get("matched") else "of"
-    decide = f"decide{'s' * (count == 1)}" + f" (rule not met: {missed})" * bool(missed)
+    decide = f"decide{'s' * (count == 1)}"
     return f"{motions} {of} this spectrum, under which it {find_worst(data)[0]}, {decide}"
 
 
@@ -351,7 +370,7 @@ def build_conclusion(data: ReportData) -> Section:
     if rows:
         head = ("", "demand", "capacity or outcome", "factor")
         named = dict.fromkeys(_FACTORS[name] for name in _FACTORS if name in data.statements)
-        factors = f"; factor: the multiple of the demand {', or '.join(named)}" * bool(named)
+        factors = f". Factors are multiples of the demand: {'; '.join(named)}" * bool(named)
         blocks.append(Grid(head, rows, f"Demand and capacity{factors}", "words"))
     blocks += map(TextBlock, _list_outdated(data))
     return Section("Conclusion", [*blocks, _build_signatures(data.case.report)])
@@ -367,10 +386,8 @@ def _build_transverse(data: ReportData) -> list[TextBlock]:
         text += (
             f"; the largest demand, {demand:.3g} g, exceeds it ({format_ratio(demand / push)} ×)"
         )
-    found, fault = data.across
-    if found:
-        text = text.removeprefix(f"{UNCHECKED_ACROSS}: ")
-    text += fault
+    # the head says that it was not checked
+    text = text.removeprefix(f"{UNCHECKED_ACROSS}: ") + data.across[1]
     manner = "doubt" if push < demand else "plain"
     return [TextBlock(sentence(text), manner, lead="Across its plane?")]
 
@@ -396,13 +413,12 @@ def _list_outdated(data: ReportData) -> Iterator[str]:
     if other:
         # digests of inputs do not say which is the older
         made = "Not stated, for its case, drawing or version of archfem is not that of the runs"
-        yield f"{made}: {', '.join(other)}; or run `archfem run` again, if the runs are older."
+        yield f"{made}: {', '.join(other)}. If the runs are older, run `archfem run` again."
 
 
 def _build_paragraphs(data: ReportData, doubtful: Sequence[str]) -> dict[str, list[str]]:
     """Return the sentences of the answer by their leads: outcomes, margin, what may change it."""
-    failures = [words for _, words in find_first_failures(data)]
-    answer = [f"it {join_words(failures)}"] if failures else []
+    answer = list[str]()
     if not data.runs:
         # an assessment is stated by the margin; a result that stands alone states all of itself
         stated = [each.sentences for name, each in data.statements.items() if name != "assessment"]
@@ -410,7 +426,8 @@ def _build_paragraphs(data: ReportData, doubtful: Sequence[str]) -> dict[str, li
         answer += [*stated[0]] if len(data.statements) == 1 and stated else [x for x, *_ in stated]
     answer += [*describe_ends(data), *_describe_ranges(data)]
     changes = [*_say_causes(data.verdict_ranges)]
-    changes += [text for study in data.own_studies for text in say_what_changes(study)]
+    if not data.runs:  # the head has them beside runs
+        changes += [text for study in data.own_studies for text in say_what_changes(study)]
     if fill := join_names(list_elastic_fill(data)):
         changes.append(f"{fill} is elastic in the runs and carries tension, which soil does not")
     changes += ["the checks of the numbers raise no doubt"] * (bool(data.runs) and not doubtful)
@@ -419,14 +436,14 @@ def _build_paragraphs(data: ReportData, doubtful: Sequence[str]) -> dict[str, li
     ranges = dict.fromkeys(row for x in data.verdict_ranges for row in list_ranges(data, x))
     changes += [f"by its finish {name} is {wider}" for name, *_, wider in ranges if wider]
     if single := list_unvaried(data):
-        none = ", and displacements have no range" * (bool(data.runs) and not data.verdict_ranges)
+        none = "; displacements have no range" * (bool(data.runs) and not data.verdict_ranges)
         verb = "were" if len(single) > 1 or single[0].endswith("s") else "was"
         changes.append(f"{join_words(single)} {verb} not varied{none}")
     given = [key for key in ("suite", "motion") if data.case.settings.get(key)]
     if given and not data.runs and not {"scale", "risk"} & data.statements.keys():
         changes.append(f"no motion was run, though [{given[0]}] is in the case")
     return {
-        "From where on, and how often?" if data.runs else "Result:": answer,
+        "What else was found?" if data.runs else "Result:": answer,
         "By which margin?": [*_describe_margin(data)],
         "What would change the answer?": changes,
     }
@@ -438,7 +455,7 @@ def _describe_ranges(data: ReportData) -> Iterator[str]:
     for each in ranges:
         motion, answers = each.dataset.attrs.get("motion"), each.answers["sampled"].values.any()
         under = f"under '{motion}' it " if motion else "it "
-        groups = f": {each.groups}" if len(ranges) == 1 else ""
+        groups = f"; by groups: {each.groups}" if len(ranges) == 1 else ""
         yield f"{under}{each.count}{groups}{each.unanswered}" if answers else each.sentence
     if moved := [each for each in ranges if each.displacements and spans_run(data, each)]:
         far = max(moved, key=lambda x: np.nanmax(x.dataset["displacement"].values[~x.falls]))
@@ -466,10 +483,12 @@ def _describe_margin(data: ReportData) -> Iterator[str]:
     for k, (_, (first, *others)) in enumerate(sorted(margins)):
         rank = ("the least margin is", "the next is", "then follows")[min(k, 2)]
         yield from [f"{rank} {first}", *others]
+    # the head states the others
     for name in (x for x in ("limit", "pushover") if x in data.statements):
-        for push in read_numbers(PushFactors, data.statements[name]):
-            yield from _describe_push(data, name, push) if push.site else ()
-    yield from (words for _, words in _say_less(data))
+        for push in (x for x in read_numbers(PushFactors, data.statements[name]) if x.site):
+            of_head = not data.runs or push.least < 1.0
+            yield from [*_describe_push(data, name, push)][of_head:]
+    yield from (words for least, words in _say_less(data) if data.runs and least >= 1.0)
 
 
 def _say_across(data: ReportData) -> Iterator[tuple[float, str, str, str]]:
@@ -487,12 +506,12 @@ def _describe_push(data: ReportData, name: str, push: PushFactors) -> Iterator[s
     moves = _say_motion(data, push.least, site_acceleration(data.case))
     bounded = push.proved is not None  # the least found, without proof that none is less
     of = " with elastic joints" if elastic else " as rigid blocks" * bounded
-    over = " over what is assumed of the fill" * (push.most > push.least)
+    over = OVER_FILL * (push.most > push.least)
     size = f"{Ends((push.least, push.most)):ratio} times {push.site}{over}"
     text = f"pushed sideways{of} it begins to move at {size}"
     if bounded:
         proved = push.proved and f"is proved to stand up to {format_ratio(push.proved)} times"
-        text += f", the least that a search found, and {proved or NO_PROOF}"
+        text += f"; it is the least that a search found, and {proved or NO_PROOF}"
     if moves and push.least >= 1.0:  # shaken it moves before
         yield f"{text}; runs that are no stronger move it, so that this is no margin"
         return
@@ -503,14 +522,14 @@ def _describe_push(data: ReportData, name: str, push: PushFactors) -> Iterator[s
 
 def _describe_check(data: ReportData, check: Ratios) -> tuple[float, list[str]]:
     """Return the ratio of a check of an assessment, and its sentences."""
-    over = " over what is assumed of the fill" * (check.most > check.least)
+    over = OVER_FILL * (check.most > check.least)
     by = f"on {name_spectrum(data)}, by {check.name}"
     moves = _say_motion(data, check.least, peak_of_spectrum(data.case))
     if check.moved is not None and moves:  # what moves at less than the push that begins it is
         begins = f"the check passes for what is at rest, and {moves}"  # judged by how far
         return check.moved, [f"{check.moved:.3g} by displacements, {by}", begins]
     _, fails = _judge_check(data, check)
-    texts = [f"{check.ends:ratio}{over}{check.beside}, {by}{fails}"]
+    texts = [f"{check.ends:ratio}{check.beside}, {by}{fails}{over}"]
     if check.moved is not None:
         texts.append(f"{check.ends:ratio} times the spectrum begins to move it")
         texts.append(f"if it moved, it could be displaced by {check.moved:.3g} times the demand")

@@ -156,7 +156,7 @@ def _doubt_displacement(data: ReportData, found: VerdictRange) -> Iterator[Doubt
         not fallen[0] and max(sizes) > MAX_RATIO_OF_DISPLACEMENTS * min(sizes)
     ):
         held = (size for size, falls in zip(sizes, fallen, strict=True) if not falls)
-        words = f"the run {own}; unvaried, with another time step or fidelity, it {other}"
+        words = f"the run {own}; with another time step or fidelity it {other}"
         yield Doubt(words, RANGE_REMEDY, tuple(held))
 
 

@@ -177,14 +177,12 @@ def tabulate_checks(data: ReportData) -> list[Grid | TextBlock]:
         rules = "number of motions, mean spectrum, stationary part"
         return [TextBlock(f"Rules for motions ({rules}) were not checked, for {why}.")]
     rows = [(*check[:3], check.state) for check in checks]
-    caption = f"Rules for motions. {rule.source}; stationary part from memory"
+    caption = f"Rules for motions. {rule.source}; stationary part from memory".replace(";", ".")
     return [Grid(("rule", "required", "found", ""), rows, caption, "words")]
 
 
 def note_checks(data: ReportData) -> list[str]:
-    """Return a note on the rules of the norm that the motions do not meet."""
-    missed = [f"{x.rule}, {x.required}, is {x.found}" for x in find_missed(data)]
-    rules = "a rule" if len(missed) == 1 else f"{len(missed)} rules"
+    """Return a note on each rule of the norm that the motions do not meet."""
+    found = [f"{x.rule}, {x.required}, is {x.found}" for x in find_missed(data)]
     norm = data.case.report.get("norm", "")
-    words = f"the motions do not meet {rules} of {norm}, as known from memory: {'; '.join(missed)}"
-    return [words] if missed else []
+    return [f"rule of {norm} that motions do not meet, from memory: {each}" for each in found]

@@ -5,11 +5,14 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from archfem.cases.report.doubts import peak_of_ground
 from archfem.cases.report.report_data import ReportData
-from archfem.dynamics.collapse_state import COLLAPSE_STATES, CollapseState, name_stones
+from archfem.dynamics.collapse_state import COLLAPSE_STATES, CollapseState
 from archfem.dynamics.history import History
 from archfem.dynamics.verdict_range import HALF_STEP, UNVARIED
 from archfem.masonry.structure import Structure, join_words
 from archfem.units import Ends
+
+# Words of a sentence
+MAX_WORDS = 25
 
 # Outcomes of runs as verbs and in plain words, the worst first; small displacements end where
 # blocks begin to move
@@ -18,7 +21,7 @@ _VERBS = {
     "partly fallen": ("falls in part", "does not survive"),
     "unknown": ("has no known outcome", "may or may not survive"),
     "mechanism": ("becomes a mechanism", "may or may not survive"),
-    "dislocated": ("is dislocated{} but stands", "survives with damage"),
+    "dislocated": ("is dislocated but stands", "survives with damage"),
     "stands": ("stands", "survives"),
     "no mechanism": ("forms no mechanism", "survives"),
 }
@@ -38,8 +41,7 @@ def describe_outcomes(data: ReportData) -> Iterator[str]:
         own = {k: run.verdict for k, run in data.runs.items() if run.verdict.outcome == outcome}
         if not own:
             continue
-        names, falls = [*own], [x.fall for x in own.values() if x.fall]
-        verb = verb.format(name_stones([*dict.fromkeys(x for fall in falls for x in fall.blocks)]))
+        names = [*own]
         of = f"of {describe_peaks(data.runs[name] for name in names)}"
         under = f"{len(names)} of {total} motions {of}: {', '.join(names)}"
         if len(names) == total:
@@ -108,6 +110,8 @@ def list_lost(structure: Structure, names: Sequence[str], max_names: int = 4) ->
 
 
 def sentence(text: str) -> str:
-    """Return a text with a capital at its beginning and a full stop at its end."""
-    text = text.strip()
+    """Return a text with a capital and a full stop; clauses of a long one are sentences."""
+    text, clause = text.strip(), text.partition("; ")[0]
+    if len(text.split()) > MAX_WORDS and clause != text and ":" not in clause:  # no list
+        return " ".join(map(sentence, text.split("; ")))
     return text[:1].upper() + text[1:] + ("" if text.endswith((".", "?")) else ".")

@@ -145,9 +145,8 @@ def _tabulate_joints(data: ReportData, run: History) -> Grid:
         "open": "None came apart.",
     }
     caption = (
-        "Criteria per joint: eccentricity under dead load, least and largest, largest "
-        "V / N, and when and how long at most the joint hinged, slid as a whole (|V| at its limit) "
-        "and was open."
+        "Criteria per joint: eccentricity under dead load, least and largest, and largest V / N. "
+        "Then when and how long at most it hinged, slid as a whole (|V| at its limit) and was open."
     )
     caption = " ".join([caption, *(note for flag, note in notes.items() if flag in empty)])
     caption += f" {sentence(assessed)}" if assessed else ""
@@ -233,9 +232,8 @@ def build_check_section(data: ReportData) -> Section:
         head += ["predicted error", "end"]
         rows = [_check_row(data.case, name, run) for name, run in data.runs.items()]
         caption = (
-            "Checks of each run: energy drift relative to the largest energy exchanged, reaction "
-            "of the supports under dead load, by joints in their directions as built, and most "
-            "Newton iterations between two records"
+            "Checks of each run. Energy drifts relative to the largest exchanged. Supports react "
+            "under dead load, by joints as built. Iterations are the most between two records"
         )
         blocks.append(Grid(head, rows, caption))
     caption = "Speed against error over fidelities, meshes and steps."

@@ -45,20 +45,20 @@ def _list_unscaled(data: ReportData) -> dict[str, tuple[str, float]]:
     return {name: (_FAILURES[x.verdict.outcome], peak_of_ground(x)) for name, x in failed.items()}
 
 
-def _say_state(state: str, stones: str, first: bool = False) -> str:
+def _say_state(state: str, stones: str) -> str:
     """Return a state in words, with the stones that are dislocated."""
-    return f"{_STATES[state][first]}{stones * (state == COLLAPSE_STATES[1])}"
+    return f"{_STATES[state][0]}{stones * (state == COLLAPSE_STATES[1])}"
 
 
-def find_first_failures(data: ReportData) -> Iterator[tuple[str, str]]:
-    """Yield each first failure over all motions: in a few words, and with all that is known."""
+def find_first_failures(data: ReportData) -> Iterator[str]:
+    """Yield each first failure over all motions."""
     # without a scale that holds, a fill bears tension at all of them
     searches = [x for x in list_scales(data) if x.held or "tension" not in x.states]
     unscaled, least = _list_unscaled(data), np.inf
     several, count = len(searches) + len(unscaled) > 1, len(data.runs)
-    stones = {x.motion: x.dislocated_stones for x in searches}
-    some = [f"of {len(searches)} of {count} motions scaled"] * (len(searches) < count)
-    some += [UNFINISHED] * any(x.unfinished for x in searches)
+    was = "were" if len(searches) > 1 else "was"
+    some = f"; {len(searches)} of {count} motions {was} scaled" * (len(searches) < count)
+    some += f"; {UNFINISHED}" * any(x.unfinished for x in searches)
     for state in ("falls", "dislocated", "mechanism"):
         first = {x.motion: (x.states[state], x.pga) for x in searches if state in x.states}
         first |= {name: (1.0, peak) for name, (found, peak) in unscaled.items() if found == state}
@@ -72,14 +72,11 @@ def find_first_failures(data: ReportData) -> Iterator[tuple[str, str]]:
         over = " and ".join(["motions"] * several + ["time steps"])
         notes = ["or less"] * (name in unscaled)
         notes += [f"{ends:#.3g} × over {over}"] * (f"{ends[0]:#.3g}" != f"{ends[1]:#.3g}")
-        notes += some[-1:] * (UNFINISHED in some)
         motion = f"'{name}'" if several or count > 1 else "the motion"
         peaks = Ends.of(scale * peak for scale, peak in every)
         beside = f" ({', '.join(notes)})" * bool(notes)
-        verb = _say_state(state, stones.get(name, ""), first=True)
-        words = f"{verb} at {least:#.3g} × {motion}, {peaks:.3g} g{beside}"
-        short = f"{verb} at {peaks[0]:.3g} g under {motion}"
-        yield short + f" ({', '.join(some)})" * bool(some), words
+        yield f"{_STATES[state][1]} at {peaks:.3g} g, {least:#.3g} × {motion}{beside}{some}"
+        some = ""  # once
 
 
 def say_fragile(data: ReportData) -> Iterator[str]:
@@ -88,7 +85,7 @@ def say_fragile(data: ReportData) -> Iterator[str]:
         run = data.runs.get(search.motion)
         outcome = run.verdict.outcome if run else ""
         weaker = [
-            (search.states[state], _say_state(state, search.dislocated_stones))
+            (search.states[state], _STATES[state][0])
             for state in ("falls", "dislocated")
             if search.states.get(state, 1.0) < 1.0 and _FAILURES.get(outcome) != state
         ]

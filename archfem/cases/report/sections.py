@@ -26,7 +26,12 @@ from archfem.cases.report.response import (
     build_ground_section,
     build_run_sections,
 )
-from archfem.cases.report.study_findings import StudyFindings, list_studied, tabulate_study
+from archfem.cases.report.study_findings import (
+    StudyFindings,
+    list_studied,
+    say_what_changes,
+    tabulate_study,
+)
 from archfem.cases.run import DRAWING_FILE
 from archfem.dynamics.collapse_state import DISLOCATION, FALLEN_STATES, shallowest_part
 from archfem.dynamics.history import SIGN_CONVENTION
@@ -411,7 +416,8 @@ def _build_study(data: ReportData, found: StudyFindings) -> list[Any]:
             TextBlock(found.text, "lines", caption),
             FigureBlock.read(found.folder / "study.png", caption),
         ]
-    blocks: list[Any] = [tabulate_study(found)]
+    blocks: list[Any] = [TextBlock(sentence(text)) for text in say_what_changes(found)]
+    blocks.append(tabulate_study(found))
     limit, key = DISLOCATION * shallowest_part(data.case.structure)[0], "residual displacement"
     with suppress(InvalidInput), limit_width(MAX_WIDTH):  # no number differs
         figure = draw_findings(found.numbers, max_panels=4, limits={key: 1e3 * limit})
