@@ -1,6 +1,7 @@
 """Figures of structures: blocks, thrust lines, joint names, loads and displaced shapes."""
 
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from typing import Any, cast
 
 import numpy as np
@@ -9,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
+from matplotlib.text import Text
 
 from archfem._typing import Array
 from archfem._validation import validate_arguments
@@ -327,14 +329,15 @@ def _join_segments(segments: Array) -> Array:
 
 
 def list_numbers(structure: Structure) -> list[str]:
-    """List by part the numbers that stand for long names of its joints in pictures, with these."""
-    texts = []
-    for part in dict.fromkeys(joint.part for joint in structure.joints):
-        names = [
-            short_name(joint.name, part)
-            for joint, own in zip(structure.joints, structure.judged, strict=True)
-            if own and joint.part == part
-        ]
+    """Name a stone by its joints, and list the numbers that stand for long names of joints."""
+    shown = [joint for joint, own in zip(structure.joints, structure.judged, strict=True) if own]
+    sides = [(first, last) for first, last in pairwise(shown) if first.blocks[1] == last.blocks[0]]
+    texts = [
+        f"{structure.blocks[last.blocks[0]].name} is between {first.name} and {last.name}"
+        for first, last in sides[len(sides) // 2 :][:1]
+    ]
+    for part in dict.fromkeys(joint.part for joint in shown):
+        names = [short_name(joint.name, part) for joint in shown if joint.part == part]
         if max(map(len, names), default=0) > MAX_NAME_LETTERS:
             listed = ", ".join(f"{k} {name}" for k, name in enumerate(names))
             texts.append(f"{part or 'joints'}: {listed}")
@@ -393,8 +396,21 @@ def draw_names(structure: Structure) -> Figure:
     set_title(axes, title)
     numbers = [] if walls else list_numbers(structure)
     note = "; ".join(filter(None, [structure.assessment, *numbers]))
-    add_note(cast(Figure, axes.figure), {"": note})
-    return cast(Figure, axes.figure)
+    add_note(figure := cast(Figure, axes.figure), {"": note})
+    if not walls:
+        figure.draw_without_rendering()
+        _keep_apart(sorted(axes.texts, key=lambda text: text.get_text() not in parts))
+    return figure
+
+
+def _keep_apart(texts: Sequence[Text]) -> None:
+    """Remove texts that would be written over earlier ones."""
+    kept = list[Any]()
+    for text in texts:
+        if any(map((box := text.get_window_extent()).overlaps, kept)):
+            text.remove()
+        else:
+            kept.append(box)
 
 
 def _number_stones(axes: Axes, structure: Structure, part: str, inch: float, sign: str) -> None:

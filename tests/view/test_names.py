@@ -12,7 +12,8 @@ import archfem as af
 from archfem.cases.analysis_keys import LimitAnalysis
 from archfem.cases.result_text import describe_collapse, describe_run
 from archfem.view import draw_envelope, draw_names, draw_structure
-from archfem.view.structure import short_name
+from archfem.view.structure import list_numbers, short_name
+from archfem.view.style import limit_width
 
 
 def test_short_names():
@@ -61,6 +62,35 @@ def test_names_of_a_ring_are_legible(voussoirs):
     assert all(note.get_rotation() == 0.0 for note in notes)
     boxes = [note.get_window_extent() for note in notes]
     assert not any(a.overlaps(b) for a, b in combinations(boxes, 2))
+
+
+def test_no_name_is_written_over_another_in_the_figures_of_a_report():
+    """A portal on piers, and two spans with a pier and sidewalls, as wide as reports draw them."""
+    arches = {"thickness": 0.5, "voussoirs": 15, "span": 5.0, "rise": 1.8}
+    tables = {
+        "shape": "bridge",
+        "arches": {"left arch": arches, "right arch": arches},
+        "piers": {"breadth": 1.7, "height": 2.0, "course": 0.5, "pier": {}},
+        "sidewalls": {"length": 2.5, "height": 2.0, "above": 1.0, "course": 0.5, "left wall": {}},
+    }
+    tables["sidewalls"] |= {"state": "fixed", "right wall": {}}
+    spans = af.Case.of({"structure": tables}).structure
+    portal = af.arch_on_piers(
+        radius=1.5, thickness=0.4, voussoirs=9, courses=[0.5] * 4, pier_breadth=0.8
+    )
+    for structure, width in ((spans, 128.0), (spans, 84.0), (portal, 84.0)):
+        with limit_width(width):
+            figure = draw_names(structure)
+        notes = written(figure)
+        boxes = [note.get_window_extent() for _, note in notes]
+        assert not any(a.overlaps(b) for a, b in combinations(boxes, 2))
+        if structure is spans:
+            assert {"left arch", "right arch", "pier"} <= {word for word, _ in notes}
+        # stones, which texts name, stand between joints that the figure names
+        middle = next(x for x in list_numbers(structure) if " is between " in x)
+        stone, _, sides = middle.partition(" is between ")
+        own = [j for j in structure.joints if stone in [structure.blocks[k].name for k in j.blocks]]
+        assert [joint.name for joint in own] == sides.split(" and ")
 
 
 # a ring without anything above it

@@ -177,7 +177,7 @@ def tabulate_checks(data: ReportData) -> list[Grid | TextBlock]:
         rules = "number of motions, mean spectrum, stationary part"
         return [TextBlock(f"Rules for motions ({rules}) were not checked, for {why}.")]
     rows = [(*check[:3], check.state) for check in checks]
-    caption = f"Rules for motions. {rule.source}; stationary part from memory".replace(";", ".")
+    caption = f"Rules for motions. {rule.source}. Stationary part from memory".replace("; ", ". ")
     return [Grid(("rule", "required", "found", ""), rows, caption, "words")]
 
 
