@@ -222,7 +222,7 @@ def _add_rating(add: Callable[..., AddArgument]) -> None:
     add_to("--dead", type=float, help="partial factor on the weights (1)")
     add_to("--width", help="width that carries one vehicle [m] (by rule)")
     add_to("--area-load", help="load beside the axles [Pa] (of its code)")
-    about = "also with other rings, piers, cover, strength, fill and width, one at a time"
+    about = "also with other rings, piers, cover, strength, friction and width, one at a time"
     add_to("--vary", action="store_true", help=about)
     add_to("--out", metavar="DIR", help="folder for text, table and picture (none)")
 

@@ -61,7 +61,7 @@ _STATES = (*_PRESSURES, "by_pressure")
 _CRUSHING = "crushing "
 
 # Each state with those whose factors guide its search, in the order of their searches
-_GUIDES: dict[str, Sequence[str]] = {"": ("factor",), **WEAKER_FILLS}
+_GUIDES: dict[str, Sequence[str]] = {"": (), **WEAKER_FILLS}
 _GUIDES |= {f"{_CRUSHING}{state}": (state, "by_pressure") for state in WEAKER_FILLS}
 
 # What a rating assumes of fill and stones
@@ -286,8 +286,7 @@ class Rating(ResultDisplay):
             part = min(spans, key=lambda name: max(spans[name][0] - x, x - spans[name][1]))
             if part in moves:
                 over.setdefault(f"'{part}'", []).append(x)
-        if over:
-            stand = [x for here in over.values() for x in here]
+        stand = [x for here in over.values() for x in here] or stand
         if not (spans and stand):
             return f"at x = {self.moving.position:.3g} m (the vehicle's middle)"
         sense = 1.0 if self.moving.direction == "right" else -1.0
@@ -491,9 +490,7 @@ def _say_ends(factors: Sequence[float]) -> str:
 def _name_places(places: Collection[float]) -> str:
     """Return some places in words, of many the first and the last; "" for none [m]."""
     each = [f"{x:.2f}" for x in sorted(places)]
-    if len(each) > 4:
-        return f"{each[0]} to {each[-1]}"
-    return join_words(each)
+    return f"{each[0]} to {each[-1]}" if len(each) > 4 else join_words(each)
 
 
 @validate_arguments
@@ -611,10 +608,9 @@ def rate_again(found: Rating, structure: Structure, width: float | None, **optio
     axles = parse_axles(vehicle.axles, vehicle.spacings)
     rows = vehicle.factored(found.live, found.impact)
     loads = [np.column_stack([share * row, axles[:, 1]]) for row in rows]
-    area_load, states = found.live * found.area_load, {"": options}
-    places = _places_along(weighted, axles)
-    again = _find_least_factors(weighted, places, loads, area_load, states, found.moving)
-    return again.get("", np.nan)
+    given = _places_along(weighted, axles), loads, found.live * found.area_load, {"": options}
+    # another property may move the worst place anywhere: no factors guide the search
+    return _find_least_factors(weighted, *given, None).get("", np.nan)
 
 
 def _check_width(width: float, structure: Structure) -> None:

@@ -21,7 +21,7 @@ from archfem._validation import check_integer, validate_arguments
 from archfem.cases.case import Case
 from archfem.cases.defaults import list_default_keys
 from archfem.cases.result_text import ResultTable
-from archfem.cases.structure_keys import find_table
+from archfem.cases.structure_keys import PRESETS, find_table
 from archfem.cases.toml_file import Table, format_key
 from archfem.cases.verdict_keys import DEFAULT_RANGES, NEUTRAL, check_ranges
 from archfem.dynamics.analysis import Analysis, with_one_facet
@@ -45,10 +45,13 @@ from archfem.statics.fill_checks import fill_doubts
 from archfem.studies.evaluators import PreparedRuns
 from archfem.studies.parameter_space import Point, WholePoint
 from archfem.studies.result_store import evaluate_with_progress
-from archfem.units import MPa, in_unit
+from archfem.units import MPa, in_degrees, in_unit
 
 # Row of a rating with the worst value of each property
 ALL_AT_ONCE = "all unfavourable at once"
+
+# Least coefficient of friction of a variation [-]
+LEAST_FRICTION = 0.05
 
 # A property that is varied beside a rating, its value in words, and keys of the case with it
 Change = tuple[str, str, dict[str, Any]]
@@ -344,7 +347,7 @@ def _vary_contacts(structure: Structure, changes: Mapping[str, Any]) -> Structur
             given,
             normal_stiffness=changes["k_n"] * given.normal_stiffness,
             shear_stiffness=changes["k_s"] * given.shear_stiffness,
-            friction=max(given.coefficient + changes["friction"], 0.05),
+            friction=max(given.coefficient + changes["friction"], LEAST_FRICTION),
         )
         joints.append(replace(joint, contact=contact))
     return replace(structure, joints=tuple(joints))
@@ -512,11 +515,21 @@ def _list_rating_changes(case: Case, found: Rating) -> Iterator[Change]:
             "half the strength of the stones",
             {"limit.strength": 0.5 * found.strength},
         )
-    if found.fill is not None:
-        for sign in (-1.0, 1.0):
-            angle = found.fill.friction_angle + 5.0 * sign
-            change_of_fill = {"limit.fill.friction_angle": f"{angle:.17g} degree"}
+    for section in ("limit", "structure"):  # as weight and pressure, or in pieces
+        fill = case.settings.get(section, {}).get("fill", {})
+        for by in (-5.0, 5.0) if "friction_angle" in fill else ():
+            angle = in_degrees(fill["friction_angle"], "angle of friction") + by
+            change_of_fill = {f"{section}.fill.friction_angle": f"{angle:.17g} degree"}
             yield "friction angle of the fill", f"fill of {angle:.3g}°", change_of_fill
+    contacts = {joint.contact for joint in found.structure.joints if joint.contact.slides}
+    keys = {find_table(case.settings, each)[0]: each.coefficient for each in contacts}
+    # that between pieces of fill has no table
+    known = {*PRESETS["contacts"], *case.settings.get("contacts", {})} & keys.keys()
+    for by in DEFAULT_RANGES["friction"] if known and case.limit.friction else ():
+        name = f"{abs(by):g} {'less' if by < 0.0 else 'more'} friction of joints"
+        changed = {key: max(keys[key] + by, LEAST_FRICTION) for key in sorted(known)}
+        paths = {f"contacts.{format_key(key)}.friction": x for key, x in changed.items()}
+        yield "friction of joints", name, paths
     for share in (0.9, 1.1):
         width = min(share * found.width, found.structure.width)
         yield "width", f"a vehicle on {width:.3g} m", {"rating.width": width}

@@ -12,8 +12,8 @@ from archfem.cases.analysis_keys import rate_case
 from archfem.studies import variations
 from archfem.studies.variations import _list_rating_changes, vary_rating
 
-SEARCHED = 0.005
-"""Relative: varied ratings search the places of least bounds, whole ones all of them."""
+PRINTED = 5e-4
+"""Relative: factors are printed with four digits."""
 
 CASE = """
 title = "two spans"
@@ -60,20 +60,22 @@ def test_each_row_is_the_rating_of_a_changed_case(tmp_path):
     assert cells.pop("piers a tenth narrower") == "-"  # on which the rings do not fit
     factors = {name: float(cell) for name, cell in cells.items()}
     thin = ["structure.arches.thickness=0.36", "structure.arches.right.thickness=0.405"]
+    rough = [f'contacts."{each} to stone".friction=0.5' for each in ("stone", "soil")]
     for name, changes in {
         "rings a tenth thinner": thin,
         "piers a tenth broader": ["structure.piers.breadth=0.968"],
         "0.1 m less cover": ["structure.backfill.cover=0.2"],
         "half the strength of the stones": ["limit.strength=2e6"],
         "fill of 40°": ["limit.fill.friction_angle=40 degree"],
+        "0.1 less friction of joints": rough,
     }.items():
         other = af.Case.read(path, changes)
         whole = rate_case(other.structure, other.rating, other.limit)
-        assert factors[name] == pytest.approx(whole.factor, rel=SEARCHED), name
+        assert factors[name] == pytest.approx(whole.factor, rel=PRINTED), name
     # in proportion to the width, which is that of the wheels and the cover
     for share in (0.9, 1.1):
         width = f"a vehicle on {share * 1.8:.3g} m"
-        assert factors[width] == pytest.approx(share * found.factor, rel=SEARCHED)
+        assert factors[width] == pytest.approx(share * found.factor, rel=PRINTED)
     assert factors["no pressure of the fill"] == pytest.approx(found.without_pressure, rel=1e-3)
     least_of_all, least, *_, most = sorted(factors, key=factors.get)
     ends = f"to {factors[least]:.4g} ({least}) at least and {factors[most]:.4g} ({most}) at most"
@@ -82,13 +84,14 @@ def test_each_row_is_the_rating_of_a_changed_case(tmp_path):
     first = f"{begin}{ends}; {at_once}"
     assert words[0] == first
     # against a rating with the worst of each property
-    worst = [*thin, "structure.backfill.cover=0.2", "limit.strength=2e6", "rating.width=1.62"]
+    worst = [*thin, *rough, "structure.backfill.cover=0.2", "limit.strength=2e6"]
+    worst += ["rating.width=1.62"]
     worst += ["limit.fill.mobilisation=0", "limit.fill.active=0"]
     weight = case.structure.blocks[-1].material.unit_weight
     worst += [f"materials.backfill.unit_weight={0.9 * weight}"]
     other = af.Case.read(path, worst)
     whole = rate_case(other.structure, other.rating, other.limit)
-    assert factors[least_of_all] == pytest.approx(whole.factor, rel=SEARCHED)
+    assert factors[least_of_all] == pytest.approx(whole.factor, rel=PRINTED)
     assert next(iter(cells)) == least_of_all
     assert [*factors.values()] == sorted(factors.values())
     assert words[1].startswith("measure first, for cart: ")
@@ -103,13 +106,14 @@ def test_the_keys_of_a_case_are_changed_one_property_at_a_time(tmp_path, key):
     text = text.replace("[structure.backfill]", f"{walls}a = {{}}\nb = {{}}\n[structure.backfill]")
     path.write_text(text)
     case = af.Case.read(path)
-    joints = [SimpleNamespace(role="pier", depth=depth) for depth in (0.7, 0.5, 0.6)]
+    dry, depths = af.masonry.STONE_TO_STONE, (0.7, 0.5, 0.6)
+    joints = [SimpleNamespace(role="pier", depth=depth, contact=dry) for depth in depths]
     structure = SimpleNamespace(width=3.0, joints=joints, blocks=case.structure.blocks)
     found = SimpleNamespace(structure=structure, strength=4e6, width=2.8, fill=case.limit.fill)
     listed = [*_list_rating_changes(case, found)]
     changes = {name: change for _, name, change in listed}
     subjects = {"rings", "piers", "cover", "abutments", "weight of backfill"}
-    subjects |= {"strength", "friction angle of the fill", "width"}
+    subjects |= {"strength", "friction angle of the fill", "friction of joints", "width"}
     assert {subject for subject, *_ in listed} == subjects
     by = {"breadth": 0.08, "gap": 0.05}[key]
     rings = ["structure.arches.thickness", "structure.arches.right.thickness"]
@@ -124,6 +128,8 @@ def test_the_keys_of_a_case_are_changed_one_property_at_a_time(tmp_path, key):
         "a vehicle on 2.52 m": {"rating.width": 2.52},
         "a vehicle on 3 m": {"rating.width": 3.0},
         "abutments free": {"structure.sidewalls.state": "free"},
+        "0.1 less friction of joints": {'contacts."stone to stone".friction': 0.5},
+        "0.1 more friction of joints": {'contacts."stone to stone".friction': 0.7},
     }
     # that of the stones is given
     name, key = "backfill", "materials.backfill.unit_weight"
@@ -137,6 +143,34 @@ def test_the_keys_of_a_case_are_changed_one_property_at_a_time(tmp_path, key):
     for name, values in expected.items():
         own = changes[name]
         assert own == (values if name == "abutments free" else pytest.approx(values)), name
+
+
+def test_fill_in_pieces_and_joints_that_hardly_slide_are_varied_by_their_friction(tmp_path):
+    """Joints that never slide are not, nor those of a rating without sliding."""
+    path = tmp_path / "case.toml"
+    pieces = '"jointed", piece_size = "1 m", friction_angle = "0.5 rad"'
+    text = CASE.replace('fill = { friction_angle = "35 degree" }', "")
+    text = text.replace("[structure.arches]", f"fill = {{ law = {pieces} }}\n[structure.arches]")
+    text = text.replace("PIER", 'breadth = "0.9 m"') + '[contacts."soil to stone"]\nfriction = '
+    path.write_text(f"{text}0.1\n")
+    case = af.Case.read(path)
+    found = SimpleNamespace(structure=case.structure, strength=4e6, width=2.0, fill=None)
+    listed = {name: change for _, name, change in _list_rating_changes(case, found)}
+    angle = listed["fill of 23.6°"]
+    stands = af.Case.read(path, [f"{key}={value}" for key, value in angle.items()]).structure
+    (own,) = {joint.contact for joint in stands.joints if joint.contact.name == "fill"}
+    assert own.friction == pytest.approx(np.tan(0.5 - np.radians(5.0)))
+    less = {"stone to stone": 0.5, "soil to stone": 0.05}
+    assert listed["0.1 less friction of joints"] == pytest.approx(
+        {f'contacts."{name}".friction': value for name, value in less.items()}
+    )
+    path.write_text(f'{text}"none"\n')
+    case = af.Case.read(path)
+    found.structure = case.structure
+    rough = {name: change for _, name, change in _list_rating_changes(case, found)}
+    assert [*rough["0.1 more friction of joints"]] == ['contacts."stone to stone".friction']
+    never = af.Case.read(path, ["limit.friction=none"])
+    assert not [name for _, name, _ in _list_rating_changes(never, found) if "joints" in name]
 
 
 @pytest.mark.slow
@@ -156,16 +190,17 @@ def test_a_backing_is_left_out_alone_and_at_once_with_the_worst_of_the_others(
     removed = ['remove=["limit.fill.backing_height"]']
     bare = af.Case.read(path, removed)
     alone = rate_case(bare.structure, bare.rating, bare.limit).factor
-    assert float(cells["no backing"]) == pytest.approx(alone, rel=SEARCHED)
+    assert float(cells["no backing"]) == pytest.approx(alone, rel=PRINTED)
     assert alone < 0.9 * found.factor
     worst = [*removed, "structure.arches.thickness=0.36", "structure.backfill.cover=0.2"]
     worst += ["limit.strength=2e6", "limit.fill.mobilisation=0", "limit.fill.active=0"]
     width = min(float(x.split()[3]) for x in cells if x.startswith("a vehicle on"))
     weight = 0.9 * case.structure.blocks[-1].material.unit_weight
     worst += [f"rating.width={width}", f"materials.backfill.unit_weight={weight}"]
+    worst += [f'contacts."{each} to stone".friction=0.5' for each in ("stone", "soil")]
     least = af.Case.read(path, worst)
     whole = rate_case(least.structure, least.rating, least.limit).factor
-    assert float(cells["all unfavourable at once"]) == pytest.approx(whole, rel=SEARCHED)
+    assert float(cells["all unfavourable at once"]) == pytest.approx(whole, rel=PRINTED)
 
 
 @pytest.mark.slow
@@ -216,14 +251,14 @@ def test_variations_that_are_stopped_are_kept(tmp_path, unplotted, capsys, monke
     table, names = out / "rating_variations.csv", "cart, without impact with"
     rows = pd.read_csv(table).set_index(names)["factor"]
     late = rows[rows == "not computed"]
-    assert len(late) == 14 - 3  # rings, and a narrower pier, which is refused before it is rated
+    assert len(late) == 16 - 3  # rings, and a narrower pier, which is refused before it is rated
     assert float(rows["rings a tenth thinner"]) < float(rows["rings a tenth thicker"])
     text = (out / "rating.txt").read_text()
     assert f"in doubt: interrupted: {len(late)} variations of the rating were not computed" in text
     assert f"; {len(late)} variations were not computed" in text
     stop[0] = 0
     assert af.commands.main(command) == 3
-    assert len(seen) == 13 + 1  # all but the narrower pier, and the interrupted one twice
+    assert len(seen) == 15 + 1  # all but the narrower pier, and the interrupted one twice
     second = pd.read_csv(table).set_index(names)["factor"]
     assert "not computed" not in set(second)
     assert second["rings a tenth thinner"] == rows["rings a tenth thinner"]
@@ -241,9 +276,9 @@ def test_variations_that_are_stopped_are_kept(tmp_path, unplotted, capsys, monke
 
     monkeypatch.setattr(variations, "rate_again", refuse)
     af.commands.main([*command, "--live", "1.5"])
-    assert len(seen) == 13
+    assert len(seen) == 15
     # that rings do not fit on a narrower pier is no failure
-    assert caplog.text.count("no optimum") == 13
+    assert caplog.text.count("no optimum") == 15
     assert "piers a tenth narrower" not in caplog.text
     capsys.readouterr()
 
