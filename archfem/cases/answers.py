@@ -227,7 +227,7 @@ def state_ratings(
     sentences = [repr(first)]
     if not np.isnan(first.factor):
         outcome, *others = first.clauses
-        outcome = f"rating for {first.vehicle.name}: factor {first.factor:.4g}, {outcome}"
+        outcome = f"rating for {first.vehicle.name}: {first.said_factor}, {outcome}"
         sentences = [outcome, *others, f"worst {first.place}"]
     if len(rated) > 1:
         least, code = first.least_by_codes

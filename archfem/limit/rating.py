@@ -194,7 +194,12 @@ class Rating(ResultDisplay):
         """Factor, place and outcome; no factor where the bridge does not stand."""
         if np.isnan(self.factor):
             return f"{self.outcome}, {self.place}"
-        return f"factor {self.factor:.4g} {self.place}, {self.outcome}"
+        return f"{self.said_factor} {self.place}, {self.outcome}"
+
+    @property
+    def said_factor(self) -> str:
+        """The factor, without crushing where no strength counts, in words."""
+        return f"factor {self.factor:.4g}{' without crushing' * bool(self.crushing)}"
 
     @property
     def _as_given(self) -> str:

@@ -143,11 +143,13 @@ def test_a_strength_that_is_not_given_is_stated_by_hand():
     assert expected < 0.995 * found.factor
     ends = f"{expected:.4g} to {found.factor:.4g} over what is assumed of the stones"
     assert f"; the factor is {ends}" in found.outcome
+    assert f": factor {found.factor:.4g} without crushing {found.place}, " in repr(found)
     words = f"(56 MPa of the preset is not given); at 5 MPa the least factor is {expected:.4g}"
     assert words in str(found)
     given = af.rate(stone, axle, width=2.0, strength=5e6)
     assert given.factor == pytest.approx(expected, rel=1e-4)
     assert not given.crushing
+    assert f": factor {given.factor:.4g} {given.place}, " in repr(given)
     soft = replace(found, live=1.35, impact=1.2, crushing={"factor": 0.9})
     assert replace(soft, moving=_scaled(soft.moving, 3.0)).outcome.startswith(
         "passes only with stones that do not crush"
@@ -487,7 +489,7 @@ def test_words_and_table(lorry_rating):
     (x,) = {*places} - {beside}
     clear = f"{x - CLEAR_FROM:.2f} m from the left clear springing"
     stands = f"1 axle of 2 at x = {x:.2f} m, {clear} (the other at {beside:.2f} m), "
-    assert f"factor {lorry_rating.factor:.4g} with {stands}" in repr(lorry_rating)
+    assert f"factor {lorry_rating.factor:.4g} without crushing with {stands}" in repr(lorry_rating)
     assert ("passes" in repr(lorry_rating)) == (lorry_rating.factor >= 1.0)
     head, *rows = lorry_rating.table().splitlines()
     assert head.startswith("direction,position")
