@@ -19,7 +19,7 @@ from archfem.cases.result_text import (
     Remark,
     compare_push,
     describe_pushover,
-    note_masses,
+    note_collapse,
 )
 from archfem.cases.run import (
     CASE_FILE,
@@ -202,7 +202,7 @@ def limit_files(
     if not collapse.push and collapse.outcome is Outcome.COLLAPSES:
         site = PushFactors(*collapse.range)
     remarks: list[Remark] = list(doubts)
-    remarks += note_masses(case.structure, collapse.live, collapse.dead, case.parapets)
+    remarks += note_collapse(case.structure, collapse, case.limit, case.parapets)
     given = collapse.sentence, remarks, demand, site
     stated = state_outcome("limit analysis", *given).as_file("limit")
     return {"limit.txt": text, "limit.csv": joints, "collapse.png": collapse.plot(), **stated}

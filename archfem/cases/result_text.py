@@ -96,6 +96,9 @@ def mark_bound(row: Mapping[str, Any], name: str, text: str) -> str:
 # What a run of a wall in bond checks across its plane
 CHECKED_ACROSS = "across the plane of the drawing a run checks it as one rigid body"
 
+# Begin of notes that are not about the least factor over what is assumed of a fill
+OF_GIVEN_FILL = "with the fill as given, "
+
 # Note on abutments, which a rating varies
 IMMOVABLE = "abutments are taken as immovable"
 
@@ -323,15 +326,22 @@ def describe_collapse(
         lines.append(collapse.over_fill.describe_states(unit, name=name))
     crushing = limit.describe_crushing(structure)
     lines += filter(None, [crushing, describe_fill(limit.fill, structure)])
-    lines += note_lower_crowns(structure, limit.fill)
-    lines += note_masses(structure, collapse.live, collapse.dead, parapets)
-    lines += [f"{NOTE_MARK}{note}" for note in collapse.notes]
+    lines += note_collapse(structure, collapse, limit, parapets)
     if structure.heads.any() and collapse.outcome is Outcome.COLLAPSES and collapse.push:
         lines.append(
             "blocks are rigid, and elastic joints may bear less: hold a push of "
             f"{0.9 * collapse.factor * collapse.push:.3g} g, a tenth below, by [motion] held"
         )
     return "\n".join(lines)
+
+
+def note_collapse(
+    structure: Structure, collapse: Collapse, limit: LimitAnalysis, parapets: float = 0.0
+) -> list[str]:
+    """Return the notes on a limit analysis: on crowns, on masses, and on the fill as given."""
+    notes = note_lower_crowns(structure, limit.fill)
+    notes += note_masses(structure, collapse.live, collapse.dead, parapets)
+    return [*notes, *(f"{NOTE_MARK}{OF_GIVEN_FILL}{note}" for note in collapse.notes)]
 
 
 def note_masses(

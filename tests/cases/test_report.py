@@ -868,7 +868,7 @@ def test_a_result_without_a_time_history_has_a_report(
     if command == "rate":
         assert "In doubt, rating: Joints slide (arch, joint" in concluded
     else:
-        assert "note: joints slide (arch, joint" in words
+        assert "note: with the fill as given, joints slide (arch, joint" in words
         assert "oints slide" not in concluded
     assert ("Over the pressure of the fill, each at its worst place: " in concluded) == (
         command == "rate"

@@ -1,5 +1,6 @@
 """Range of results over what is assumed of a fill: closed forms of a stone in it, and its words."""
 
+import json
 from dataclasses import replace
 from itertools import product
 from types import SimpleNamespace
@@ -10,6 +11,7 @@ from backfilled import SOIL, rectangle
 
 import archfem as af
 from archfem.cases.analysis_keys import LimitAnalysis
+from archfem.cases.result_folder import limit_files
 from archfem.cases.result_text import describe_collapse
 from archfem.limit import collapse
 from archfem.limit.fill_range import FillAssumption, FillRange, vary_fill
@@ -121,7 +123,11 @@ def test_what_happens_at_the_upper_end_of_a_range_alone_is_a_note(angle, doubtfu
     slides = "at a factor of {:.4g} the fill itself slides, at"
     upper = slides.format(max(factors))
     assert [note.startswith(upper) for note in found.notes] == [True]
-    assert f"\nnote: {upper}" in describe_collapse(buried_stone(), found, LimitAnalysis((), None))
+    noted, limit = f"with the fill as given, {upper}", LimitAnalysis((), None)
+    assert f"\nnote: {noted}" in describe_collapse(buried_stone(), found, limit)
+    case = SimpleNamespace(structure=buried_stone(), limit=limit, parapets=0.0)
+    stated = json.loads(limit_files(case, found, "", None, [])["limit.json"])
+    assert [note.startswith(noted) for note in stated["notes"]] == [True]
     assert found.least.notes == found.notes
     checked = af.kinematic_assessment(buried_stone(), SITE, friction=None, fill=fill)
     assert checked.alpha_0 == pytest.approx(max(factors))

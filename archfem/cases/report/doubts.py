@@ -10,6 +10,7 @@ from archfem.cases.answers import MATCHED, RESULTS, Ratios, read_numbers
 from archfem.cases.report.motion_rules import check_motions, note_checks
 from archfem.cases.report.report_data import ReportData
 from archfem.cases.report.study_findings import list_studied
+from archfem.cases.result_text import OF_GIVEN_FILL
 from archfem.dynamics.collapse_state import COLLAPSE_STATES, FALLEN_STATES, RANGE_REMEDY
 from archfem.dynamics.history import History
 from archfem.dynamics.verdict_range import MAX_RATIO_OF_DISPLACEMENTS, VerdictRange, property_text
@@ -171,7 +172,12 @@ def spans_run(data: ReportData, found: VerdictRange) -> bool:
 
 def list_notes(data: ReportData) -> dict[str, list[str]]:
     """Return the notes of each result, with that on the rules of a norm for motions."""
-    notes = {RESULTS[name]: [*each.notes] for name, each in data.statements.items() if each.notes}
+    notes = {
+        RESULTS[name]: own
+        for name, each in data.statements.items()
+        # what is not about the least factor of a push stands in its text alone
+        if (own := [note for note in each.notes if not note.startswith(OF_GIVEN_FILL)])
+    }
     notes |= {HISTORIES: missed} if (missed := note_checks(data)) else {}
     return notes
 
