@@ -2,10 +2,11 @@
 
 import argparse
 import json
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import asdict
 from functools import wraps
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import Any
 
 from archfem._display import DOUBT_MARK, write_progress_line
@@ -22,8 +23,13 @@ from archfem.commands.run import (
     name_group,
     write_results,
 )
-from archfem.dynamics.collapse_state import DISLOCATION, CollapseState, shallowest_part
-from archfem.dynamics.history import Ending
+from archfem.dynamics.collapse_state import (
+    DISLOCATION,
+    FALLEN_STATES,
+    CollapseState,
+    shallowest_part,
+)
+from archfem.dynamics.history import Ending, History
 from archfem.dynamics.motion_scaling import (
     OWN_STEP,
     CollapseScale,
@@ -34,6 +40,7 @@ from archfem.dynamics.scale_search import KeptRuns, MechanismScales, ScaledRun
 from archfem.dynamics.walls_across import check_across
 from archfem.errors import InvalidInput
 from archfem.limit.mechanism_count import Mechanism
+from archfem.masonry.structure import join_words
 from archfem.models.model import Doubt
 from archfem.motion.motion import Motion
 from archfem.statics.fill_checks import doubt_pieces
@@ -73,7 +80,9 @@ def verdict(options: argparse.Namespace) -> int:
     case = Case.read(options.case, options.changes)
     motion = _choose_motion(case, options)
     print(case.title)
-    folder = None if options.out is None else path_inside(Path(options.out), "variations")
+    # of its own, in which other pairs may be varied at the same time
+    place = PurePath("variations", options.pair or "")
+    folder = None if options.out is None else path_inside(Path(options.out), place)
     sampling = {"workers": options.workers, "samples": options.samples, "folder": folder}
     computed = verdict_range(case.analysis, motion, fidelity="rigid", **case.verdict, **sampling)
     _, falls = check_across(case.structure, {motion.name: motion})
@@ -93,14 +102,18 @@ def _say_steps(case: Case, motion: Motion, options: argparse.Namespace) -> str:
     if case.analysis.dt is not None:
         return ""
     text = f"\nvariations take steps of {1e3 * OWN_STEP:g} ms, and a run varies its own"
-    if options.out is None:
-        return text
-    alone = case if options.pair is None else case.alone(options.pair)
-    run = load_finished_run(Path(options.out, options.pair or "", HISTORY_FILE), alone, motion)
-    if run is None:
+    if (run := _find_run(case, motion, options)) is None:
         return text
     most, left = (format_mm(run.dataset.attrs[key]) for key in ("displacement", "residual"))
     return f"{text}: in this folder it is displaced by up to {most}, {left} at the end"
+
+
+def _find_run(case: Case, motion: Motion, options: argparse.Namespace) -> History | None:
+    """Return the finished run of the folder under a motion of the same case, or None."""
+    if options.out is None:
+        return None
+    alone = case if options.pair is None else case.alone(options.pair)
+    return load_finished_run(Path(options.out, options.pair or "", HISTORY_FILE), alone, motion)
 
 
 def _choose_motion(case: Case, options: argparse.Namespace) -> Motion:
@@ -130,6 +143,7 @@ def scale(options: argparse.Namespace) -> int:
     with record_doubts(case.structure) as doubts:
         found = search(case.analysis, motion, made=made)
         doubts += doubt_pieces(case.structure)
+        doubts += _compare_with_run(found, _find_run(case, motion, options))
     files: Files = {**answers.state_scale(found, motion, doubts)}
     doubts += found.doubts
     lines = [f"{motion.name}: {found}", *mark_remarks(doubts), "", found.table()]
@@ -147,6 +161,22 @@ def scale(options: argparse.Namespace) -> int:
     if found.interrupted:
         raise KeyboardInterrupt
     return doubt_code(doubts)
+
+
+def _compare_with_run(
+    found: CollapseScale | MechanismScales, run: History | None
+) -> Iterator[Doubt]:
+    """Yield a doubt where it falls at 1 × the motion by steps of a search or in a run alone."""
+    if run is None or run.fall is None:
+        return
+    falls, made = run.fall.kind in FALLEN_STATES, found.kept_runs.items()
+    answers_at_one = {dt: x.fall.kind for (dt, at), x in made if dt and at == 1.0 and x.fall}
+    others = [dt for dt, kind in answers_at_one.items() if (kind in FALLEN_STATES) != falls]
+    if others:
+        steps = f"by steps of {join_words([f'{1e3 * dt:g}' for dt in others])} ms"
+        which = ["in the run of this folder", steps][:: 1 if falls else -1]
+        words = "at 1.00 × it falls {}, but not {}".format(*which)
+        yield Doubt(words, f"give both the same, `--set analysis.dt={min(others):g}`")
 
 
 def _read_kept(case: Case, options: argparse.Namespace, name: str) -> str | None:

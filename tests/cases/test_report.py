@@ -720,9 +720,10 @@ def test_the_rise_of_a_pointed_arch_is_that_of_its_apex_within_the_key_stone():
 
 
 def test_a_verdict_that_was_broken_off_is_a_doubt(kept):
-    """Until all of its runs are finished; so is a study in the folder."""
+    """Until all of its runs are finished; so is that of a pair, and a study in the folder."""
     found = af.cases.open_results(kept)
-    for place, command in (("variations", "verdict"), ("", "study")):
+    of_pair = "variations/second", "verdict --pair second"
+    for place, command in (("variations", "verdict"), of_pair, ("", "study")):
         path = kept / place / "progress.json"
         path.parent.mkdir(exist_ok=True)
         for done in (23, 40):

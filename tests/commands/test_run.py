@@ -7,6 +7,7 @@ import tomllib
 from contextlib import suppress
 from dataclasses import asdict, replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -242,7 +243,7 @@ def test_a_range_is_that_of_the_case_and_marked_as_given(small, unplotted):
 @pytest.mark.parametrize("out", [[], ["--out", "out"]])
 def test_a_range_keeps_its_runs_in_its_folder(small, monkeypatch, capsys, out):
     def interrupted(analysis, motion, *, folder, **options):
-        assert folder == (Path("out/variations") if out else None)
+        assert folder == (Path("out/variations/first") if out else None)
         raise KeyboardInterrupt
 
     monkeypatch.setattr(variations, "verdict_range", interrupted)
@@ -400,6 +401,32 @@ def test_scales_of_the_pairs_of_a_suite_stand_side_by_side(searched, tmp_path, c
     assert "not scaled" not in words
     assert af.commands.main([*given, "--set", "materials.stone.unit_weight=21e3"]) in (0, 3)
     assert made[3:] == ["weak", "strong", "middle"]
+
+
+@pytest.mark.parametrize(
+    ("pair", "kind", "says"),
+    [
+        ("weak", "fallen", "it falls in the run of this folder, but not by steps of 5 ms"),
+        pytest.param("weak", "dislocated", "", marks=pytest.mark.slow),
+        pytest.param(
+            *("strong", "stands", "it falls by steps of 5 ms, but not in the run of this folder"),
+            marks=pytest.mark.slow,
+        ),
+    ],
+)
+def test_a_search_and_a_run_of_which_one_alone_falls_are_in_doubt(
+    pair, kind, says, searched, tmp_path, monkeypatch, capsys
+):
+    """Steps of a search are fixed, and the run of the folder varies its own."""
+    run = SimpleNamespace(fall=SimpleNamespace(kind=kind))
+    monkeypatch.setattr(margin, "load_finished_run", lambda *_: run)
+    code = af.commands.main([*searched[0], "--pair", pair])
+    stated = json.loads((tmp_path / "out" / pair / "scale.json").read_text(encoding="utf-8"))
+    found = [cause for cause, *_ in stated["doubts"] if "the run of this folder" in cause]
+    assert found == [f"at 1.00 × {says}"] * bool(says)
+    said = f"in doubt: at 1.00 × {says}; give both the same, `--set analysis.dt=0.005`\n"
+    assert (said in capsys.readouterr().out) == bool(says)
+    assert code == 3 or not says
 
 
 @pytest.mark.slow

@@ -71,7 +71,9 @@ def list_doubts(data: ReportData) -> list[tuple[str, Doubt]]:
 
 def _list_unfinished(data: ReportData) -> Iterator[str]:
     """Yield how many runs of a verdict, and of a study in the folder, were finished, if not all."""
-    for command, place in {"verdict": "variations", "study": ""}.items():
+    pairs = (data.case.suite or {}).get("pairs", ())
+    places = {f"variations/{pair}": f"verdict --pair {pair}" for pair in pairs}
+    for place, command in {"variations": "verdict", **places, "": "study"}.items():
         path = (data.folder or Path()) / place / "progress.json"
         if data.folder and path.is_file():
             progress = read_sealed_json(path, "progress")
