@@ -48,8 +48,9 @@ def take_fill_as_loads(
     if columns.lean.any():
         raise InvalidInput(
             "an assessment takes no axles on a fill, on which a vehicle leans: push it by `archfem "
-            "limit`, or run motions on a fill in pieces; as weights of `loads`, axles do not press "
-            "the fill against the stones, and ratios were up to 2.4 times too high"
+            "limit`, which compares it with the site's acceleration, or run motions on a fill in "
+            "pieces; as weights of `loads`, axles do not press the fill against the stones, and "
+            "ratios were up to 2.4 times too high"
         )
     loads = []
     for number in np.unique(columns.stone):

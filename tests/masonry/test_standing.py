@@ -130,8 +130,9 @@ def test_a_vehicle_on_two_piers_leans_on_the_one_in_front(lever, verified, caplo
     assert "an axle has lifted, at 0.125 g" in caplog.text
     # pieces are loads of an assessment too, and axles as weights do not press the fill
     pieces = carrying(af.masonry.jointed_fill(piers, 0.4, friction_angle=30.0), [truck])
+    words = r"on a fill, .*push it by .*, which compares it with the site's .*too high"
     for each in (loaded, pieces):
-        with pytest.raises(af.errors.InvalidInput, match=r"on a fill, .*push it by .*too high"):
+        with pytest.raises(af.errors.InvalidInput, match=words):
             af.kinematic_assessment(each, af.Eurocode8(ag=0.25, ground="C"))
 
 
