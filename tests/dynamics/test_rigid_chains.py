@@ -2,13 +2,20 @@
 
 import numpy as np
 import pytest
-from kernels import from_python
+from kernels import each_way
 
 import archfem as af
 from archfem._numba import kernel
 from archfem.dynamics.schemes import Conserving
-from archfem.dynamics.solvers import newton, rigid_chains
+from archfem.dynamics.solvers import newton
 from archfem.dynamics.solvers.equation import Equation
+from archfem.dynamics.solvers.rigid_chains import (
+    _couple_joints,
+    _evaluate_joints,
+    _move_stones,
+    _start_joints,
+    chain_system,
+)
 from archfem.dynamics.solvers.stone_tree import find_stone_tree
 
 DAMPING = af.StiffnessDamping(0.05, 8.0)
@@ -90,22 +97,23 @@ def test_supports_that_have_moved_and_turned_stay_there(monkeypatch):
 
 @kernel
 def evaluate_step(system, before, after):
-    rigid_chains._move_stones(system.stones, before, before, True)
-    rigid_chains._start_joints(system, 0)
-    rigid_chains._move_stones(system.stones, before, after, False)
-    rigid_chains._evaluate_joints(system, 0)
-    rigid_chains._couple_joints(system, 0)
+    _move_stones(system.stones, before, before, True)
+    _start_joints(system, 0)
+    _move_stones(system.stones, before, after, False)
+    _evaluate_joints(system, 0)
+    _couple_joints(system, 0)
 
 
-def test_coupling_of_stones_is_the_derivative_of_their_forces():
+@each_way
+def test_coupling_of_stones_is_the_derivative_of_their_forces(called):
     """Central differences at 0.05 rad; joints that open are integrated by Gauss's rule."""
     structure = ring(contact=af.Contact(1e6, 4e5, None))
     equation = equation_of(structure)
     tree, rng = find_stone_tree(equation), np.random.default_rng(4)
-    system = rigid_chains.chain_system(equation, tree, 0.002)
+    system = chain_system(equation, tree, 0.002)
     before, after = 0.05 * rng.standard_normal((2, len(system.mass) + 3))
     before[-3:] = after[-3:] = 0.0
-    evaluate = from_python(evaluate_step)
+    evaluate = called(evaluate_step)
 
     def forces(place, change):
         moved = after.copy()

@@ -3,12 +3,19 @@
 import numba
 import numpy as np
 import pytest
-from kernels import from_python
+from kernels import each_way, from_python
 from repeats import each_once
 
 import archfem as af
 from archfem._numba import kernel
-from archfem.joints.large import lane_law as lanes_of
+from archfem.joints.large.lane_law import (
+    lane_damping_loss,
+    lane_energy,
+    lane_forces,
+    lane_law,
+    lane_overlap,
+    pad,
+)
 from archfem.joints.large.lanes import (
     LANES,
     WIDTH,
@@ -65,15 +72,15 @@ def evaluate_lanes(law, start, end, lag, memory, out):
     for at in range(0, start.shape[1], WIDTH):
         g0, s0, t0 = load(start, 0, at), load(start, 1, at), load(start, 2, at)
         g1, s1, t1 = load(end, 0, at), load(end, 1, at), load(end, 2, at)
-        (l0, _), (c0, _) = lanes_of.lane_overlap(law, at, s0)
-        (l1, _), (c1, _) = lanes_of.lane_overlap(law, at, s1)
+        (l0, _), (c0, _) = lane_overlap(law, at, s0)
+        (l1, _), (c1, _) = lane_overlap(law, at, s1)
         g0 = g0 - c0 * t0
-        before = lanes_of.lane_energy(law, at, l0, g0, t0)[0]
-        force, rates, others, missing, after = lanes_of.lane_forces(
+        before = lane_energy(law, at, l0, g0, t0)[0]
+        force, rates, others, missing, after = lane_forces(
             law, at, (g0, s0, t0, l0, c0, before), (g1, s1, t1), lag, memory
         )
         ends = (g0, l0 * t0, l0), (g1 - c1 * t1, l1 * t1, l1)
-        loss = lanes_of.lane_damping_loss(law, at, *ends, lag, memory[3])
+        loss = lane_damping_loss(law, at, *ends, lag, memory[3])
         for k in range(3):
             store(out, k, at, force[k])
             store(out, 3 + k, at, others[k])
@@ -102,9 +109,6 @@ def evaluate_one_by_one(law, start, end, lag, memory, out):
         out[17, joint] = damping_loss(law, joint, (first, last), lag)
 
 
-side_by_side_forces, one_by_one_forces = map(from_python, (evaluate_lanes, evaluate_one_by_one))
-
-
 def joints_of(contact, quadrature=None):
     """Return the law of the joints of 18 stones on each other, some of whose faces are longer."""
     ends = 0.5 + 0.1 * np.random.default_rng(2).integers(0, 3, (18, 2))
@@ -127,16 +131,18 @@ def random_measures(rng, count, depth):
     return signs * [size[0], slip, size[2]]
 
 
+@each_way
 @pytest.mark.parametrize(
     ("name", "quadrature", "lag"), each_once([*CONTACTS], [None, "lobatto"], [0.4, 0.0])
 )
-def test_joints_side_by_side_equal_joints_one_by_one(name, quadrature, lag):
+def test_joints_side_by_side_equal_joints_one_by_one(name, quadrature, lag, called):
     """Random steps, each joint by another part of the law; equal to rounding."""
     law, rng = joints_of(CONTACTS[name], quadrature), np.random.default_rng(5)
+    side_by_side_forces, one_by_one_forces = called(evaluate_lanes), called(evaluate_one_by_one)
     count, points = len(law.depth), int(law.first_point[1])
-    side_by_side, seen = lanes_of.lane_law(law), 0
-    width = lanes_of.pad(count)
-    for _ in range(30):
+    side_by_side, seen = lane_law(law), 0
+    width = pad(count)
+    for _ in range(30 if called is from_python else 10):
         start, end = np.zeros((2, 3, width))
         start[:, :count] = random_measures(rng, count, law.depth)
         change = random_measures(rng, count, law.depth)

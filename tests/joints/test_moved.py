@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from kernels import from_python
+from kernels import interpreted
 from repeats import each_once
 
 import archfem as af
@@ -19,14 +19,14 @@ from archfem.joints.large.overlap_law import FaceLaw
 from archfem.joints.large.point_law import CONTACT_RECORD
 from archfem.joints.large.rates import assemble_rates, find_block_starts, find_rate_pairs
 
-joint_measures = from_python(face_kinematics.joint_measures)
-step_measures = from_python(face_kinematics.step_measures)
-face_forces = from_python(face_kinematics.face_forces)
-rotation_series = from_python(face_kinematics.rotation_series)
-cosine_sine = from_python(face_kinematics.cosine_sine)
-face_pose = from_python(face_kinematics.face_pose)
-gather_face_forces = from_python(face_kinematics.gather_face_forces)
-step_poses = from_python(face_kinematics.step_poses)
+joint_measures = interpreted(face_kinematics.joint_measures)
+step_measures = interpreted(face_kinematics.step_measures)
+face_forces = interpreted(face_kinematics.face_forces)
+rotation_series = interpreted(face_kinematics.rotation_series)
+cosine_sine = interpreted(face_kinematics.cosine_sine)
+face_pose = interpreted(face_kinematics.face_pose)
+gather_face_forces = interpreted(face_kinematics.gather_face_forces)
+step_poses = interpreted(face_kinematics.step_poses)
 
 SEEDS = range(12)
 
