@@ -27,6 +27,8 @@ def pytest_addoption(parser):
 
 
 def pytest_configure(config):
+    # garbage is looked for seldom: collecting tests makes large syntax trees, a fifth of its time
+    gc.set_threshold(50_000, 20, 100)
     # a failure of the machine, against which files are flushed, ends the tests too
     os.fsync = lambda number: None
     if config.getoption("--verified") and not hasattr(config, "workerinput"):
@@ -51,10 +53,9 @@ def pytest_make_collect_report(collector):
 
 
 def pytest_collection_finish():
-    """Look for garbage among what tests make alone, and seldom: a twentieth of their time."""
+    """Look for garbage among what tests make alone: a twentieth of their time."""
     gc.collect()
     gc.freeze()
-    gc.set_threshold(50_000, 20, 100)
 
 
 def pytest_collection_modifyitems(config, items):
