@@ -4,6 +4,7 @@ Or they run as Python, with the same arithmetic: compiling takes seconds where c
 """
 
 from contextlib import suppress
+from functools import cache
 from types import FunctionType
 from typing import Any
 
@@ -32,6 +33,7 @@ class WrapperCache(FunctionCache):
         return sig, codegen.magic_tuple()
 
 
+@cache
 def from_python(kernel: Any) -> Any:
     """Return a compiled function that calls a kernel, and that Python can call."""
 
@@ -88,14 +90,15 @@ LANE_FUNCTIONS = {
 
 def with_attributes(value: Any) -> Any:
     """Return an argument whose records have their fields as attributes, as in compiled code."""
-    if isinstance(value, np.ndarray) and value.dtype.names:
-        return value.view(np.recarray)
+    if isinstance(value, np.ndarray | np.void) and value.dtype.names:
+        return value.view((np.record, value.dtype))
     if not isinstance(value, tuple):
         return value
     fields = map(with_attributes, value)
     return type(value)(*fields) if hasattr(value, "_fields") else tuple(fields)
 
 
+@cache
 def interpreted(kernel: Any) -> Any:
     """Return a kernel as a function of Python, in which all kernels that it calls are such too."""
     made: dict[Any, Any] = {}
@@ -121,7 +124,16 @@ def interpreted(kernel: Any) -> Any:
     return call
 
 
-# Compiling a kernel takes longer than a test of it: by default its Python code runs.
-each_way = pytest.mark.parametrize(
-    "called", [interpreted, pytest.param(from_python, marks=pytest.mark.slow)]
-)
+def either(kernel: Any) -> Any:
+    """Return a function that calls a kernel in the way of `each_way`."""
+    return lambda *arguments: WAY["way"](kernel)(*arguments)
+
+
+WAY = {"way": interpreted}
+
+
+@pytest.fixture(params=[interpreted, pytest.param(from_python, marks=pytest.mark.slow)])
+def each_way(request: Any, monkeypatch: Any) -> Any:
+    """How kernels run: as Python by default, since compiling takes longer than a test of them."""
+    monkeypatch.setitem(WAY, "way", request.param)
+    return request.param

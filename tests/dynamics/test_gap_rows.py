@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from kernels import each_way, from_python
+from kernels import from_python
 
 import archfem as af
 from archfem.dynamics.solvers import joint_law as law_kernels
@@ -84,15 +84,14 @@ def test_forces_at_an_instant_are_those_of_the_operator(fidelity, rule):
     assert released == pytest.approx(same, abs=1e-12 * np.abs(same).max())
 
 
-@each_way
 @pytest.mark.parametrize("part", np.geomspace(1e-9, 1e-5, 5))
-def test_a_facet_that_opens_by_a_little_releases_as_little(part, called):
+def test_a_facet_that_opens_by_a_little_releases_as_little(part, each_way):
     """An opening so small that the integral at its nearer end is all rounding."""
     stone = af.column(breadth=1.0, heights=[1.0], contact=af.Contact(1e9, 3e8, None))
     joints = af.build(stone, fidelity="rigid", quadrature="exact").operator
     numbers = step_numbers(0.005, (0.25, 0.5, 0.0), 0.0, 0.0)
     law, _, _ = joint_law(joints, numbers, 0.005, conserving=False)
     gap, released = np.array([-1.0, part / (1.0 - part)]), np.zeros(2)
-    called(open_forces)(law, gap, released)
+    each_way(open_forces)(law, gap, released)
     assert (released >= 0.0).all()
     assert released.max() <= 2.0 * part * 1e9

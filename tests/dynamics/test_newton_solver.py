@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from glued import glued
-from kernels import from_python
 from scipy import sparse
 
 import archfem as af
@@ -116,11 +115,10 @@ def test_the_narrower_order_is_taken():
         assert narrowest_width(matrix.tocsr()) == 1
 
 
-@pytest.mark.slow  # the kernel is compiled anew where a test calls it from Python
-def test_points_that_reverse_their_slip_are_held():
+def test_points_that_reverse_their_slip_are_held(each_way):
     """They release nothing, and what they release has no derivative, until they slide again."""
     released, last = np.array([-4.0, 3.0, 5.0, -6.0, 0.0]), np.array([2.0, 1.0, 0.0, -1.0, 7.0])
     rows, values = np.array([[0, 0, 0], [0, 1, 1], [1, 0, 2], [4, 4, 3]]), np.ones(4)
-    from_python(joint_law.hold_reversed)(last, released, (rows, values), 4)
+    each_way(joint_law.hold_reversed)(last, released, (rows, values), 4)
     assert released.tolist() == [0.0, 3.0, 5.0, -6.0, 0.0]
     assert values.tolist() == [0.0, 0.0, 1.0, 1.0]

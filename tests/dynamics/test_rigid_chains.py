@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from kernels import each_way
 
 import archfem as af
 from archfem._numba import kernel
@@ -104,8 +103,7 @@ def evaluate_step(system, before, after):
     _couple_joints(system, 0)
 
 
-@each_way
-def test_coupling_of_stones_is_the_derivative_of_their_forces(called):
+def test_coupling_of_stones_is_the_derivative_of_their_forces(each_way):
     """Central differences at 0.05 rad; joints that open are integrated by Gauss's rule."""
     structure = ring(contact=af.Contact(1e6, 4e5, None))
     equation = equation_of(structure)
@@ -113,7 +111,7 @@ def test_coupling_of_stones_is_the_derivative_of_their_forces(called):
     system = chain_system(equation, tree, 0.002)
     before, after = 0.05 * rng.standard_normal((2, len(system.mass) + 3))
     before[-3:] = after[-3:] = 0.0
-    evaluate = called(evaluate_step)
+    evaluate = each_way(evaluate_step)
 
     def forces(place, change):
         moved = after.copy()

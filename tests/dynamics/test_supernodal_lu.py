@@ -4,7 +4,7 @@ import logging
 
 import numpy as np
 import pytest
-from kernels import from_python
+from kernels import either
 from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
@@ -41,7 +41,7 @@ def grid():
     return matrix, elimination, np.stack([entries.row[own], entries.col[own]]).astype(np.int64)
 
 
-solve_panels = from_python(supernodal_lu.solve_panels)
+solve_panels = either(supernodal_lu.solve_panels)
 
 
 def factorise(panels, places, added):
@@ -52,6 +52,7 @@ def factorise(panels, places, added):
 
 
 # the kernel is compiled anew where a test calls it from Python; the history below is by it too
+@pytest.mark.usefixtures("each_way")
 @pytest.mark.slow
 def test_solutions_are_those_of_superlu_for_any_added_entries(grid):
     matrix, elimination, places = grid

@@ -4,7 +4,7 @@ from math import pi, sqrt
 
 import numpy as np
 import pytest
-from kernels import from_python
+from kernels import either
 from scipy.integrate import quad
 
 import archfem as af
@@ -26,9 +26,9 @@ MOTION = af.Motion(4.0 * np.sin(4.0 * pi * TIMES) * (TIMES < 0.25), 0.005)
 
 LAW = ContactLaw.of(af.Contact(STIFFNESS, 1e9, 0.6, closure=CLOSURE))
 
-excess_means = from_python(closing_law.excess_means)
-facet_step_excess = from_python(closing_law.facet_step_excess)
-point_step_excess = from_python(closing_law.point_step_excess)
+excess_means = either(closing_law.excess_means)
+facet_step_excess = either(closing_law.facet_step_excess)
+point_step_excess = either(closing_law.point_step_excess)
 
 PROFILES = [
     (-0.1, 0.2),
@@ -51,6 +51,7 @@ def excess(closing):
     return STIFFNESS * CLOSURE * (pressure - share)
 
 
+@pytest.mark.usefixtures("each_way")
 @pytest.mark.parametrize(("first", "last"), PROFILES)
 def test_means_along_a_facet_are_those_of_quadrature(first, last):
     first, last = first * CLOSURE, last * CLOSURE
@@ -68,6 +69,7 @@ def test_means_along_a_facet_are_those_of_quadrature(first, last):
     assert far == pytest.approx(mean(lambda x: x), rel=1e-9)
 
 
+@pytest.mark.usefixtures("each_way")
 @pytest.mark.parametrize(("first", "last"), PROFILES)
 def test_means_and_tangents_are_derivatives(first, last):
     ends, step = np.array([first, last]) * CLOSURE, 1e-6 * CLOSURE
@@ -100,6 +102,7 @@ STEPS = [
 """Closings of both ends over δ_m before a step, then after it."""
 
 
+@pytest.mark.usefixtures("each_way")
 @pytest.mark.parametrize("ends", STEPS)
 def test_mean_of_a_step_does_the_work_of_the_energy(ends):
     ends = np.array(ends) * CLOSURE
@@ -113,6 +116,7 @@ def test_mean_of_a_step_does_the_work_of_the_energy(ends):
     assert place * (ends[2] - ends[0]) == pytest.approx(stored[1] - stored[0], rel=1e-10)
 
 
+@pytest.mark.usefixtures("each_way")
 @pytest.mark.parametrize("ends", STEPS)
 def test_tangent_of_a_step_is_nearly_the_derivative(ends):
     """Its off-diagonal entries are made equal; the others are exact but for quadrature in time."""

@@ -3,7 +3,7 @@
 import numba
 import numpy as np
 import pytest
-from kernels import each_way, from_python
+from kernels import from_python
 from repeats import each_once
 
 import archfem as af
@@ -131,18 +131,17 @@ def random_measures(rng, count, depth):
     return signs * [size[0], slip, size[2]]
 
 
-@each_way
 @pytest.mark.parametrize(
     ("name", "quadrature", "lag"), each_once([*CONTACTS], [None, "lobatto"], [0.4, 0.0])
 )
-def test_joints_side_by_side_equal_joints_one_by_one(name, quadrature, lag, called):
+def test_joints_side_by_side_equal_joints_one_by_one(name, quadrature, lag, each_way):
     """Random steps, each joint by another part of the law; equal to rounding."""
     law, rng = joints_of(CONTACTS[name], quadrature), np.random.default_rng(5)
-    side_by_side_forces, one_by_one_forces = called(evaluate_lanes), called(evaluate_one_by_one)
+    side_by_side_forces, one_by_one_forces = each_way(evaluate_lanes), each_way(evaluate_one_by_one)
     count, points = len(law.depth), int(law.first_point[1])
     side_by_side, seen = lane_law(law), 0
     width = pad(count)
-    for _ in range(30 if called is from_python else 10):
+    for _ in range(30 if each_way is from_python else 10):
         start, end = np.zeros((2, 3, width))
         start[:, :count] = random_measures(rng, count, law.depth)
         change = random_measures(rng, count, law.depth)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from kernels import interpreted
+from kernels import either
 from repeats import each_once
 
 import archfem as af
@@ -19,14 +19,14 @@ from archfem.joints.large.overlap_law import FaceLaw
 from archfem.joints.large.point_law import CONTACT_RECORD
 from archfem.joints.large.rates import assemble_rates, find_block_starts, find_rate_pairs
 
-joint_measures = interpreted(face_kinematics.joint_measures)
-step_measures = interpreted(face_kinematics.step_measures)
-face_forces = interpreted(face_kinematics.face_forces)
-rotation_series = interpreted(face_kinematics.rotation_series)
-cosine_sine = interpreted(face_kinematics.cosine_sine)
-face_pose = interpreted(face_kinematics.face_pose)
-gather_face_forces = interpreted(face_kinematics.gather_face_forces)
-step_poses = interpreted(face_kinematics.step_poses)
+joint_measures = either(face_kinematics.joint_measures)
+step_measures = either(face_kinematics.step_measures)
+face_forces = either(face_kinematics.face_forces)
+rotation_series = either(face_kinematics.rotation_series)
+cosine_sine = either(face_kinematics.cosine_sine)
+face_pose = either(face_kinematics.face_pose)
+gather_face_forces = either(face_kinematics.gather_face_forces)
+step_poses = either(face_kinematics.step_poses)
 
 SEEDS = range(12)
 
@@ -44,6 +44,7 @@ def measured(poses, angle):
     return np.array(joint_measures(tuple(poses[0]), tuple(poses[1]), angle))
 
 
+@pytest.mark.usefixtures("each_way")
 @pytest.mark.parametrize("seed", SEEDS)
 def test_the_discrete_derivative_gives_the_change_of_the_measures(seed):
     """D Δp = Δ(g, s, σ), to rounding."""
@@ -58,6 +59,7 @@ def test_the_discrete_derivative_gives_the_change_of_the_measures(seed):
         assert abs(face_forces(rates, tuple(row)) @ moved - change) < 4e-15
 
 
+@pytest.mark.usefixtures("each_way")
 @pytest.mark.parametrize("x", [0.0, 1e-9, 1e-3, 0.2499, -0.2499, 0.3, 2.0])
 def test_series_of_small_turns(x):
     """Against NumPy, and the derivative of sin x / x against differences of it."""
@@ -67,6 +69,7 @@ def test_series_of_small_turns(x):
     assert rotation_series(x)[2] == pytest.approx((there - back) / 2e-4, abs=1e-9)
 
 
+@pytest.mark.usefixtures("each_way")
 def test_turning_about_a_place_where_the_faces_touch_is_no_slip():
     """Whatever the angle; the gap at an arm a is -a σ less that at the place."""
     rng = np.random.default_rng(0)
@@ -199,6 +202,7 @@ def test_the_derivative_is_that_of_the_force(kind, friction, facets):
     assert np.quantile(errors, 0.75) < 1e-7
 
 
+@pytest.mark.usefixtures("each_way")
 @pytest.mark.parametrize("turns", [True, False])
 @pytest.mark.parametrize("seed", SEEDS)
 def test_the_pose_follows_its_discrete_derivative(seed, turns):

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from glued import glued
-from kernels import from_python
+from kernels import either
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
@@ -102,9 +102,9 @@ def test_steps_that_do_not_converge_are_left_to_snes(filled):
     assert off < 1e-8 * np.abs(exact.joints["M"]).max()
 
 
-update_images = from_python(newmark.update_images)
-solve_forward = from_python(supernodal_lu.solve_forward)
-solve_backward = from_python(supernodal_lu.solve_backward)
+update_images = either(newmark.update_images)
+solve_forward = either(supernodal_lu.solve_forward)
+solve_backward = either(supernodal_lu.solve_backward)
 
 
 def solve(factor, vector):
@@ -121,6 +121,7 @@ def laplacian(side):
     return sparse.block_diag([grid, line], format="csr")
 
 
+@pytest.mark.usefixtures("each_way")
 @pytest.mark.parametrize("side", [2, 7, 30])
 def test_factor_solves(side):
     matrix = laplacian(side)
@@ -156,6 +157,7 @@ def with_crumbs(rng):
     return matrix
 
 
+@pytest.mark.usefixtures("each_way")
 def test_factor_bears_entries_that_rounding_has_left_on_one_side():
     """Three of 1800 such entries, six in each of 300 matrices, used to lie outside the plan."""
     rng = np.random.default_rng(1)
@@ -208,6 +210,7 @@ def shuffled_structure(rng):
     return replace(made, blocks=stones)
 
 
+@pytest.mark.usefixtures("each_way")
 @pytest.mark.parametrize(
     ("first", "count"), [(0, 8), pytest.param(8, 2032, marks=pytest.mark.slow)]
 )
@@ -245,6 +248,7 @@ def test_matrix_that_is_not_definite_is_refused():
         symmetric_factor(matrix[plan.order][:, plan.order], plan)
 
 
+@pytest.mark.usefixtures("each_way")
 def test_images_follow_the_state():
     """Images of a random matrix, under HHT, against its products with the state."""
     rng = np.random.default_rng(4)
