@@ -24,7 +24,7 @@ def things():
         # the runs of the range, which other tests compute, take most of the time
         stands = CollapseState("stands", None, (), 0.02, 0.01, True)
         patch.setattr(variations, "prepare_runs", lambda *_: lambda _: stands)
-        patch.setattr(rating, "_places_along", partial(rating._places_along, steps=20))
+        patch.setattr(rating, "_places_along", partial(rating._places_along, steps=4))
         yield one_of_each()
 
 

@@ -73,17 +73,19 @@ def test_tables_of_another_version_or_kind_are_refused(what, tmp_path, older):
         read(path)
 
 
-def test_commands_refuse_results_of_another_version(results, tmp_path, monkeypatch, capsys):
+def test_commands_refuse_results_of_another_version(
+    results, tmp_path, unplotted, undoubted, monkeypatch, capsys
+):
     """A folder by its list, a history that was moved alone by its own format."""
     folder, alone = shutil.copytree(results, tmp_path / "out"), tmp_path / "alone.nc"
     groups = {name: group._asdict() for name, group in _files.read_file_list(folder).items()}
     run = af.History.read(folder / HISTORY_FILE)
-    for module in ("_netcdf", "_files"):
-        monkeypatch.setattr(f"archfem.{module}.FORMAT", 0)
-    _files.write_sealed_json(folder / "archfem.json", groups)
-    _files.write_sealed_json(tmp_path / "study.json", {"points": []})
-    run.save(alone)
-    monkeypatch.undo()
+    with monkeypatch.context() as older:
+        for module in ("_netcdf", "_files"):
+            older.setattr(f"archfem.{module}.FORMAT", 0)
+        _files.write_sealed_json(folder / "archfem.json", groups)
+        _files.write_sealed_json(tmp_path / "study.json", {"points": []})
+        run.save(alone)
     for command, name in (
         (["report", str(folder)], "archfem.json"),
         (["page", str(folder)], "archfem.json"),

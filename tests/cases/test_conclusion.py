@@ -1161,7 +1161,7 @@ def test_variations_that_miss_the_run_have_no_range_of_displacements(case):
         assert (bool(said), "largest displacements 1.2 mm to 4 mm" in listed) == (stated, stated)
 
 
-def test_a_study_of_another_structure_has_no_part_in_the_answer(case, tmp_path):
+def test_a_study_of_another_structure_has_no_part_in_the_answer(case, tmp_path, undrawn):
     """A block begins to move at the ratio of its sides; sites are of 0.2 g."""
     sides = {"own": "0.5", "a point": "0.4", "other": "0.4"}
     text = format_tables({**case.settings, "assessment": SPECTRUM, "limit": {"horizontal": 1.0}})

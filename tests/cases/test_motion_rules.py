@@ -23,7 +23,7 @@ def matched_motion(duration):
     return af.Case.of({"structure": structure, "suite": suite}).ground_suite().motions[0]
 
 
-def data_of(norm="EN 1998-1", pairs=3, duration=30.0, modes=MODES, factor=1.0, **suite):
+def data_of(norm="EN 1998-1", pairs=3, duration=10.0, modes=MODES, factor=1.0, **suite):
     """Return the data of a report of motions that are the target's plateau at its band."""
     made = {f"pair {k}": {"synthetic": {"seed": k, "duration": duration}} for k in range(pairs)}
     tables = {
@@ -46,7 +46,7 @@ def states(data):
 
 @pytest.mark.slow
 def test_rules_are_met_by_matched_motions_of_thirty_seconds():
-    data = data_of()
+    data = data_of(duration=30.0)
     assert [*states(data).values()] == ["met", "met", "not checked", "met", "met"]
     assert motion_rules.note_checks(data) == []
     (grid,) = motion_rules.tabulate_checks(data)
@@ -70,7 +70,7 @@ def test_the_periods_of_rocking_beyond_the_rule_are_compared():
 
 def test_a_short_stationary_part_is_a_note():
     """The envelope is constant from 15 to 50 % of the duration, which the samples show."""
-    data = data_of(duration=10.0)
+    data = data_of()
     assert states(data)["stationary part of artificial motions"] == "not met"
     (note,) = motion_rules.note_checks(data)
     assert note == (
@@ -102,7 +102,7 @@ def test_each_rule_can_fail(changes, rule, state):
 )
 def test_rules_are_judged_by_what_is_printed(share, state):
     """Six decimals of a file end below 0.2 × 1.2 g: a ratio printed as 1 meets a rule of 1."""
-    peak = matched_motion(30.0).pga / 9.80665
+    peak = matched_motion(10.0).pga / 9.80665
     checks = motion_rules.check_motions(data_of(factor=share * 0.24 / peak))
     (found,) = (check for check in checks if "period zero" in check.rule)
     assert (found.found, found.state) == ("1" if state == "met" else "0.999", state)

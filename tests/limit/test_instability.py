@@ -91,7 +91,7 @@ def test_cohesion_of_less_deep_joints_is_less():
 
 def test_the_geometric_factor_of_a_ring_is_that_of_its_thickness():
     """The two weigh a little otherwise, as the corners of a thinner ring are cut less."""
-    ring = af.circular_arch(radius=1.0, thickness=0.2, embrace=180.0, voussoirs=20)
+    ring = af.circular_arch(radius=1.0, thickness=0.2, embrace=180.0, voussoirs=10)
     least = af.minimum_thickness(af.masonry.find_ring(ring).with_thickness, tolerance=1e-4)
     assert af.limit.geometric_factor(ring) == pytest.approx(0.2 / least, rel=3e-3)
 
