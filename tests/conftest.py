@@ -10,7 +10,6 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import pytest
-from kernels import each_way  # noqa: F401  (a fixture)
 from verified import Table, verified  # noqa: F401  (a fixture)
 
 import archfem as af

@@ -1,6 +1,7 @@
 """The ring on rigid blocks, and a motion that makes it a mechanism."""
 
 import pytest
+from kernels import each_way  # noqa: F401  (a fixture)
 
 import archfem as af
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from kernels import each_way  # noqa: F401  (a fixture)
 
 import archfem as af
 

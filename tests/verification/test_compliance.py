@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from glued import glued
-from kernels import either
+from kernels import each_way, either  # noqa: F401  (a fixture)
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
