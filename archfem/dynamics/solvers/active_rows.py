@@ -59,8 +59,7 @@ def predict_active_rows(law, active, work):  # type: ignore
     for segment in law.segments:
         if marks[segment.near] or marks[segment.far]:
             near[segment.near] = near[segment.far] = True
-    for row in range(len(gap)):
-        marks[row] = False
+    marks[: len(gap)] = False
     _add_active(law, active, ahead, near, True)
     _add_slips_near_limit(law, near)
     _add_pressing(law, near)
@@ -437,8 +436,7 @@ def _rotate(column, step, norm, rotations):  # type: ignore
 def _combine(basis, count, active, right):  # type: ignore
     """Combine the vectors of the basis by back substitution in the triangle."""
     triangle, rotations = active.triangle, active.rotations
-    for k in range(len(right)):
-        right[k] = 0.0
+    right[:] = 0.0
     for step in range(count - 1, -1, -1):
         rotations[step, 2] /= triangle[step, step]
         for j in range(step):

@@ -1,17 +1,19 @@
 """The protocol of a solver of time steps, and the one compiled loop over steps.
 
 A solver's system is a NamedTuple. For its type `start_run`, `solve_step` and `evaluate_step` are
-overloaded (`numba.extending.overload`), and numba picks them when it compiles `advance`. The loop
-itself has no matrices and no joints, so that only the code of the solver at hand is compiled. It
-makes no arrays: a system contains its workspace.
+overloaded by `overload_steps`, and numba picks them when it compiles `advance`. The loop itself has
+no matrices and no joints, so that only the code of the solver at hand is compiled. It makes no
+arrays: a system contains its workspace.
 """
 
+from collections.abc import Callable
 from copy import deepcopy
 from typing import Any, ClassVar, Protocol, Self
 
+from numba.extending import overload
 from numpy.typing import NDArray
 
-from archfem._numba import entry
+from archfem._numba import INNER_OPTIONS, entry
 from archfem.dynamics.solvers.equation import Equation
 
 # Iterations over the joints in a step before it is given up
@@ -89,6 +91,21 @@ def advance(series, memories, results, ground, system):  # type: ignore
     return len(resultants)
 
 
-def is_system(system: Any, kind: type) -> bool:
-    """Return whether numba types a system as a kind of NamedTuple."""
-    return getattr(system, "instance_class", None) is kind
+def is_kind(kind: type) -> Callable[[Any], bool]:
+    """Return the function that says whether numba types a system as a kind of NamedTuple."""
+    return lambda system: getattr(system, "instance_class", None) is kind
+
+
+def overload_for(fits: Callable[[Any], bool], function: Any, kernel: Any) -> None:
+    """Let a function be a kernel for systems whose types in numba fit."""
+
+    def choose(system: Any, *_: Any) -> Any:
+        return kernel if fits(system) else None
+
+    overload(function, jit_options=INNER_OPTIONS, strict=False)(choose)
+
+
+def overload_steps(fits: Callable[[Any], bool], start: Any, solve: Any, evaluate: Any) -> None:
+    """Overload `start_run`, `solve_step` and `evaluate_step` for systems that fit."""
+    for function, kernel in ((start_run, start), (solve_step, solve), (evaluate_step, evaluate)):
+        overload_for(fits, function, kernel)

@@ -12,9 +12,8 @@ is checked against the gaps of the whole structure.
 from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
-from numba.extending import overload
 
-from archfem._numba import INNER_OPTIONS, kernel
+from archfem._numba import kernel
 from archfem.dynamics.solvers.active_compliance import ActiveRows, begin_problem, clear_problem
 from archfem.dynamics.solvers.active_rows import (
     check_active_rows,
@@ -22,7 +21,7 @@ from archfem.dynamics.solvers.active_rows import (
     solve_active_rows,
     subtract_released,
 )
-from archfem.dynamics.solvers.base import MAX_ITERATIONS, StepSolver, is_system
+from archfem.dynamics.solvers.base import MAX_ITERATIONS, StepSolver, is_kind, overload_for
 from archfem.dynamics.solvers.equation import Equation
 from archfem.dynamics.solvers.joint_law import largest_force
 from archfem.dynamics.solvers.linear_step import (
@@ -105,11 +104,6 @@ class ComplianceSolver(StepSolver):
         return {id(old): ActiveRows.of(len(old.full), segments, len(old.derivatives[1]))}
 
 
-@overload(solve_contact, jit_options=INNER_OPTIONS)
-def _solve_contact(system):  # type: ignore
-    return _solve_by_compliance if is_system(system, ComplianceSystem) else None
-
-
 def _solve_by_compliance(system):  # type: ignore
     """Solve a step, adding rows that turn out to be active; returns iterations, or -1."""
     linear, law, active, work = system.linear, system.linear.law, system.active, system.work
@@ -129,8 +123,7 @@ def _solve_by_compliance(system):  # type: ignore
                 return -1
             iterations += more - 1
             # right side with the released forces, whose forward substitution is added
-            for k in range(len(vector)):
-                vector[k] = 0.0
+            vector[:] = 0.0
             add_rows(linear.gaps, work.force, vector)
             solve_forward(system.factor, vector)
             for k in range(len(vector)):
@@ -146,6 +139,9 @@ def _solve_by_compliance(system):  # type: ignore
             return iterations
         iterations += 1
     return -1
+
+
+overload_for(is_kind(ComplianceSystem), solve_contact, _solve_by_compliance)
 
 
 @kernel
@@ -197,8 +193,7 @@ def _fill_compliance(system, row):  # type: ignore
     active.filled[row] = True
     # displacements by forces of one at the row, then the gaps that they cause at the others
     vector = system.unit
-    for k in range(len(vector)):
-        vector[k] = 0.0
+    vector[:] = 0.0
     for entry in range(indptr[row], indptr[row + 1]):
         vector[indices[entry]] += data[entry]
     solve_forward(system.factor, vector)
@@ -214,8 +209,7 @@ def _fill_compliance(system, row):  # type: ignore
 def _mark_branches(system, rows):  # type: ignore
     """Mark the groups of the factor on which the gaps of some rows depend, with all ancestors."""
     (indptr, indices, _), parent, marked = system.linear.gaps, system.factor.parent, system.marked
-    for group in range(len(marked)):
-        marked[group] = False
+    marked[:] = False
     for row in rows:
         for entry in range(indptr[row], indptr[row + 1]):
             group = system.group[indices[entry]]

@@ -383,8 +383,7 @@ def evaluate_slips(law, gap, rows):  # type: ignore
 def collect_released(law, selection, released):  # type: ignore
     """Sum up released forces of selected rows: their places, their segments, their slip rows."""
     (place, segments, slips), openings = selection, law.openings
-    for k in range(len(released)):
-        released[k] = 0.0
+    released[:] = 0.0
     for number in segments:
         segment, state = law.segments[number], law.segment_states[number]
         released[place[segment.near]] += state.near
@@ -452,8 +451,7 @@ def _enter(entries, number, where, value):  # type: ignore
 def open_forces(law, gap, released):  # type: ignore
     """Evaluate the forces that joints release at an instant, of all opening rows; their energy."""
     points, facets, energy = law.points, law.facets, 0.0
-    for k in range(len(released)):
-        released[k] = 0.0
+    released[:] = 0.0
     for segment in law.segments:
         opening, first = (gap[segment.near], gap[segment.far]), points[segment.begin]
         if not releases(first, opening):

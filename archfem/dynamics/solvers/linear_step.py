@@ -14,13 +14,12 @@ import itertools
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba.extending import overload
 from numpy.typing import NDArray
 from scipy import sparse
 
-from archfem._numba import INNER_OPTIONS, inlined_kernel, kernel, summing_kernel
+from archfem._numba import inlined_kernel, kernel, summing_kernel
 from archfem._typing import Array
-from archfem.dynamics.solvers.base import evaluate_step, solve_step, start_run
+from archfem.dynamics.solvers.base import overload_steps
 from archfem.dynamics.solvers.equation import Equation
 from archfem.dynamics.solvers.joint_law import (
     JointLaw,
@@ -158,21 +157,6 @@ def solve_contact(system: Any) -> Any:
 def _is_linear(system: Any) -> bool:
     """Return whether numba types a system as one with a field `linear`."""
     return "linear" in getattr(system, "fields", ())
-
-
-@overload(start_run, jit_options=INNER_OPTIONS)
-def _start_run(system, state, memory):  # type: ignore
-    return _start_linear_run if _is_linear(system) else None
-
-
-@overload(solve_step, jit_options=INNER_OPTIONS)
-def _solve_step(system, step, states, ground):  # type: ignore
-    return _solve_linear_step if _is_linear(system) else None
-
-
-@overload(evaluate_step, jit_options=INNER_OPTIONS)
-def _evaluate_step(system, step, states, ground, results, memory):  # type: ignore
-    return _evaluate_linear_step if _is_linear(system) else None
 
 
 def _start_linear_run(system, state, memory):  # type: ignore
@@ -441,3 +425,6 @@ def subtract_derivatives(system, count):  # type: ignore
                 place += width
         for m in range(size):
             entries[places[begin + m]] -= dense[m]
+
+
+overload_steps(_is_linear, _start_linear_run, _solve_linear_step, _evaluate_linear_step)

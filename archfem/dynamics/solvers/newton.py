@@ -15,19 +15,12 @@ solve for Δq. With f̄ the mean force of the joints over the step (`joints.larg
 from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
-from numba.extending import overload
 from scipy import sparse
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
-from archfem._numba import INNER_OPTIONS, kernel
+from archfem._numba import kernel
 from archfem._typing import Array
-from archfem.dynamics.solvers.base import (
-    StepSolver,
-    evaluate_step,
-    is_system,
-    solve_step,
-    start_run,
-)
+from archfem.dynamics.solvers.base import StepSolver, is_kind, overload_for, overload_steps
 from archfem.dynamics.solvers.equation import Equation
 from archfem.dynamics.solvers.joint_law import (
     add_derivatives,
@@ -353,11 +346,6 @@ _solve_small = newton_driver(
 )
 
 
-@overload(solve_contact, jit_options=INNER_OPTIONS)
-def _solve_contact(system):  # type: ignore
-    return _solve_small_step if is_system(system, SmallSystem) else None
-
-
 def _solve_small_step(system):  # type: ignore
     """Solve a step from where the velocity leads; a second try starts where the blocks are."""
     # an impact between stiff joints leads far into the other block, or away from it
@@ -385,6 +373,9 @@ def _solve_small_step(system):  # type: ignore
                 work.contact[k] = system.contact[0, k]
             return total
     return -1
+
+
+overload_for(is_kind(SmallSystem), solve_contact, _solve_small_step)
 
 
 # ---- large displacements
@@ -425,21 +416,6 @@ class LargeStepWorkspace(NamedTuple):
     constant: Array  # forces that do not depend on the end of the step
 
 
-@overload(start_run, jit_options=INNER_OPTIONS)
-def _start_run(system, state, memory):  # type: ignore
-    return _start_large_run if is_system(system, LargeSystem) else None
-
-
-@overload(solve_step, jit_options=INNER_OPTIONS)
-def _solve_step(system, step, states, ground):  # type: ignore
-    return _solve_large_step if is_system(system, LargeSystem) else None
-
-
-@overload(evaluate_step, jit_options=INNER_OPTIONS)
-def _evaluate_step(system, step, states, ground, results, memory):  # type: ignore
-    return _evaluate_large_step if is_system(system, LargeSystem) else None
-
-
 def _start_large_run(system, state, memory):  # type: ignore
     """Copy memory and state, and discard the factor of an earlier run."""
     system.factored[0] = False
@@ -469,8 +445,7 @@ def _large_residual(system, work, iteration):  # type: ignore
     for k in range(len(move)):
         work.after[k] = work.before[k] + move[k]
     if iteration != 1:  # only the first correction is compared with the guess
-        for point in range(len(forces.slip_direction)):
-            forces.slip_direction[point] = 0.0
+        forces.slip_direction[:] = 0.0
     compute_step_forces(system.joints, work.before, work.after, system.step[1], system.slip, forces)
     # loads less inertia, damping and blocks, then less the mean forces of the joints
     for k in range(len(residual)):
@@ -513,8 +488,7 @@ def _renew_tangent(system):  # type: ignore
     whole = not system.factored[0] or system.tolerances.reduction == 0.0
     for k in range(len(entries) if whole else 0):
         entries[k] = base[k]
-    for group in range(len(changed)):
-        changed[group] = False
+    changed[:] = False
     for joint in range(len(sides.size)):
         if not whole:
             if not _has_changed(own.law[joint], new.law[joint]):
@@ -599,3 +573,6 @@ def _evaluate_energies(system, work, new, ground, energy):  # type: ignore
         energy[1] += 0.5 * new[0, k] * work.pulled[k]
         energy[3] += lag * move[k] * more + move[k] * row_times(system.viscous, k, move) / dt
     energy[1] += joint_energy(system.joints, new[0], system.slip)
+
+
+overload_steps(is_kind(LargeSystem), _start_large_run, _solve_large_step, _evaluate_large_step)

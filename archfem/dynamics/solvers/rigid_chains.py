@@ -8,11 +8,10 @@ that of `newton`.
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba.extending import overload
 
-from archfem._numba import INNER_OPTIONS, inlined_kernel, kernel, summing_kernel
+from archfem._numba import inlined_kernel, kernel, summing_kernel
 from archfem._typing import Array
-from archfem.dynamics.solvers.base import evaluate_step, is_system, solve_step, start_run
+from archfem.dynamics.solvers.base import is_kind, overload_steps
 from archfem.dynamics.solvers.equation import Equation
 from archfem.dynamics.solvers.semismooth_newton import (
     Correction,
@@ -382,21 +381,6 @@ def _by_stone(row, side, sign, dx, dy):  # type: ignore
 # ---- steps
 
 
-@overload(start_run, jit_options=INNER_OPTIONS)
-def _start_run(system, state, memory):  # type: ignore
-    return _start_chain_run if is_system(system, ChainSystem) else None
-
-
-@overload(solve_step, jit_options=INNER_OPTIONS)
-def _solve_step(system, step, states, ground):  # type: ignore
-    return _solve_chain_step if is_system(system, ChainSystem) else None
-
-
-@overload(evaluate_step, jit_options=INNER_OPTIONS)
-def _evaluate_step(system, step, states, ground, results, memory):  # type: ignore
-    return _evaluate_chain_step if is_system(system, ChainSystem) else None
-
-
 def _start_chain_run(system, state, memory):  # type: ignore
     """Copy the memory, and forget the steps of an earlier run."""
     system.known[0] = 0
@@ -554,3 +538,6 @@ def _joint_energies(system, at, lag):  # type: ignore
         stretched = slip - load(system.end_slip, point, at)
         elastic += 0.5 * load(law.spring, point, at) * stretched * stretched
     return loss, elastic
+
+
+overload_steps(is_kind(ChainSystem), _start_chain_run, _solve_chain_step, _evaluate_chain_step)

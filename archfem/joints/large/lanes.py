@@ -24,9 +24,8 @@ WIDTH = 8
 class VectorType(types.Type):
     """Type of vectors of numbers or of conditions."""
 
-    def unify(self, typingctx: Any, other: types.Type) -> types.Type | None:
+    def unify(self, _typingctx: Any, other: types.Type) -> types.Type | None:
         """Return this type for a variable that is a number elsewhere."""
-        del typingctx
         return self if self is LANES and isinstance(other, types.Float | types.Integer) else None
 
 
@@ -53,9 +52,8 @@ def _splat(builder: Any, value: Any) -> Any:
 
 @lower_cast(types.Float, LANES)
 @lower_cast(types.Integer, LANES)
-def _number_to_lanes(context: Any, builder: Any, source: Any, target: Any, value: Any) -> Any:
+def _number_to_lanes(context: Any, builder: Any, source: Any, _target: Any, value: Any) -> Any:
     """Lower the conversion of a number."""
-    del target
     return _splat(builder, context.cast(builder, value, source, types.float64))
 
 
@@ -68,8 +66,7 @@ def _declare(function: Any, argument: VectorType, result: VectorType, lower: Any
         is_ours = argument in kinds and fits
         return signature(result, *[argument] * len(kinds)) if is_ours else None
 
-    def implement(context: Any, builder: Any, sig: Any, values: Any) -> Any:
-        del context, sig
+    def implement(_context: Any, builder: Any, _sig: Any, values: Any) -> Any:
         return lower(builder, *values)
 
     _register(function, find_signature)
@@ -143,39 +140,34 @@ _declare(abs, LANES, LANES, _size)
 
 
 @_lane_function(LANES, LANES, LANES, takes_numbers=True)
-def least(context: Any, builder: Any, kinds: Any, a: Any, b: Any) -> Any:
+def least(_context: Any, builder: Any, _kinds: Any, a: Any, b: Any) -> Any:
     """Return the smaller of two numbers, in each lane."""
-    del context, kinds
     return builder.select(builder.fcmp_ordered("<", b, a), b, a)
 
 
 @_lane_function(LANES, LANES, LANES, takes_numbers=True)
-def greatest(context: Any, builder: Any, kinds: Any, a: Any, b: Any) -> Any:
+def greatest(_context: Any, builder: Any, _kinds: Any, a: Any, b: Any) -> Any:
     """Return the larger of two numbers, in each lane."""
-    del context, kinds
     return builder.select(builder.fcmp_ordered(">", b, a), b, a)
 
 
 @_lane_function(LANES, MASK, LANES, LANES, takes_numbers=True)
-def select(context: Any, builder: Any, kinds: Any, mask: Any, a: Any, b: Any) -> Any:
+def select(_context: Any, builder: Any, _kinds: Any, mask: Any, a: Any, b: Any) -> Any:
     """Return the first number where a condition holds, else the second, in each lane."""
-    del context, kinds
     return builder.select(mask, a, b)
 
 
 @_lane_function(LANES, LANES, takes_numbers=True)
-def logarithm(context: Any, builder: Any, kinds: Any, a: Any) -> Any:
+def logarithm(_context: Any, builder: Any, kinds: Any, a: Any) -> Any:
     """Return the natural logarithm, in each lane."""
-    del context
     kind, suffix = ir.FunctionType(a.type, [a.type]), f"v{WIDTH}f64" if kinds[0] is LANES else "f64"
     function = cgutils.get_or_insert_function(builder.module, kind, f"llvm.log.{suffix}")
     return builder.call(function, [a])
 
 
 @_lane_function(types.boolean, MASK, takes_numbers=True)
-def any_lane(context: Any, builder: Any, kinds: Any, mask: Any) -> Any:
+def any_lane(_context: Any, builder: Any, kinds: Any, mask: Any) -> Any:
     """Return whether a condition holds in any lane."""
-    del context
     if kinds[0] is types.boolean:
         return mask
     bits = builder.bitcast(mask, ir.IntType(WIDTH))
@@ -183,23 +175,20 @@ def any_lane(context: Any, builder: Any, kinds: Any, mask: Any) -> Any:
 
 
 @_lane_function(types.float64, LANES, types.intp)
-def lane(context: Any, builder: Any, kinds: Any, values: Any, number: Any) -> Any:
+def lane(_context: Any, builder: Any, _kinds: Any, values: Any, number: Any) -> Any:
     """Return the number in one lane."""
-    del context, kinds
     return builder.extract_element(values, number)
 
 
 @_lane_function(LANES, LANES, types.intp, types.float64)
-def with_lane(context: Any, builder: Any, kinds: Any, values: Any, number: Any, value: Any) -> Any:
+def with_lane(_context: Any, builder: Any, _kinds: Any, values: Any, place: Any, value: Any) -> Any:
     """Return the numbers with another one in one lane."""
-    del context, kinds
-    return builder.insert_element(values, value, number)
+    return builder.insert_element(values, value, place)
 
 
 @_lane_function(LANES, LANES)
-def spread(context: Any, builder: Any, kinds: Any, value: Any) -> Any:
+def spread(_context: Any, _builder: Any, _kinds: Any, value: Any) -> Any:
     """Return a number in all lanes."""
-    del context, builder, kinds
     return value  # converted by then
 
 
