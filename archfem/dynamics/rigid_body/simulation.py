@@ -12,6 +12,7 @@ import numpy as np
 from archfem._display import ProgressReport
 from archfem._typing import Array
 from archfem._validation import check_number, check_type, validate_methods
+from archfem.dynamics.rigid_body import time_stepping
 from archfem.dynamics.rigid_body.bodies import (
     Bodies,
     FallEnergy,
@@ -25,16 +26,6 @@ from archfem.dynamics.rigid_body.contact_detection import (
     allocate_contacts,
     allocate_pieces,
     allocate_stored_impulses,
-)
-from archfem.dynamics.rigid_body.time_stepping import (
-    MAX_ENERGY_GAIN,
-    MAX_SWEEPS,
-    SETTLED,
-    StepParameters,
-    StepWorkspace,
-    SweepResult,
-    advance_steps,
-    kinetic_energy,
 )
 from archfem.errors import DidNotConverge, Interrupted, InvalidInput, logger
 from archfem.masonry.structure import Structure
@@ -158,7 +149,7 @@ class RigidBlockSimulation:
                 raise Interrupted(frames or finer) from error
             change = self._step_change(frames, finer) if frames else float("nan")
             frames = finer
-            balanced = frames[-1].energy.gained_share <= MAX_ENERGY_GAIN
+            balanced = frames[-1].energy.gained_share <= time_stepping.MAX_ENERGY_GAIN
             if change <= MAX_STEP_CHANGE and balanced:
                 break
         if not frames:
@@ -249,22 +240,22 @@ class RigidBlockSimulation:
 
 def prepare_steps(
     simulation: RigidBlockSimulation, dt: float
-) -> tuple[StepParameters, StepWorkspace]:
+) -> tuple[time_stepping.StepParameters, time_stepping.StepWorkspace]:
     """Return parameters and workspace of the time steps of a length [s]."""
     structure, bodies = simulation.structure, simulation.bodies
     weight_speed = structure.gravity * dt
     # a rocking ratio follows from velocities before the impact, which foreseen contacts change
     has_ratio = bool(bodies.rocking.any())
-    parameters = StepParameters(
+    parameters = time_stepping.StepParameters(
         *(dt, structure.gravity, 0.0 if has_ratio else 0.5 * dt, simulation.restitution),
         # impacts below 0.05 m/s, the speed of a fall by 0.13 mm, do not bounce
         *(0.05, 2.0 * weight_speed),
-        MAX_SWEEPS * -(-len(structure.free) // 100),
-        SETTLED * weight_speed,
+        time_stepping.MAX_SWEEPS * -(-len(structure.free) // 100),
+        time_stepping.SETTLED * weight_speed,
         ENERGY_GAIN_NOISE * structure.weight * structure.size,
     )
     contacts, count = allocate_contacts(len(bodies.owner)), len(bodies.mass)
-    workspace = StepWorkspace(
+    workspace = time_stepping.StepWorkspace(
         allocate_pieces(bodies),
         contacts,
         allocate_stored_impulses(contacts),
@@ -272,7 +263,7 @@ def prepare_steps(
         np.empty((len(contacts.key), 17)),
         np.zeros((count + 1, 3)),
         *(
-            SweepResult(np.zeros((count + 1, 3)), np.zeros((len(contacts.key), 3)))
+            time_stepping.SweepResult(np.zeros((count + 1, 3)), np.zeros((len(contacts.key), 3)))
             for _ in range(2)
         ),
     )
@@ -293,7 +284,7 @@ class _Run:
         self._is_first = True
         # fields of FallEnergy, then the largest loss and the largest energy exchanged so far, and
         # what is left of the strain energy [J]
-        kinetic = kinetic_energy(bodies, self._v)
+        kinetic = time_stepping.kinetic_energy(bodies, self._v)
         self._energy = np.array([kinetic, *[0.0] * 5, kinetic, start.strain_energy])
         # fields of Settling
         self._settling = np.zeros(4)
@@ -322,10 +313,10 @@ class _Run:
             self._is_first, ground = False, ground[1:]
         self._advance(ground, self._parameters)
 
-    def _advance(self, ground: Array, parameters: StepParameters) -> None:
+    def _advance(self, ground: Array, parameters: time_stepping.StepParameters) -> None:
         """Advance by steps with parameters."""
         ground = np.ascontiguousarray(ground)
-        overlap, is_crowded = advance_steps(
+        overlap, is_crowded = time_stepping.advance_steps(
             self._simulation.bodies,
             parameters,
             self._workspace,

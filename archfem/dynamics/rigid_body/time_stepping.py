@@ -26,21 +26,7 @@ import numpy as np
 
 from archfem._numba import allocating_entry, entry, kernel
 from archfem._typing import Array
-from archfem.dynamics.rigid_body.contact_detection import (
-    Contacts,
-    PlacedPieces,
-    StoredImpulses,
-    apply_initial_impulses,
-    find_contacts,
-    has_partner,
-    measure_residual,
-    place_pieces,
-    prepare_rows,
-    relative_speed,
-    restore_impulses,
-    solve_face,
-    store_impulses,
-)
+from archfem.dynamics.rigid_body import contact_detection
 
 # Residual of settled impulses: speed by which a contact violates its condition, relative to that
 # which a body gains by its weight in a step [-]
@@ -79,9 +65,9 @@ class SweepResult(NamedTuple):
 class StepWorkspace(NamedTuple):
     """Workspace of the time steps."""
 
-    world: PlacedPieces
-    contacts: Contacts
-    stored: StoredImpulses
+    world: contact_detection.PlacedPieces
+    contacts: contact_detection.Contacts
+    stored: contact_detection.StoredImpulses
     middle: Array  # poses at the middle of the step (b, 3)
     # of each contact: cross products of the arms with the normal, first and second body, and with
     # the tangent; 1/(H M⁻¹ Hᵀ) of normal and tangent; target u_N and u_T; μ; coupling of u_N with
@@ -192,7 +178,7 @@ def take_step(bodies, parameters, workspace, state):  # type: ignore
     if rebounds and work > 0.0:
         more, residual = _limit_rebounds(bodies, parameters, workspace, touching, (v, ground))
         sweeps += more
-    store_impulses(bodies, middle, contacts, touching, workspace.stored)
+    contact_detection.store_impulses(bodies, middle, contacts, touching, workspace.stored)
     # trapezoidal rule for the poses
     q += 0.5 * parameters.dt * (v + speeds[: len(q)])
     v[:] = speeds[: len(q)]
@@ -207,23 +193,23 @@ def _begin_step(bodies, parameters, workspace, state):  # type: ignore
     # contacts at the middle of the step, with the impulses of the step before
     half, count = 0.5 * parameters.dt, len(q)
     middle[:] = q + half * v
-    place_pieces(bodies, middle, workspace.world)
+    contact_detection.place_pieces(bodies, middle, workspace.world)
     # contacts and targets follow from the velocities before the step, hence first
     speeds[:count] = v
     speeds[count] = 0.0
     motion = middle, speeds, parameters.foresight
-    touching = find_contacts(bodies, workspace.world, contacts, motion)
+    touching = contact_detection.find_contacts(bodies, workspace.world, contacts, motion)
     if touching < 0:
         return -1, False
-    restore_impulses(bodies, middle, contacts, touching, workspace.stored)
-    prepare_rows(bodies, parameters, workspace, touching)
+    contact_detection.restore_impulses(bodies, middle, contacts, touching, workspace.stored)
+    contact_detection.prepare_rows(bodies, parameters, workspace, touching)
     rebounds = _add_rebounds(bodies, parameters, workspace, touching)
     # free velocities: inertia forces of the ground motion, and weight
     for b in range(count):
         if bodies.inverse_mass[b, 0] > 0.0:
             speeds[b, 0] -= parameters.dt * ground[0]
             speeds[b, 1] -= parameters.dt * (parameters.gravity + ground[1])
-    apply_initial_impulses(bodies, workspace, touching)
+    contact_detection.apply_initial_impulses(bodies, workspace, touching)
     return touching, rebounds
 
 
@@ -267,7 +253,7 @@ def _separate(bodies, parameters, workspace, touching):  # type: ignore
     for k in range(touching):
         a, b = contacts.bodies[k]
         nx, ny = contacts.normal[k]
-        speed = relative_speed(speeds, (a, b), (nx, ny), (rows[k, 0], rows[k, 1]))
+        speed = contact_detection.relative_speed(speeds, (a, b), (nx, ny), (rows[k, 0], rows[k, 1]))
         excess = -bodies.slop - (contacts.gap[k] + half * speed)
         deepest = max(deepest, excess)
         # the displacement of the contact, and no friction
@@ -296,17 +282,19 @@ def _add_rebounds(bodies, parameters, workspace, touching):  # type: ignore
     for k in range(touching):
         a, b = contacts.bodies[k]
         normal = contacts.normal[k, 0], contacts.normal[k, 1]
-        speed = relative_speed(speeds, (a, b), normal, (rows[k, 0], rows[k, 1]))
+        speed = contact_detection.relative_speed(speeds, (a, b), normal, (rows[k, 0], rows[k, 1]))
         ratio = bodies.rocking[a, b]
-        is_end = k > 0 and has_partner(contacts, k - 1, touching)
-        if ratio == 0.0 or not (is_end or has_partner(contacts, k, touching)):
+        is_end = k > 0 and contact_detection.has_partner(contacts, k - 1, touching)
+        if ratio == 0.0 or not (is_end or contact_detection.has_partner(contacts, k, touching)):
             # a point still apart rebounds where it would cross by the end of the step
             closing = 2.0 * contacts.gap[k] / parameters.dt
             closing = closing if contacts.gap[k] > bodies.contact_gap else 0.0
             if parameters.restitution > 0.0 and speed < -max(closing, parameters.min_impact_speed):
                 rows[k, 10] = closing - parameters.restitution * speed
         elif not is_end:
-            other = relative_speed(speeds, (a, b), normal, (rows[k + 1, 0], rows[k + 1, 1]))
+            other = contact_detection.relative_speed(
+                speeds, (a, b), normal, (rows[k + 1, 0], rows[k + 1, 1])
+            )
             # the speed common to both ends rebounds by Newton's law
             if max(speed, other) < -parameters.min_impact_speed:
                 rows[k, 10] = rows[k + 1, 10] = -parameters.restitution * max(speed, other)
@@ -349,7 +337,7 @@ def _settle_impulses(bodies, workspace, touching, tolerance, max_sweeps):  # typ
     for sweep in range(1, max_sweeps + 1):
         residual = _sweep_contacts(bodies, workspace, touching)
         if residual <= tolerance:
-            residual = measure_residual(bodies, workspace, touching)
+            residual = contact_detection.measure_residual(bodies, workspace, touching)
             if residual <= tolerance:
                 return sweep, residual
         # Momentum that diverges is dropped. Residuals of faces that open or slide rise for a few
@@ -361,7 +349,7 @@ def _settle_impulses(bodies, workspace, touching, tolerance, max_sweeps):  # typ
         _add_momentum(workspace, touching, (before - 1.0) / weight)
     speeds[:] = last.speeds
     contacts.impulse[:touching] = last.impulse[:touching]
-    return max_sweeps, measure_residual(bodies, workspace, touching)
+    return max_sweeps, contact_detection.measure_residual(bodies, workspace, touching)
 
 
 @kernel
@@ -409,7 +397,7 @@ def _sweep_contacts(bodies, workspace, touching):  # type: ignore
             new2 = max(old2 - rows[k + 1, 4] * gap2, 0.0)
             worst = max(worst, abs(new2 - old2) * rows[k + 1, 11])
             inverse = rows[k, 11], rows[k + 1, 11], rows[k, 9], rows[k, 13]
-            new, new2 = solve_face(inverse, (old, old2), (gap, gap2))
+            new, new2 = contact_detection.solve_face(inverse, (old, old2), (gap, gap2))
             impulse[k + 1, 0] = new2
             normal = new2 - old2
             wa -= ia * rows[k + 1, 0] * normal

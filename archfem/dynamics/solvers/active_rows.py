@@ -18,6 +18,7 @@ openings press on those. They are predicted before the step, and checked at the 
 import numpy as np
 
 from archfem._numba import kernel, summing_kernel
+from archfem.dynamics.solvers import joint_law
 from archfem.dynamics.solvers.active_compliance import (
     MAX_KRYLOV_VECTORS,
     add_columns,
@@ -26,14 +27,6 @@ from archfem.dynamics.solvers.active_compliance import (
     row_room,
     rows_of,
     update_columns,
-)
-from archfem.dynamics.solvers.joint_law import (
-    collect_derivatives,
-    collect_released,
-    evaluate_openings,
-    evaluate_slips,
-    largest_force,
-    predict_gaps,
 )
 from archfem.joints.large.point_law import shear_limit
 
@@ -47,7 +40,7 @@ def predict_active_rows(law, active, work):  # type: ignore
     """Mark in `near` the rows that are active, or soon will be at the rates of the gaps."""
     near, marks, openings = active.near, active.marks, law.openings
     gap, before, force, ahead = work.gap, work.gap_before, work.force, work.spare
-    predict_gaps(law, gap, before)
+    joint_law.predict_gaps(law, gap, before)
     for row in range(len(gap)):
         near[row] = force[row] != 0.0
         # rows that were active, or open within the next two steps
@@ -100,7 +93,7 @@ def check_active_rows(law, active, gap, near):  # type: ignore
         if near[row]:
             error = max(error, law.stiffness[row] * abs(gap[row] - guess[row]))
         guess[row] = gap[row]
-    everywhere = error > 1e-11 * largest_force(law, gap)
+    everywhere = error > 1e-11 * joint_law.largest_force(law, gap)
     return _add_active(law, active, gap, near, everywhere) and not everywhere
 
 
@@ -121,8 +114,8 @@ def _add_active(law, active, gap, near, everywhere):  # type: ignore
         if everywhere or not near[row]:
             slips[slip_count] = row
             slip_count += 1
-    evaluate_openings(law, gap, segments[:count])
-    evaluate_slips(law, gap, slips[:slip_count])
+    joint_law.evaluate_openings(law, gap, segments[:count])
+    joint_law.evaluate_slips(law, gap, slips[:slip_count])
     for number in segments[:count]:
         segment, state = law.segments[number], law.segment_states[number]
         if state.near != 0.0 or state.far != 0.0:
@@ -193,7 +186,7 @@ def _iterate(law, active, selection, tolerance, full_steps):  # type: ignore
     size, error, (places, values) = active.sizes[0], np.inf, active.derivatives
     force, released, change, gap = active.force, active.released, active.change, active.gap
     _evaluate(law, selection, released[:size])
-    count = collect_derivatives(law, selection, active.derivatives)
+    count = joint_law.collect_derivatives(law, selection, active.derivatives)
     update_columns(active, force, released, count)
     for k in range(size):
         force[k] = released[k]
@@ -212,7 +205,7 @@ def _iterate(law, active, selection, tolerance, full_steps):  # type: ignore
             return -1
         add_columns(active, released, 0)
         if iteration == 1 or error**2 > last * tolerance:
-            count = collect_derivatives(law, selection, active.derivatives)
+            count = joint_law.collect_derivatives(law, selection, active.derivatives)
             add_columns(active, released, count)
             prepare_equations(active, count)
         for k in range(size):
@@ -255,9 +248,9 @@ def _take_correction(law, active, selection, search):  # type: ignore
 @kernel
 def _evaluate(law, selection, released):  # type: ignore
     """Evaluate λ of the rows at the guess of their gaps."""
-    evaluate_openings(law, law.guess, selection[1])
-    evaluate_slips(law, law.guess, selection[2])
-    collect_released(law, selection, released)
+    joint_law.evaluate_openings(law, law.guess, selection[1])
+    joint_law.evaluate_slips(law, law.guess, selection[2])
+    joint_law.collect_released(law, selection, released)
 
 
 @kernel

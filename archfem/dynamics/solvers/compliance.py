@@ -14,24 +14,11 @@ from typing import Any, ClassVar, NamedTuple, Self
 import numpy as np
 
 from archfem._numba import kernel
+from archfem.dynamics.solvers import active_rows, linear_step
 from archfem.dynamics.solvers.active_compliance import ActiveRows, begin_problem, clear_problem
-from archfem.dynamics.solvers.active_rows import (
-    check_active_rows,
-    predict_active_rows,
-    solve_active_rows,
-    subtract_released,
-)
 from archfem.dynamics.solvers.base import MAX_ITERATIONS, StepSolver, is_kind, overload_for
 from archfem.dynamics.solvers.equation import Equation
 from archfem.dynamics.solvers.joint_law import largest_force
-from archfem.dynamics.solvers.linear_step import (
-    LinearStepWorkspace,
-    LinearSystem,
-    constant_parts,
-    linear_system,
-    linear_workspace,
-    solve_contact,
-)
 from archfem.dynamics.solvers.sparse_products import (
     add_rows,
     multiply,
@@ -50,8 +37,8 @@ from archfem.dynamics.solvers.supernodal_lu import (
 class ComplianceSystem(NamedTuple):
     """A structure's matrices in the order of their factor."""
 
-    linear: LinearSystem  # its matrices by rows
-    work: LinearStepWorkspace
+    linear: linear_step.LinearSystem  # its matrices by rows
+    work: linear_step.LinearStepWorkspace
     factor: SymmetricFactor  # of K + μ M + ν R
     group: Any  # of the factor to which each coordinate belongs (n,)
     marked: Any  # groups of the factor in which a solve is wanted (groups,)
@@ -79,12 +66,12 @@ class ComplianceSolver(StepSolver):
 
     def assemble(self, dt: float) -> ComplianceSystem:
         """Return the data of steps of one length [s]."""
-        linear, pairs, effective = linear_system(self._equation, self.order, dt)
+        linear, pairs, effective = linear_step.linear_system(self._equation, self.order, dt)
         factor = symmetric_factor(effective, self._elimination)
         rows = len(linear.law.offset)
         return ComplianceSystem(
             linear,
-            linear_workspace(linear),
+            linear_step.linear_workspace(linear),
             factor,
             self._elimination.group_of,
             np.zeros(len(factor.parent), bool),
@@ -96,7 +83,7 @@ class ComplianceSolver(StepSolver):
     def constants(self, system: ComplianceSystem) -> tuple[Any, ...]:
         """Return the parts of the data that no step changes."""
         factor = system.factor
-        return (*constant_parts(system.linear), *factor[:-1], system.group)
+        return (*linear_step.constant_parts(system.linear), *factor[:-1], system.group)
 
     def empty_parts(self, system: ComplianceSystem) -> dict[int, Any]:
         """Return an empty F: untouched pages cost nothing."""
@@ -108,7 +95,7 @@ def _solve_by_compliance(system):  # type: ignore
     """Solve a step, adding rows that turn out to be active; returns iterations, or -1."""
     linear, law, active, work = system.linear, system.linear.law, system.active, system.work
     vector, half, gap = work.contact, work.product, work.gap
-    predict_active_rows(law, active, work)
+    active_rows.predict_active_rows(law, active, work)
     tolerance, iterations = 1e-12 * largest_force(law, gap), 1
     # forward substitution of the right side serves all rounds
     _copy(work.right_side, half)
@@ -135,13 +122,13 @@ def _solve_by_compliance(system):  # type: ignore
         for row in range(len(gap)):
             gap[row] += law.offset[row]
         _copy(gap, work.gap_end)
-        if check_active_rows(law, active, gap, active.near):
+        if active_rows.check_active_rows(law, active, gap, active.near):
             return iterations
         iterations += 1
     return -1
 
 
-overload_for(is_kind(ComplianceSystem), solve_contact, _solve_by_compliance)
+overload_for(is_kind(ComplianceSystem), linear_step.solve_contact, _solve_by_compliance)
 
 
 @kernel
@@ -164,8 +151,8 @@ def _solve_in_rows(system, rows, first, tolerance):  # type: ignore
         for row in rows:
             start[row] = row_times(gaps, row, work.contact) + law.offset[row]
     else:
-        subtract_released(system.active, work.force, start)
-    return solve_active_rows(law, start, system.active, work.force, tolerance)
+        active_rows.subtract_released(system.active, work.force, start)
+    return active_rows.solve_active_rows(law, start, system.active, work.force, tolerance)
 
 
 @kernel

@@ -20,27 +20,9 @@ from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from archfem._numba import kernel
 from archfem._typing import Array
+from archfem.dynamics.solvers import joint_law, linear_step, supernodal_lu
 from archfem.dynamics.solvers.base import StepSolver, is_kind, overload_for, overload_steps
 from archfem.dynamics.solvers.equation import Equation
-from archfem.dynamics.solvers.joint_law import (
-    add_derivatives,
-    collect_derivatives,
-    hold_reversed,
-    largest_force,
-    predict_gaps,
-)
-from archfem.dynamics.solvers.linear_step import (
-    LinearStepWorkspace,
-    LinearSystem,
-    constant_parts,
-    evaluate_released,
-    find_tangent_blocks,
-    linear_system,
-    linear_workspace,
-    solve_contact,
-    subtract_derivatives,
-    tangent_pattern,
-)
 from archfem.dynamics.solvers.rigid_chains import ChainSystem, chain_system, constant_chain_parts
 from archfem.dynamics.solvers.semismooth_newton import (
     Correction,
@@ -59,16 +41,6 @@ from archfem.dynamics.solvers.sparse_products import (
     without_round_off,
 )
 from archfem.dynamics.solvers.stone_tree import find_stone_tree
-from archfem.dynamics.solvers.supernodal_lu import (
-    Elimination,
-    Indices,
-    Panels,
-    add_ancestors,
-    eliminate,
-    panel_places,
-    panels_of,
-    solve_panels,
-)
 from archfem.joints.large.forces import (
     JointStepForces,
     LargeDisplacementJoints,
@@ -90,8 +62,8 @@ class NewtonSolver(StepSolver):
 
     def __init__(self, equation: Equation) -> None:
         self._equation, self.assembled = equation, {}
-        pattern, joints = tangent_pattern(equation), equation.joints
-        self._elimination = Elimination.of(pattern)
+        pattern, joints = linear_step.tangent_pattern(equation), equation.joints
+        self._elimination = supernodal_lu.Elimination.of(pattern)
         self.order, self.half_width = self._elimination.order, narrowest_width(pattern)
         stiffens = joints is not None and joints.points.stiffens
         self.is_narrow = self.half_width <= (12 if stiffens else 40)
@@ -128,20 +100,20 @@ class NewtonSolver(StepSolver):
         changing = "entries", "factor", "products", "changed", "image"
         parts = [getattr(tangent, name) for name in tangent._fields if name not in changing]
         if isinstance(system, SmallSystem):
-            return (*parts, *constant_parts(system.linear), system.begin, system.places)
+            return (*parts, *linear_step.constant_parts(system.linear), system.begin, system.places)
         matrices = system.mass, system.blocks, system.viscous, system.effective
         return (*parts, *matrices, system.joints, system.places, system.weight, system.body)
 
-    def _store(self, matrix: sparse.csr_matrix, ends: Any) -> tuple[Panels, Any]:
+    def _store(self, matrix: sparse.csr_matrix, ends: Any) -> tuple[supernodal_lu.Panels, Any]:
         """Return a matrix to be factorised, and the places of its entries (row, column) there."""
-        panels = panels_of(matrix, self._elimination, *ends)
-        return panels, panel_places(panels, *ends).astype(np.uint32)
+        panels = supernodal_lu.panels_of(matrix, self._elimination, *ends)
+        return panels, supernodal_lu.panel_places(panels, *ends).astype(np.uint32)
 
     def _small_system(self, dt: float) -> "SmallSystem":
         """Return the data of steps with small displacements."""
-        linear, pairs, effective = linear_system(self._equation, self.order, dt)
+        linear, pairs, effective = linear_step.linear_system(self._equation, self.order, dt)
         law = linear.law
-        begin, *ends = find_tangent_blocks(linear.gaps, pairs)
+        begin, *ends = linear_step.find_tangent_blocks(linear.gaps, pairs)
         tangent, places = self._store(effective, ends)
         widest = int(np.diff(linear.gaps[0]).max(initial=0))
         blocks = np.zeros(widest), np.zeros(widest**2)
@@ -150,7 +122,7 @@ class NewtonSolver(StepSolver):
         rows, contact = np.zeros((7, len(law.offset))), np.zeros((3, len(linear.weight)))
         return SmallSystem(  # type: ignore[call-arg]
             linear,
-            linear_workspace(linear),
+            linear_step.linear_workspace(linear),
             tangent,
             begin,
             places,
@@ -216,10 +188,10 @@ def narrowest_width(pattern: sparse.csr_matrix) -> int:
 class SmallSystem(NamedTuple):
     """A structure of small displacements."""
 
-    linear: LinearSystem
-    work: LinearStepWorkspace
+    linear: linear_step.LinearSystem
+    work: linear_step.LinearStepWorkspace
     tangent: Any  # K + μ M + ν R, to which joints add
-    begin: Indices  # begin of the block of each pair of gap rows (q,)
+    begin: supernodal_lu.Indices  # begin of the block of each pair of gap rows (q,)
     places: Any  # entries of the tangent in the blocks, row by row
     blocks: tuple[Array, Array]  # workspace for a row of a block, and for a block
     entries: tuple[Any, Array]  # derivatives: row, column and pair (m, 3), and values (m,)
@@ -243,7 +215,7 @@ def _small_residual(system, work, iteration):  # type: ignore
     largest, reverses = 0.0, False
     for row in range(len(released)):
         last[row] = released[row]
-    evaluate_released(system.linear.law, system.linear.places, released)
+    linear_step.evaluate_released(system.linear.law, system.linear.places, released)
     if iteration == 0:  # nothing is in balance with the guess
         return np.inf, False
     for row in range(len(released)):
@@ -271,18 +243,18 @@ def _small_correction(system, work, iteration, reuse, hold):  # type: ignore
         move[row] = released[row] - origin[row]
         along[row] = law.offset[row] - law.guess[row]
     if begin:
-        add_derivatives(system.entries, system.factored[2][0], along, move)
+        joint_law.add_derivatives(system.entries, system.factored[2][0], along, move)
     for k in range(len(change)):
         contact[1, k] = 0.0 if begin else contact[0, k]
         change[k] = right[k] if begin else 0.0
     add_rows(gaps, move, change)
-    solve_panels(system.tangent, change)
+    supernodal_lu.solve_panels(system.tangent, change)
     # change of the gaps, and of λ: the balance holds for any share of both
     for row in range(len(move)):
         moved = row_times(gaps, row, change)
         along[row] = moved + along[row] if begin else moved
         move[row] = released[row] - origin[row]
-    add_derivatives(system.entries, system.factored[2][0], along, move)
+    joint_law.add_derivatives(system.entries, system.factored[2][0], along, move)
     return True
 
 
@@ -293,9 +265,9 @@ def _renew_factor(system, hold):  # type: ignore
     pairs, factored, number = system.factored
     law, numbers = system.linear.law, system.linear.places
     selection = numbers, numbers[: len(law.segments)], numbers[law.openings :]
-    count = collect_derivatives(law, selection, system.entries)
+    count = joint_law.collect_derivatives(law, selection, system.entries)
     if hold:
-        hold_reversed(system.last, system.released, system.entries, count)
+        joint_law.hold_reversed(system.last, system.released, system.entries, count)
     same = number[0] == count
     for k in range(count):
         same = same and pairs[k] == rows[k, 2] and factored[k] == values[k]
@@ -305,8 +277,8 @@ def _renew_factor(system, hold):  # type: ignore
     entries, base = tangent.entries, tangent.base
     for k in range(len(entries)):
         entries[k] = base[k]
-    subtract_derivatives(system, count)
-    regular = eliminate(tangent)
+    linear_step.subtract_derivatives(system, count)
+    regular = supernodal_lu.eliminate(tangent)
     number[0] = count if regular else -1
     return regular
 
@@ -351,13 +323,13 @@ def _solve_small_step(system):  # type: ignore
     # an impact between stiff joints leads far into the other block, or away from it
     law, work, total = system.linear.law, system.work, 0
     # relative to the largest force; ten times as much where rounding does not let it fall
-    error = 1e-12 * largest_force(law, work.gap)
+    error = 1e-12 * joint_law.largest_force(law, work.gap)
     tolerances = Tolerances(error, 10.0 * error, 0.0, 0.0, system.reduction)
     number = system.factored[2]
     # the derivatives of joints that stiffen change in every step, but little
     earlier = system.keeps_factor and number[0] >= 0
     for limit, full_steps, reusable in ((12, 4, earlier), (60, 1, False)):
-        predict_gaps(law, work.gap, work.gap_before)
+        joint_law.predict_gaps(law, work.gap, work.gap_before)
         if full_steps == 1:
             for row in range(len(law.guess)):
                 law.guess[row] = law.start[row] if law.gain > 0.0 else work.gap[row]
@@ -375,7 +347,7 @@ def _solve_small_step(system):  # type: ignore
     return -1
 
 
-overload_for(is_kind(SmallSystem), solve_contact, _solve_small_step)
+overload_for(is_kind(SmallSystem), linear_step.solve_contact, _solve_small_step)
 
 
 # ---- large displacements
@@ -475,7 +447,7 @@ def _large_correction(system, work, iteration, reuse, hold):  # type: ignore
         _renew_tangent(system)
         if not system.factored[0]:
             return False
-    solve_panels(system.tangent, correction)
+    supernodal_lu.solve_panels(system.tangent, correction)
     return True
 
 
@@ -499,7 +471,7 @@ def _renew_tangent(system):  # type: ignore
         for side in range(2):
             for k in range(sides.size[joint, side]):
                 changed[tangent.group_of[sides.index[joint, side, k]]] = True
-    system.factored[0] = eliminate(add_ancestors(tangent))
+    system.factored[0] = supernodal_lu.eliminate(supernodal_lu.add_ancestors(tangent))
 
 
 @kernel

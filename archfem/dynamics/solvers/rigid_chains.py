@@ -11,6 +11,7 @@ import numpy as np
 
 from archfem._numba import inlined_kernel, kernel, summing_kernel
 from archfem._typing import Array
+from archfem.dynamics.solvers import stone_tree
 from archfem.dynamics.solvers.base import is_kind, overload_steps
 from archfem.dynamics.solvers.equation import Equation
 from archfem.dynamics.solvers.semismooth_newton import (
@@ -20,12 +21,6 @@ from archfem.dynamics.solvers.semismooth_newton import (
     newton_driver,
     residual_work,
     reverse_correction,
-)
-from archfem.dynamics.solvers.stone_tree import (
-    StoneTree,
-    add_joint_blocks,
-    eliminate_stones,
-    substitute_stones,
 )
 from archfem.joints.large.face_kinematics import (
     add_angles,
@@ -104,7 +99,7 @@ class ChainWorkspace(NamedTuple):
     constant: Array  # forces that do not depend on the end of the step
 
 
-def chain_system(equation: Equation, tree: StoneTree, dt: float) -> ChainSystem:
+def chain_system(equation: Equation, tree: stone_tree.StoneTree, dt: float) -> ChainSystem:
     """Return the data of steps of one length [s]."""
     model: Any = equation.model
     joints: LargeDisplacementJoints = model.joints
@@ -453,10 +448,10 @@ def _chain_correction(system, work, iteration, reuse, hold):  # type: ignore
             _couple_joints(system, at)
         for joint in range(count):
             stones = stone[0, joint], stone[1, joint]
-            add_joint_blocks(system.coupling, joint, stones, system.parent, blocks)
-        if not eliminate_stones(system.parent, blocks):
+            stone_tree.add_joint_blocks(system.coupling, joint, stones, system.parent, blocks)
+        if not stone_tree.eliminate_stones(system.parent, blocks):
             return False
-    substitute_stones(system.parent, system.blocks, correction)
+    stone_tree.substitute_stones(system.parent, system.blocks, correction)
     return True
 
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from archfem._numba import allocating_entry, entry, inlined_kernel, kernel
 from archfem._typing import Array
+from archfem.joints.large import overlap_law
 from archfem.joints.large.face_kinematics import (
     FaceKinematics,
     face_forces,
@@ -24,13 +25,6 @@ from archfem.joints.large.face_kinematics import (
     step_measures,
     step_poses,
 )
-from archfem.joints.large.overlap_law import (
-    FaceLaw,
-    closing_energy,
-    damping_loss,
-    overlap,
-    segment_forces,
-)
 from archfem.joints.large.rates import JointRates
 
 
@@ -38,7 +32,7 @@ class LargeDisplacementJoints(NamedTuple):
     """Joint segments between blocks of large displacements."""
 
     kinematics: FaceKinematics
-    face_law: FaceLaw
+    face_law: overlap_law.FaceLaw
     normal_angle: Array  # direction of the normals before anything moved (j,) [rad]
     # 1 where the extrados is on the left of the normal, -1 on the right: slip, rotation, V and M of
     # the structure's joints are positive toward the extrados (j,)
@@ -165,9 +159,9 @@ def joint_energy(joints, q, slip):  # type: ignore
         longer = joints.initial_measures[segment, 3]
         longer = longer + relative_stretch(joints.kinematics, segment, q)
         # across: w ℓ Φ
-        (length, _), (middle, _) = overlap(law, segment, measures[1])
+        (length, _), (middle, _) = overlap_law.overlap(law, segment, measures[1])
         opening = measures[0] - middle * measures[2]
-        phi = closing_energy(law, segment, length, opening, measures[2])[0]
+        phi = overlap_law.closing_energy(law, segment, length, opening, measures[2])[0]
         total += law.width * length * phi
         # along: the shear spring of each point
         for point in range(law.first_point[segment], law.first_point[segment + 1]):
@@ -202,11 +196,11 @@ def _compute_segment(joints, segment, states, lag, slip, forces):  # type: ignor
     end = _add_initial_measures(joints, segment, end)
     # forces on the measures, and their derivative
     memory = slip, forces.irreversible_slip, forces.slip_direction
-    force, law_rate, stretch_rate, others = segment_forces(
+    force, law_rate, stretch_rate, others = overlap_law.segment_forces(
         law, segment, (start, end, (first, last)), lag, memory
     )
     (shear, moment), loss, missing = others
-    forces.dissipation[segment] = loss + damping_loss(law, segment, (start, end), lag)
+    forces.dissipation[segment] = loss + overlap_law.damping_loss(law, segment, (start, end), lag)
     joint, orientation = joints.joint[segment], joints.orientation[segment]
     forces.resultants[joint, 0] -= force[0]
     forces.resultants[joint, 1] += orientation * shear
