@@ -14,7 +14,7 @@ from typing import Any
 
 from archfem._files import atomic_write
 from archfem._validation import check_words, declared_keys, validate_arguments
-from archfem.cases import analysis_keys, analysis_tables, motion_keys, provenance
+from archfem.cases import analysis_keys, analysis_tables, motion_keys, provenance, toml_file
 from archfem.cases.analysis_keys import AssessmentSettings, LimitAnalysis, PushoverSettings
 from archfem.cases.analysis_tables import (
     DEAD_LOAD_KEYS,
@@ -25,17 +25,6 @@ from archfem.cases.analysis_tables import (
 )
 from archfem.cases.risk_keys import RISK_KEYS, RiskSettings, parse_risk
 from archfem.cases.structure_keys import cached_structure, write_structure
-from archfem.cases.toml_file import (
-    Table,
-    apply_change,
-    check_table,
-    format_tables,
-    parse_change,
-    read_with_base,
-    refuse_unknown,
-    remove_key,
-    set_value,
-)
 from archfem.cases.verdict_keys import VERDICT_KEYS, parse_verdict
 from archfem.dynamics.analysis import Analysis
 from archfem.dynamics.recorder import Record
@@ -46,10 +35,10 @@ from archfem.motion.design_spectra import DesignSpectrum
 from archfem.motion.motion import Motion
 from archfem.motion.suite import Suite
 
-OUTPUT_KEYS: Table = {"joints": [(int, str)], "animation": bool, "free_body": str}
+OUTPUT_KEYS: toml_file.Table = {"joints": [(int, str)], "animation": bool, "free_body": str}
 
 # Who signs what, against which demand: head and conclusion of a report
-REPORT_KEYS: Table = dict.fromkeys(
+REPORT_KEYS: toml_file.Table = dict.fromkeys(
     ("project", "place", "author", "checked_by", "date", "norm", "demand"), str
 )
 
@@ -83,7 +72,7 @@ class Case:
     suite: dict[str, Any] | None
     limit: LimitAnalysis
     pushover: PushoverSettings | None
-    rating: Table
+    rating: toml_file.Table
     assessment: AssessmentSettings
     risk: RiskSettings | None
     verdict: dict[str, Any]
@@ -123,7 +112,7 @@ class Case:
 
     @classmethod
     @validate_arguments
-    def of(cls, settings: Table, folder: Path = Path()) -> "Case":
+    def of(cls, settings: toml_file.Table, folder: Path = Path()) -> "Case":
         """Return the case of tables such as a TOML file contains.
 
         Args:
@@ -142,7 +131,7 @@ class Case:
         _check_sections(settings)
         provenance.load_extensions_of(settings, folder)
         check_words(settings.get("title", ""), "title", 'write words in quotes: title = "…"')
-        output = check_table(settings.get("output", {}), OUTPUT_KEYS, "output")
+        output = toml_file.check_table(settings.get("output", {}), OUTPUT_KEYS, "output")
         report = _read_report(settings)
         motion, suite, push = (settings.get(key) for key in ("motion", "suite", "pushover"))
         if motion is not None and suite is not None:
@@ -261,7 +250,7 @@ class Case:
         """
         if self.suite is None:
             raise InvalidInput("the case has no [suite] to take pairs of: give a table for each")
-        refuse_unknown(dict.fromkeys(pairs), self.suite["pairs"], "suite.pairs")
+        toml_file.refuse_unknown(dict.fromkeys(pairs), self.suite["pairs"], "suite.pairs")
         # Checked keys and original tables must agree: the digest is that of the tables.
         suite, table = (
             {**keys, "pairs": {key: pair for key, pair in keys["pairs"].items() if key in pairs}}
@@ -281,21 +270,21 @@ class Case:
         settings = deepcopy(self.settings)
         for path in paths:
             with suppress(InvalidInput):  # there is no such key
-                remove_key(settings, path)
+                toml_file.remove_key(settings, path)
         return Case.of(settings, self.folder)
 
     def text(self) -> str:
         """Return the case as TOML, changes included, with the blocks of a drawing for its file."""
         if "file" not in self.settings.get("structure", ()):
-            return format_tables(self.settings)
+            return toml_file.format_tables(self.settings)
         # results must not need the drawing beside them
         blocks = write_structure(self.structure)
         tables = blocks | self.settings | {"structure": blocks["structure"]}
         with suppress(ArchfemError):
             if cached_structure(tables) == self.structure:
-                return format_tables(tables)
+                return toml_file.format_tables(tables)
         # materials of the case under other names than theirs
-        return format_tables(self.settings | blocks)
+        return toml_file.format_tables(self.settings | blocks)
 
     def signed(self, changes: Sequence[str]) -> "Case":
         """Return the case with other values of [report], which change no result.
@@ -333,15 +322,15 @@ class Case:
 
 def read_settings(path: Path, changes: Sequence[str] = ()) -> dict[str, Any]:
     """Read the tables of a case file, with its base and with changed values."""
-    settings = read_with_base(path)
+    settings = toml_file.read_with_base(path)
     for text in changes:
-        path_of_value, value = parse_change(text)
-        apply_change(settings, complete_path(path_of_value), value)
+        path_of_value, value = toml_file.parse_change(text)
+        toml_file.apply_change(settings, complete_path(path_of_value), value)
     return settings
 
 
 @cache
-def section_keys() -> Mapping[str, Table]:
+def section_keys() -> Mapping[str, toml_file.Table]:
     """Return the keys and kinds of each section whose keys do not depend on others in it."""
     analysis = analysis_tables.analysis_keys()
     return {
@@ -362,7 +351,7 @@ def section_keys() -> Mapping[str, Table]:
     }
 
 
-def _check_sections(settings: Table) -> None:
+def _check_sections(settings: toml_file.Table) -> None:
     """Refuse sections that are no tables, unknown ones, and keys that only other sections have."""
     known = section_keys()
     sections = ("structure", "materials", "contacts", *known)
@@ -376,23 +365,23 @@ def _check_sections(settings: Table) -> None:
             if homes := [f"{name}.{key}" for name, keys in known.items() if key in keys]:
                 place = f"{section}.{key}" if section else key
                 raise InvalidInput(f"unknown key '{place}': it is {' or '.join(homes)}")
-    refuse_unknown(settings, ("title", "extensions", *sections))
+    toml_file.refuse_unknown(settings, ("title", "extensions", *sections))
 
 
 def sign(settings: dict[str, Any], changes: Sequence[str]) -> dict[str, Any]:
     """Return the tables of a case with other values of [report], as `Case.signed` takes them."""
     signed = deepcopy(settings)
-    for path, words in map(parse_change, changes):
+    for path, words in map(toml_file.parse_change, changes):
         if not path.startswith("report."):
             raise InvalidInput(f"'{path}' changes results: run the case again with it")
-        set_value(signed, path, str(words))
+        toml_file.set_value(signed, path, str(words))
     _read_report(signed)
     return signed
 
 
-def _read_report(settings: Table) -> dict[str, str]:
+def _read_report(settings: toml_file.Table) -> dict[str, str]:
     """Return the keys of [report]."""
-    report = check_table(settings.get("report", {}), REPORT_KEYS, "report")
+    report = toml_file.check_table(settings.get("report", {}), REPORT_KEYS, "report")
     for key, words in report.items():
         check_words(words, f"report.{key}")
     return report

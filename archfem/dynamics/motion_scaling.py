@@ -17,13 +17,7 @@ from archfem.dynamics.fall import state_rigid_falls
 from archfem.dynamics.history import Ending, History, first_mechanisms, partial_history
 from archfem.dynamics.monitor import refuse_fill_in_tension
 from archfem.dynamics.recorder import Record
-from archfem.dynamics.rigid_body.rocking_body import (
-    FirstFall,
-    describe_first_fall,
-    find_first_fall,
-    say_again,
-    say_scale,
-)
+from archfem.dynamics.rigid_body import rocking_body
 from archfem.dynamics.scale_search import (
     COLLAPSE_DEFINITION,
     FILLED_SHARE,
@@ -164,14 +158,14 @@ class CollapseScale:
     pga: float | None = None
     of_model: tuple[Doubt, ...] = ()
     longer: dict[float, MechanismScales] = field(default_factory=dict)
-    as_one: FirstFall | None = None
+    as_one: rocking_body.FirstFall | None = None
 
     @property
     def sentence(self) -> str:
         """Scales around the fall, and the least at which it is dislocated, in words."""
         (least, last), met = self.first_falls, "falls at no scale that was tried"
         if least < inf:
-            met = f"falls at {say_scale(least, self.pga)}"
+            met = f"falls at {rocking_body.say_scale(least, self.pga)}"
         elif unanswered := [run.scale for run in self._runs if run.fall is None]:
             none = f"{len(unanswered)} have none, the first at {min(unanswered):#.3g} ×"
             met = f"falls in no run that has an answer ({none})"
@@ -180,7 +174,7 @@ class CollapseScale:
             ends = {dt: each[COLLAPSE_DEFINITION].upper for dt, each in self._finished.items()}
             met = f"{met}, by steps of {1e3 * max(ends, key=ends.__getitem__):g} ms {at}"
         if self.above:
-            met = f"{met}, and {say_again(self.above)}"
+            met = f"{met}, and {rocking_body.say_again(self.above)}"
         if self.dislocated < inf:
             met = f"dislocated at {self.dislocated:#.3g} ×{self.dislocated_stones}, {met}"
         if self.moves <= max(self._stood):
@@ -189,7 +183,7 @@ class CollapseScale:
         if first is None:
             return said
         rocks = f"rocks from {first.rocks:#.3g} × on and " * (first.rocks < inf)
-        one = f"as one rigid body it {rocks}{describe_first_fall(first, self.pga)}"
+        one = f"as one rigid body it {rocks}{rocking_body.describe_first_fall(first, self.pga)}"
         return f"{one}; in courses it {said}" if first.scale < least else f"{said}; {one}"
 
     def __repr__(self) -> str:
@@ -553,5 +547,5 @@ def collapse_scale(
         steps = [shorter, 0.5 * shorter]
         searches = _search_steps(search, steps, shortens)
     largest = max([limits[0], *(run.scale for x in searches.values() for run in x.runs)])
-    as_one = find_first_fall(model.structure, motion, (limits[0], largest))
+    as_one = rocking_body.find_first_fall(model.structure, motion, (limits[0], largest))
     return CollapseScale(searches, motion.pga, doubt_soft_blocks(model.structure), longer, as_one)

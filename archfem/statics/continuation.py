@@ -23,15 +23,9 @@ from archfem.limit.linear_programme import RigidBlocks
 from archfem.limit.self_weight import self_weight_programme
 from archfem.masonry.loads import BodyForce, PointLoad, Settlement
 from archfem.models.model import Model
+from archfem.statics import relaxation
 from archfem.statics.equilibrium import Equilibrium, self_weight
 from archfem.statics.newton import MAX_ROUND_OFF_RESIDUAL, EquilibriumSolver, load_magnitude
-from archfem.statics.relaxation import (
-    MAX_IRREVERSIBLE_ITERATIONS,
-    has_irreversible_joints,
-    is_stationary,
-    linear_predictor,
-    solve_or_relax,
-)
 
 # Residual relative to the sum of all loads, and of the added equation relative to the step [-]
 RESIDUAL_TOLERANCE = 1e-9
@@ -40,7 +34,7 @@ RESIDUAL_TOLERANCE = 1e-9
 Goal = tuple[Array, float, float]
 
 # Finds the next equilibrium of a path, whose steps are small: what slid in creep stays there
-_solve_next = partial(solve_or_relax, in_proportion=False)
+_solve_next = partial(relaxation.solve_or_relax, in_proportion=False)
 
 # First displacement, relative to the structure's size [-]
 FIRST_DISPLACEMENT = 1e-6
@@ -263,13 +257,13 @@ class LoadPath(EquilibriumPath):
         last = np.append(self.states[-1], self.factors[-1])
         x = last if guess is None else guess
         model, iterations = self.model, 0
-        for number in range(MAX_IRREVERSIBLE_ITERATIONS):
+        for number in range(relaxation.MAX_IRREVERSIBLE_ITERATIONS):
             solution = self._iterate(model, x, goal, share)
             if solution is None:
                 return False
             x, iterations = solution[0], iterations + solution[1]
-            if not has_irreversible_joints(model) or (
-                number > 0 and is_stationary(model, x[:-1], solution[1])
+            if not relaxation.has_irreversible_joints(model) or (
+                number > 0 and relaxation.is_stationary(model, x[:-1], solution[1])
             ):
                 # a singular matrix, as under joints that slide together, has no sense
                 if sense and self._sense(model, x, x - last) == -sense:
@@ -457,7 +451,7 @@ class SupportPath(EquilibriumPath):
         """Return the coordinates extrapolated from the last step, an initial guess (n,)."""
         last, increment = self.states[-1], multiple - self.multiples[-1]
         if len(self.multiples) < 2:
-            return linear_predictor(self.model, last, increment * self.motion)
+            return relaxation.linear_predictor(self.model, last, increment * self.motion)
         rate = (last - self.states[-2]) / (self.multiples[-1] - self.multiples[-2])
         return last + increment * rate
 

@@ -28,12 +28,7 @@ from archfem.errors import DidNotConverge, InvalidInput
 from archfem.joints.contact_law import LARGEST_CLOSING, ContactLaw
 from archfem.joints.criteria import assessed_joints
 from archfem.joints.resultants import joint_dataset, select_joint
-from archfem.limit.instability import (
-    describe_friction,
-    explain_instability,
-    least_friction,
-    name_free_end,
-)
+from archfem.limit import instability
 from archfem.limit.linear_programme import NoEquilibrium
 from archfem.masonry.block import Block, as_point, say_place
 from archfem.masonry.construction import Stage, resolve_stages
@@ -281,7 +276,7 @@ def _check_closings(state: Equilibrium) -> Equilibrium:
 def _describe_failure(model: Model, error: DidNotConverge, newton: Newton | None) -> str:
     """Return the message of a failed dead load, with its cause by limit analysis."""
     try:
-        cause = explain_instability(model.structure)
+        cause = instability.explain_instability(model.structure)
     except (InvalidInput, DidNotConverge):  # soft bodies or bonds: limit analysis does not apply
         return str(error)
     if cause is not None:
@@ -291,10 +286,10 @@ def _describe_failure(model: Model, error: DidNotConverge, newton: Newton | None
     soft = "joints are" if model.fidelity == "rigid" else "joints and blocks are"
     text = f"as rigid blocks it stands, but its {soft} too soft for its depth"
     friction = float(model.structure.friction.max())
-    if friction < 1.1 * (least_friction(model.structure) or 0.0):
+    if friction < 1.1 * (instability.least_friction(model.structure) or 0.0):
         text = (
-            f"as rigid blocks {describe_friction(model.structure)}, which is too near its "
-            f"{friction:g} for joints that deform (give more of it, or stiffer joints)"
+            f"as rigid blocks {instability.describe_friction(model.structure)}, which is too near "
+            f"its {friction:g} for joints that deform (give more of it, or stiffer joints)"
         )
     part = _find_carried_part(model, newton)
     if part is None:
@@ -321,7 +316,7 @@ def _describe_moving_pieces(model: Model, newton: Newton | None) -> str:
         # those of joints beside a wedge that moves as one
         fast = np.flatnonzero(speed > 0.3 * speed.max())
         names = join_joint_names([structure.joints[k].name for k in fast])
-        end = name_free_end(structure, {*structure.pairs[fast].ravel().tolist()})
+        end = instability.name_free_end(structure, {*structure.pairs[fast].ravel().tolist()})
         return (
             f"pieces of the fill move on ({names}): {end or 'more of its cohesion may hold them'}"
         )

@@ -11,17 +11,11 @@ import numpy as np
 import xarray as xr
 
 from archfem._validation import validate_arguments
+from archfem.cases import result_text
 from archfem.cases.analysis_keys import rate_case
 from archfem.cases.answers import compare_crushing, find_margin
 from archfem.cases.case import Case
 from archfem.cases.provenance import hash_inputs, remove_presentation
-from archfem.cases.result_text import (
-    STATED_DOUBTS,
-    UPPER_BOUNDS,
-    doubt_rating,
-    record_doubts,
-    site_acceleration,
-)
 from archfem.cases.run import DeadLoadResult, log_prefix
 from archfem.dynamics.analysis import Analysis
 from archfem.dynamics.history import (
@@ -36,12 +30,7 @@ from archfem.dynamics.schemes import EffectiveDamping, Viscous
 from archfem.dynamics.time_history import time_history
 from archfem.dynamics.verdict import ALL_DEFINITIONS, MECHANISM_DEFINITIONS
 from archfem.errors import DidNotConverge, InvalidInput, keep_warnings
-from archfem.joints.criteria import (
-    assessed_joints,
-    describe_assessed_joints,
-    eccentricity_magnitude,
-    part_roles,
-)
+from archfem.joints import criteria
 from archfem.limit.collapse import Outcome
 from archfem.limit.fill_range import BACKED, FillRange
 from archfem.limit.mechanism_count import Mechanism
@@ -60,9 +49,9 @@ Findings = dict[str, Any]
 def evaluate_dead_load(case: Case) -> Findings:
     """Return the largest |e| and friction of joints under dead load, and the first mode."""
     result = dead_load_of(case)
-    joints = assessed_joints(result.dead.joints)
+    joints = criteria.assessed_joints(result.dead.joints)
     return {
-        "eccentricity": float(eccentricity_magnitude(joints).max()),
+        "eccentricity": float(criteria.eccentricity_magnitude(joints).max()),
         "friction": float(joints["friction"].max()),
         "N": float(joints["N"].min()),
         **_describe_first_mode(result),
@@ -145,7 +134,7 @@ def of_history(run: History, mechanisms: Mapping[str, Mechanism | None] | None =
         findings[definition] = np.inf if first is None or first.time is None else first.time
         findings[f"{definition}, class"] = "" if first is None else str(first.kind)
     findings |= {"ended": str(run.ending), "fall": "" if run.fall is None else run.fall.kind}
-    assessed = describe_assessed_joints(run.joints)
+    assessed = criteria.describe_assessed_joints(run.joints)
     findings |= {"assessed": assessed} if assessed else {}
     drift = float(run.dataset.attrs["energy_drift"])
     return findings | {"energy_drift": drift} | _state_doubts(run.doubts)
@@ -153,12 +142,12 @@ def of_history(run: History, mechanisms: Mapping[str, Mechanism | None] | None =
 
 def _state_doubts(doubts: Sequence[Doubt]) -> Findings:
     """Return the number of doubts, and all of them as JSON."""
-    return {"doubts": float(len(doubts)), STATED_DOUBTS: write_doubts(doubts)}
+    return {"doubts": float(len(doubts)), result_text.STATED_DOUBTS: write_doubts(doubts)}
 
 
 def _name_bounds(bounds: Sequence[str]) -> Findings:
     """Return the finding that names those which are upper bounds, if there are any."""
-    return {UPPER_BOUNDS: ", ".join(bounds)} if bounds else {}
+    return {result_text.UPPER_BOUNDS: ", ".join(bounds)} if bounds else {}
 
 
 def largest_values(run: History) -> dict[str, float]:
@@ -213,7 +202,7 @@ def evaluate_limit(case: Case) -> Findings:
     which does not stand, or of one without a state without dilatancy, which `factor_at_most`
     bounds. `upper_bounds` names findings not proved least.
     """
-    with record_doubts(case.structure) as doubts:
+    with result_text.record_doubts(case.structure) as doubts:
         collapse = case.limit.solve(case.structure)
         other = case.limit.opposite if collapse.outcome is not Outcome.INFEASIBLE else None
         senses = [collapse] if other is None else [collapse, other.solve(case.structure)]
@@ -228,7 +217,7 @@ def evaluate_limit(case: Case) -> Findings:
     bounds = ["factor"] * searched[0]
     if push := abs(collapse.push):
         factors = [x.factor if x.over_fill is None else x.range[0] for x in senses]
-        least, site = push * float(np.min(factors)), site_acceleration(case)
+        least, site = push * float(np.min(factors)), result_text.site_acceleration(case)
         findings |= {"push": push * float(collapse.factor), "least_push": least}
         findings |= {"least_push_over_site": least / site} if site > 0.0 else {}
         over = FillRange.least_of([x.over_fill for x in senses if x.over_fill]).values
@@ -244,7 +233,7 @@ def evaluate_assessment(case: Case) -> Findings:
 
     It is over the states of the fill too, and below 1 where the demand is not withstood.
     """
-    with record_doubts(case.structure) as doubts:
+    with result_text.record_doubts(case.structure) as doubts:
         found = case.assessment.solve(case.structure, case.demand).values()
     with keep_warnings():  # which are those of the assessment
         doubts += [each for each in compare_crushing(case, found) if isinstance(each, Doubt)]
@@ -257,9 +246,11 @@ def evaluate_assessment(case: Case) -> Findings:
 
 def evaluate_rating(case: Case) -> Findings:
     """Return the factor of a case in each state of its fill, and the place of the vehicle."""
-    with record_doubts(case.structure) as doubts:
+    with result_text.record_doubts(case.structure) as doubts:
         found = rate_case(case.structure, case.rating, case.limit)
-    doubts += [each for each in doubt_rating(found, case.limit) if isinstance(each, Doubt)]
+    doubts += [
+        each for each in result_text.doubt_rating(found, case.limit) if isinstance(each, Doubt)
+    ]
     place = {"position": found.moving.position, "hinges": len(found.moving.worst.hinges)}
     return found.factors | place | _state_doubts(doubts)
 
@@ -271,11 +262,11 @@ def evaluate_comparison(
     if case.suite is None:
         return capacity_findings(case)
     result, motion = dead_load_of(case), ground_motion(case)
-    joints = assessed_joints(result.dead.joints)
+    joints = criteria.assessed_joints(result.dead.joints)
     findings: Findings = {
         **_describe_first_mode(result),
-        **_prefix("role", part_roles(joints)),
-        **_prefix("dead", _largest_by_part(eccentricity_magnitude(joints))),
+        **_prefix("role", criteria.part_roles(joints)),
+        **_prefix("dead", _largest_by_part(criteria.eccentricity_magnitude(joints))),
     }
     try:
         run = run_motion(result, motion)
@@ -297,7 +288,7 @@ def evaluate_comparison(
 
 def findings_by_part(run: History) -> Findings:
     """Return the findings of a run, which may be incomplete."""
-    joints, mechanisms = assessed_joints(run.joints), first_mechanisms(run)
+    joints, mechanisms = criteria.assessed_joints(run.joints), first_mechanisms(run)
     eccentricity = abs(joints["eccentricity"]).max("time").fillna(0.5)
     friction = joints["friction"].max("time").fillna(np.inf)
     return {

@@ -26,6 +26,7 @@ from archfem.masonry.stiffness_ratio import list_stones
 from archfem.masonry.structure import Joint, Structure
 from archfem.models.model import Model
 from archfem.statics.equilibrium import Equilibrium
+from archfem.view import positions
 from archfem.view.joint_marks import (
     Marker,
     Marks,
@@ -35,14 +36,6 @@ from archfem.view.joint_marks import (
     model_and_coordinates,
     round_magnification,
     support_outlines,
-)
-from archfem.view.positions import (
-    block_kinds,
-    decisive_instant,
-    fields_at,
-    peak_displacements,
-    peak_instant,
-    peak_joint_ends,
 )
 from archfem.view.style import (
     Colour,
@@ -258,7 +251,7 @@ def title_at_instant(name: str, joints: xr.Dataset | None) -> str:
 def block_colours(structure: Structure) -> list[str]:
     """Return the fill colour of each block."""
     colours = {"support": Colour.SUPPORT, "soil": Colour.SOIL, "stone": Colour.STONE}
-    return [colours[kind] for kind in block_kinds(structure)]
+    return [colours[kind] for kind in positions.block_kinds(structure)]
 
 
 def draw_blocks(axes: Axes, structure: Structure) -> None:
@@ -515,8 +508,8 @@ def _clip_to_stones(axes: Axes, structure: Structure, places: Array, block: Arra
 
 def draw_critical(structure: Structure, run: History, model: Model | None = None) -> Figure:
     """Draw the decisive instant of a run and, where nothing falls, that of largest displacement."""
-    joints = run.joints.sel(time=decisive_instant(run), method="nearest")
-    if (time := peak_instant(run)) is None:
+    joints = run.joints.sel(time=positions.decisive_instant(run), method="nearest")
+    if (time := positions.peak_instant(run)) is None:
         return draw_during(structure, run, joints, model)
     low, high = outline_bounds(structure)
     # side by side, unless they would be less than half as high as wide
@@ -541,13 +534,15 @@ def _draw_peak(axes: Axes, structure: Structure, run: History, joints: xr.Datase
     outlines = [block.drawn() for block in structure.blocks]
     block = np.repeat(np.arange(len(outlines)), [len(outline) for outline in outlines])
     places = np.concatenate(outlines)
-    moved = peak_displacements(structure, run, places, block)
+    moved = positions.peak_displacements(structure, run, places, block)
     stones = np.isin(block, list_own_stones(structure))
     by = round_magnification(float(np.abs(moved[stones]).max()) / structure.size)
     displaced = np.split(places + by * moved, np.flatnonzero(np.diff(block)) + 1)
     add_polygons(axes, outlines, "none", edge=Colour.UNDEFORMED, width=0.6, zorder=0)
     add_polygons(axes, displaced, block_colours(structure), gid="blocks")
-    draw_marks(axes, joint_marks(structure, joints, shift=by * peak_joint_ends(structure, run)))
+    draw_marks(
+        axes, joint_marks(structure, joints, shift=by * positions.peak_joint_ends(structure, run))
+    )
     scale = "" if by == 1.0 else f", displacements × {by:g}"
     set_title(axes, title_at_instant("largest displacement", joints) + scale)
     _clip_to_stones(axes, structure, places + by * moved, block)
@@ -562,7 +557,7 @@ def draw_during(
 ) -> Figure:
     """Draw an instant of a run, with displaced blocks if the run contains displacements."""
     if model is not None and "q" in run.dataset:
-        q = fields_at(run, joints["time"].values[None])[0]
+        q = positions.fields_at(run, joints["time"].values[None])[0]
         largest = float(np.abs(model.cells.displacement(q)).max()) / model.structure.size
         magnification = 1.0 if model.large_displacements else round_magnification(largest)
         return draw_displaced(model, q, joints=joints, magnification=magnification, axes=axes)

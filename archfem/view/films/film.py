@@ -18,6 +18,7 @@ from archfem.limit.mechanism_kinematics import VerifiedMechanism
 from archfem.models.model import Model
 from archfem.statics.equilibrium import Equilibrium
 from archfem.statics.modes import Modes
+from archfem.view import joint_marks
 from archfem.view.films.encoder import Image, film_path, write_film
 from archfem.view.films.frames import (
     Frame,
@@ -29,12 +30,6 @@ from archfem.view.films.frames import (
 )
 from archfem.view.films.renderer import FrameLayout, FramePainter
 from archfem.view.films.settings import Setup, check_film, check_options
-from archfem.view.joint_marks import (
-    joints_of_state,
-    model_and_coordinates,
-    outline_moving_blocks,
-    scale_motion,
-)
 from archfem.view.positions import FallingBlocks, fields_at, recorded_fields
 from archfem.view.statics import ModePanel, mode_panels
 
@@ -102,8 +97,8 @@ def film(  # noqa: PLR0913  (a film has many settings)
     held = _times_before_fall(timing.times, falls)
     setup = Setup.of(model, fields_at(run, held), colour, magnification).with_falls(falls)
     if mechanism is not None and mechanism.moved.blocks:
-        motion = scale_motion(model.structure, mechanism.motion)
-        outlines = outline_moving_blocks(model.structure, motion)
+        motion = joint_marks.scale_motion(model.structure, mechanism.motion)
+        outlines = joint_marks.outline_moving_blocks(model.structure, motion)
         setup = setup.with_outlines(outlines, mechanism.moved.time or 0.0)
     if page:
         from archfem.view.films.viewer import write_scenes
@@ -169,8 +164,8 @@ def picture(
         InvalidInput: q or joints belong to another model, or an option is invalid.
     """
     check_options(model, colour, magnification, size)
-    model, q = model_and_coordinates(model, q)
-    joints = joints_of_state(model, q, joints, criteria)
+    model, q = joint_marks.model_and_coordinates(model, q)
+    joints = joint_marks.joints_of_state(model, q, joints, criteria)
     setup = Setup.of(model, q[None], colour, magnification)
     image = FrameLayout(setup, size, joints).compose(frame_of_state(setup, q, joints))
     return image[..., :3].copy()
