@@ -11,14 +11,8 @@ from archfem.errors import InvalidInput
 from archfem.masonry.structure import Structure
 from archfem.masonry.survey.circle_fit import fitted_circle
 from archfem.units import mm
-from archfem.view.style import (
-    Colour,
-    Size,
-    add_legend_below,
-    new_figure,
-    style_axes,
-    style_length_axes,
-)
+from archfem.view import style
+from archfem.view.style import Colour, Size
 
 
 @validate_arguments
@@ -44,10 +38,10 @@ def draw_circle_fit(curves: Structure | Mapping[str, Array]) -> Figure:
     every = np.concatenate([np.asarray(own).reshape(-1, 2) for own in points.values()])
     wide, tall = np.maximum(np.ptp(every, axis=0), 1e-3)
     high = float(np.clip((Size.PAGE - 1.0) * tall / wide, 0.8, 4.0))
-    figure = new_figure(Size.PAGE, high + 2.9)
+    figure = style.new_figure(Size.PAGE, high + 2.9)
     above, below = figure.subplots(2, 1, height_ratios=[high + 0.4, 1.6])
-    style_length_axes(above)
-    style_axes(below, "angle from the vertical [°]", "distance from the circle [mm]")
+    style.style_length_axes(above)
+    style.style_axes(below, "angle from the vertical [°]", "distance from the circle [mm]")
     below.axhline(0.0, color=Colour.GREY, lw=0.8)
     reach = 0.1  # of the lower axis [mm]: round-off of exact circles is not drawn
     for (label, own), colour in zip(points.items(), Colour.LINES, strict=False):
@@ -60,11 +54,11 @@ def draw_circle_fit(curves: Structure | Mapping[str, Array]) -> Figure:
         text = f"{label}: R = {circle.radius:.3f} m, rms {circle.rms / mm:.2f} mm"
         above.plot(*arc.T, color=colour, lw=0.9, label=text)
         above.plot(*np.asarray(own).T, "o", color=colour, ms=2.6)
-        style = {"color": colour, "lw": 0.9, "marker": "o", "ms": 2.6}
-        below.plot(np.degrees(angles), circle.distances / mm, **style)
+        look = {"color": colour, "lw": 0.9, "marker": "o", "ms": 2.6}
+        below.plot(np.degrees(angles), circle.distances / mm, **look)
         reach = max(reach, 1.1 * float(np.abs(circle.distances).max()) / mm)
     below.set_ylim(-reach, reach)
-    add_legend_below(figure, 2, handles=above.get_legend_handles_labels()[0])
+    style.add_legend_below(figure, 2, handles=above.get_legend_handles_labels()[0])
     return figure
 
 

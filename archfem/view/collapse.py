@@ -27,28 +27,11 @@ from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import Structure, rigid_motion_matrix
 from archfem.statics.assessment_checks import UPPER_BOUND, AssessmentCheck
 from archfem.statics.mechanism_assessment import KinematicAssessment
+from archfem.view import style
 from archfem.view.joint_marks import Marker, outline_moving_blocks, scale_motion
 from archfem.view.positions import FallingBlocks
 from archfem.view.structure import block_colours, draw_loads, draw_structure, draw_thrust
-from archfem.view.style import (
-    Colour,
-    Size,
-    add_legend,
-    add_legend_below,
-    add_polygons,
-    annotate,
-    line_style,
-    new_axes,
-    new_figure,
-    outline_bounds,
-    panel_grid,
-    set_title,
-    structure_figure,
-    style_axes,
-    style_colour_bar,
-    style_length_axes,
-    white_halo,
-)
+from archfem.view.style import Colour, Size
 
 # Share of the largest turn of a hinge from which one is drawn [-]
 LEAST_TURN = 0.05
@@ -94,8 +77,8 @@ def _draw_mechanism(axes: Axes, structure: Structure, found: Collapse, factors: 
     factor = f"{multiple:.3g} ×{factors}" if np.isfinite(multiple) else ""
     if found.outcome is not Outcome.INFEASIBLE:  # else nothing was loaded: the weight is too much
         draw_loads(axes, structure, found.live, factor=factor)
-    set_title(axes, f"{structure.name}: {found.sentence}")
-    add_legend(axes)
+    style.set_title(axes, f"{structure.name}: {found.sentence}")
+    style.add_legend(axes)
 
 
 def _draw_fill(axes: Axes, structure: Structure, found: Collapse) -> None:
@@ -132,10 +115,10 @@ def _draw_fill(axes: Axes, structure: Structure, found: Collapse) -> None:
 def _hatch_backing(axes: Axes, structure: Structure, level: float) -> None:
     """Hatch the fill below the level of the backing."""
     blocks = [structure.blocks[number].drawn() for number in find_yielding_blocks(structure)]
-    style = {"facecolors": "none", "edgecolors": Colour.GREY, "linewidths": 0.0, "hatch": "xxx"}
-    backing = PolyCollection(blocks, label="backing", **style)
+    look = {"facecolors": "none", "edgecolors": Colour.GREY, "linewidths": 0.0, "hatch": "xxx"}
+    backing = PolyCollection(blocks, label="backing", **look)
     axes.add_collection(backing)
-    (left, low), (right, _) = outline_bounds(structure)
+    (left, low), (right, _) = style.outline_bounds(structure)
     box = Rectangle((left, low), right - left, level - low, transform=axes.transData)
     backing.set_clip_path(box)
 
@@ -194,18 +177,18 @@ def draw_ratings(ratings: Sequence[Rating]) -> Figure:
     top = max(
         4.0 * max(1.0, min(factors_of)), 1.5 * max(filter(np.isfinite, factors_of), default=1)
     )
-    figure = new_figure(Size.PAGE, 2.8)
+    figure = style.new_figure(Size.PAGE, 2.8)
     upper = figure.subplots()
     for k, found in enumerate(drawn):
         over = found.moving.factors["factor"].min("direction")
         finite = over.where(np.isfinite(over))
-        upper.plot(over["position"], finite, label=found.label, lw=1.5, **line_style(k))
-        style = {"color": line_style(k)["color"], "mec": "white", "ms": 6.5, "zorder": 5}
-        upper.plot([found.moving.position], [found.factor], "o", **style)
+        upper.plot(over["position"], finite, label=found.label, lw=1.5, **style.line_style(k))
+        look = {"color": style.line_style(k)["color"], "mec": "white", "ms": 6.5, "zorder": 5}
+        upper.plot([found.moving.position], [found.factor], "o", **look)
     upper.axhline(1.0, color=Colour.GREY, lw=1.0)
     upper.set_ylim(0.0, top)
-    style_axes(upper, "middle of the vehicle, x [m]", "factor [-]")
-    set_title(upper, f"{structure.name}: least factor of each vehicle, over its place")
+    style.style_axes(upper, "middle of the vehicle, x [m]", "factor [-]")
+    style.set_title(upper, f"{structure.name}: least factor of each vehicle, over its place")
     upper.legend(frameon=False, fontsize=Size.LABEL, loc="lower center", ncols=3)
     return figure
 
@@ -222,9 +205,9 @@ def draw_worst_places(ratings: Sequence[Rating]) -> Figure:
     """
     drawn = ratings[: len(Colour.LINES)]
     structure, count = drawn[0].structure, (len(drawn) + 1) // 2
-    low, high = outline_bounds(structure)
+    low, high = style.outline_bounds(structure)
     tall = (0.5 * Size.PAGE - 0.2) * (high[1] - low[1]) / (high[0] - low[0]) + 0.3
-    figure = new_figure(Size.PAGE, 0.4 + min(count * tall, 3.25))
+    figure = style.new_figure(Size.PAGE, 0.4 + min(count * tall, 3.25))
     rows = [figure.add_subplot(count, 2, 1 + k) for k in range(len(drawn))]
     for found, axes in zip(drawn, rows, strict=True):
         worst, factors, strips = _take_axles_as_given(found)
@@ -233,11 +216,11 @@ def draw_worst_places(ratings: Sequence[Rating]) -> Figure:
         _mark_strips(axes, structure, strips)
         axes.get_legend().remove()
         axes.set_axis_off()
-        set_title(axes, f"{found.label}: {found.factor:.3g}")
+        style.set_title(axes, f"{found.label}: {found.factor:.3g}")
     labelled = {x.get_label(): x for axes in rows for x in axes.get_legend_handles_labels()[0]}
     # the size of the loads is another one in each panel
     kept = [handle for label, handle in labelled.items() if not label.startswith("live load")]
-    add_legend_below(figure, handles=kept)
+    style.add_legend_below(figure, handles=kept)
     return figure
 
 
@@ -279,37 +262,39 @@ def _draw_factors(
     structure = worst.structure
     assert structure is not None  # it was analysed
     over, top = found.factors["factor"], 4.0 * max(worst.factor, required)
-    low, high = outline_bounds(structure)
+    low, high = style.outline_bounds(structure)
     # a long vehicle is worst with its middle beside the bridge
     seen = over["position"].values[((over <= top) & np.isfinite(over)).any("direction").values]
     ends = np.array([*seen, low[0], high[0]])
-    wide, tall = structure_figure(structure).get_size_inches()
+    wide, tall = style.structure_figure(structure).get_size_inches()
     # height to spare, so that the bridge fills its part of the width, and room for the legend
     tall = min(max(1.5 * tall * (high[0] - low[0]) / np.ptp(ends), 2.5), 3.9)
-    figure = new_figure(wide, tall + 2.0)
+    figure = style.new_figure(wide, tall + 2.0)
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=[2.0, tall])
     ways = zip(("right", "left"), ("-", "--"), (Colour.THRUST, Colour.LOAD), strict=True)
     for way, line, colour in ways:
         drawn = over.sel(direction=way)
-        style = {"color": colour, "ls": line, "lw": 1.5, "label": f"driving {way}"}
-        upper.plot(drawn["position"], drawn.where(np.isfinite(drawn)), **style)
+        look = {"color": colour, "ls": line, "lw": 1.5, "label": f"driving {way}"}
+        upper.plot(drawn["position"], drawn.where(np.isfinite(drawn)), **look)
     upper.axhline(required, color=Colour.GREY, lw=1.0)
     if np.isfinite(worst.factor):
-        style = {"mfc": Colour.HINGE, "mec": "white", "ms": 7.5, "zorder": 5}
-        upper.plot([found.position], [worst.factor], "o", label="worst place", **style)
+        look = {"mfc": Colour.HINGE, "mec": "white", "ms": 7.5, "zorder": 5}
+        upper.plot([found.position], [worst.factor], "o", label="worst place", **look)
         upper.set_ylim(0.0, top)
-    style_axes(upper, "middle of the vehicle, x [m]", "factor [-]")
+    style.style_axes(upper, "middle of the vehicle, x [m]", "factor [-]")
     upper.tick_params(labelbottom=True)
-    set_title(upper, title)
+    style.set_title(upper, title)
     draw_structure(structure, axes=lower)
     _draw_mechanism(lower, structure, worst, factors)
     if np.isfinite(worst.factor):
-        set_title(lower, f"{structure.name}: a mechanism at {worst.factor:.3g} ×{factors} {load}")
+        style.set_title(
+            lower, f"{structure.name}: a mechanism at {worst.factor:.3g} ×{factors} {load}"
+        )
     _mark_strips(lower, structure, strips)
     # below both panels: arrows may stand anywhere in the lower one
     lower.get_legend().remove()
     handles = [axes.get_legend_handles_labels()[0] for axes in (upper, lower)]
-    add_legend_below(figure, handles=[*handles[0], *handles[1]])
+    style.add_legend_below(figure, handles=[*handles[0], *handles[1]])
     margin = 0.03 * np.ptp(ends)
     lower.set_xlim(ends.min() - margin, ends.max() + margin)
     return figure
@@ -319,8 +304,8 @@ def _mark_strips(axes: Axes, structure: Structure, strips: Sequence[PointLoad]) 
     """Mark where a distributed load stands."""
     if strips:
         places = np.array([load.place(structure)[1] for load in strips])
-        style = {"color": Colour.LOAD, "ls": "", "marker": "v", "ms": 3.0, "zorder": 9}
-        axes.plot(*places.T, label="distributed load", **style)
+        look = {"color": Colour.LOAD, "ls": "", "marker": "v", "ms": 3.0, "zorder": 9}
+        axes.plot(*places.T, label="distributed load", **look)
 
 
 @validate_arguments
@@ -341,24 +326,24 @@ def draw_kinematic_assessment(found: KinematicAssessment) -> Figure:
     if found.path is None:
         raise InvalidInput("there is no motion to draw: no mechanism moves under horizontal forces")
     if found.displacement is None:
-        figure = structure_figure(found.structure)
+        figure = style.structure_figure(found.structure)
         _draw_displaced_mechanism(figure.add_subplot(), found)
-        add_legend_below(figure, 2)
+        style.add_legend_below(figure, 2)
         figure.draw_without_rendering()  # the first layout cuts off a title over what moves upwards
         return figure
-    wide, high = structure_figure(found.structure).get_size_inches()
+    wide, high = style.structure_figure(found.structure).get_size_inches()
     wide = max(wide, 0.75 * Size.COLUMN)
-    if panel_grid(2) == (1, 2):
-        figure = new_figure(wide + 0.8 * Size.COLUMN, max(high, 4.2))
+    if style.panel_grid(2) == (1, 2):
+        figure = style.new_figure(wide + 0.8 * Size.COLUMN, max(high, 4.2))
         left, right = figure.subplots(1, 2, width_ratios=[wide, 0.8 * Size.COLUMN])
     else:
-        figure = new_figure(wide, high + 3.0)
+        figure = style.new_figure(wide, high + 3.0)
         left, right = figure.subplots(2, 1, height_ratios=[high, 3.0])
     _draw_displaced_mechanism(left, found)
     _draw_capacity_curve(right, found)
     # in the panels it would lie on curves
     handles = [axes.get_legend_handles_labels()[0] for axes in (left, right)]
-    add_legend_below(figure, 3, handles=[*handles[0], *handles[1]])
+    style.add_legend_below(figure, 3, handles=[*handles[0], *handles[1]])
     return figure
 
 
@@ -378,7 +363,7 @@ def _draw_displaced_mechanism(axes: Axes, found: KinematicAssessment) -> None:
     rest = np.zeros((len(structure.blocks), 3))
     _mark_hinges(axes, structure, found, rest, {"label": "hinge at rest", "ms": 6.5})
     _mark_sliding(axes, structure, found.sliding)
-    set_title(axes, f"alpha_0 = {found.alpha_0:.3f}, e* = {found.e_star:.2f}")
+    style.set_title(axes, f"alpha_0 = {found.alpha_0:.3f}, e* = {found.e_star:.2f}")
 
 
 def _draw_capacity_curve(axes: Axes, found: KinematicAssessment) -> None:
@@ -387,33 +372,33 @@ def _draw_capacity_curve(axes: Axes, found: KinematicAssessment) -> None:
     reduced = curve["a"].values / found.confidence_factor
     last = float(curve["d"][-1])
     factor = f", FC = {found.confidence_factor:g}"
-    style = {"color": Colour.THRUST, "lw": 1.8, "label": f"capacity a*(d*){factor}"}
+    look = {"color": Colour.THRUST, "lw": 1.8, "label": f"capacity a*(d*){factor}"}
     place = curve.attrs["holds"] + 1
-    axes.plot(curve["d"][:place], reduced[:place], **style)
+    axes.plot(curve["d"][:place], reduced[:place], **look)
     if place < len(reduced):
-        style |= {"ls": ":", "label": f"the same, {UPPER_BOUND}"}
-        axes.plot(curve["d"][place - 1 :], reduced[place - 1 :], **style)
+        look |= {"ls": ":", "label": f"the same, {UPPER_BOUND}"}
+        axes.plot(curve["d"][place - 1 :], reduced[place - 1 :], **look)
     periods = np.geomspace(0.02 * check.period, max(4.0, check.period), 160)  # as codes, to 4 s
     displacement, acceleration = found.demand(periods)
     damping = f"{100.0 * found.limit_state.damping:.0f} %"
-    style = {"color": Colour.GREY, "lw": 1.2, "label": f"spectrum, {damping} damped"}
-    axes.plot(displacement, acceleration, **style)
+    look = {"color": Colour.GREY, "lw": 1.2, "label": f"spectrum, {damping} damped"}
+    axes.plot(displacement, acceleration, **look)
     slope = (2.0 * np.pi / check.period) ** 2
     top = 1.15 * max(reduced.max(), acceleration.max())
     reach = min(1.1 * last, top / slope)
-    style = {"color": Colour.LOAD, "lw": 1.0, "ls": "--"}
-    axes.plot([0.0, reach], [0.0, slope * reach], label=f"T = {check.period:.2f} s", **style)
+    look = {"color": Colour.LOAD, "lw": 1.0, "ls": "--"}
+    axes.plot([0.0, reach], [0.0, slope * reach], label=f"T = {check.period:.2f} s", **look)
     colour = Colour.MECHANISM if check.passes else Colour.HINGE
     axes.axvline(check.capacity, color=colour, lw=1.2, label=f"capacity {check.capacity:.3f} m")
-    style = {"mfc": Colour.LOAD, "mec": "white", "ms": 7.0, "zorder": 5}
+    look = {"mfc": Colour.LOAD, "mec": "white", "ms": 7.0, "zorder": 5}
     label = f"demand {check.demand:.3f} m"
-    axes.plot([check.demand], [slope * check.demand], "D", label=label, **style)
-    style_axes(axes, "spectral displacement d* [m]", "spectral acceleration a* [m/s²]")
+    axes.plot([check.demand], [slope * check.demand], "D", label=label, **look)
+    style.style_axes(axes, "spectral displacement d* [m]", "spectral acceleration a* [m/s²]")
     axes.set(xlim=(0.0, 1.1 * max(last, check.demand)), ylim=(0.0, top))
     rest = ", at which it begins to move" if check.at_rest else ""
     titles = [f"{_title_check(check)}{rest}"]
     titles += [] if found.linear.passes else [_title_check(found.linear)]
-    set_title(axes, "; ".join(titles))
+    style.set_title(axes, "; ".join(titles))
 
 
 def _title_check(check: AssessmentCheck) -> str:
@@ -443,7 +428,7 @@ def draw_capacity(
     Returns:
         The figure, with a colour bar beside the map.
     """
-    figure, axes = new_axes(Size.COLUMN, 4.4, "embrace [°]", "thickness / radius, t/R [-]")
+    figure, axes = style.new_axes(Size.COLUMN, 4.4, "embrace [°]", "thickness / radius, t/R [-]")
     embraces, ratios = capacity["embrace"].values, capacity["ratio"].values
     # rings that no acceleration overturns are drawn in the colour of the largest values
     values = np.nan_to_num(capacity.values.T, nan=0.0, posinf=1e3)
@@ -455,15 +440,15 @@ def draw_capacity(
     axes.plot(*edge.T, color=Colour.TEXT, lw=1.6, zorder=3, label="least thickness")
     _mark_reference_values(axes, known)
     axes.set(xlim=(embraces[0], embraces[-1]), ylim=(0.0, ratios[-1]))
-    add_legend(axes)
-    style_colour_bar(figure.colorbar(filled), "horizontal acceleration at collapse [g]")
+    style.add_legend(axes)
+    style.style_colour_bar(figure.colorbar(filled), "horizontal acceleration at collapse [g]")
     return figure
 
 
 def _draw_motion(axes: Axes, outlines: Sequence[Array], label: str) -> None:
     """Draw displaced blocks over a structure that is drawn already."""
-    style = {"edge": Colour.MECHANISM, "width": 0.8, "zorder": 2, "label": label}
-    add_polygons(axes, outlines, f"{Colour.MECHANISM}30", **style)
+    look = {"edge": Colour.MECHANISM, "width": 0.8, "zorder": 2, "label": label}
+    style.add_polygons(axes, outlines, f"{Colour.MECHANISM}30", **look)
     axes.autoscale_view()
 
 
@@ -472,7 +457,7 @@ def _mark_hinges(
     structure: Structure,
     found: Collapse | KinematicAssessment,
     motion: Array,
-    style: dict[str, Any],
+    look: dict[str, Any],
 ) -> None:
     """Mark each hinge that turns visibly, where its blocks stay in contact, displaced."""
     points, pairs = [], structure.pairs[[number for number, _ in found.hinges]]
@@ -486,32 +471,34 @@ def _mark_hinges(
         matrix = rigid_motion_matrix(end[None, :], structure.blocks[joint.lower].centroid)[0]
         points.append(end + matrix @ motion[joint.lower])
     if points:
-        style = {"mfc": Colour.HINGE, "mec": "white", "mew": 0.8, "zorder": 6} | style
-        axes.plot(*np.array(points).T, "o", **style)
+        look = {"mfc": Colour.HINGE, "mec": "white", "mew": 0.8, "zorder": 6} | look
+        axes.plot(*np.array(points).T, "o", **look)
 
 
 def _mark_sliding(axes: Axes, structure: Structure, joints: Sequence[int]) -> None:
     """Mark sliding joints as built."""
     if joints:
-        style = {"colors": Colour.SLIDING, "linewidths": 2.4, "zorder": 4}
+        look = {"colors": Colour.SLIDING, "linewidths": 2.4, "zorder": 4}
         lines = structure.ends[list(joints)]
-        axes.add_collection(LineCollection(lines, label="sliding joint", **style))
+        axes.add_collection(LineCollection(lines, label="sliding joint", **look))
 
 
 def _mark_reference_values(axes: Axes, known: Mapping[tuple[float, float], float]) -> None:
     """Mark reference values on the capacity map."""
     thin = [point for point, factor in known.items() if factor == 0.0]
     strong = [point for point, factor in known.items() if factor > 0.0]
-    style: dict[str, Any] = {"ms": 6.5, "zorder": 5, "clip_on": False}
+    look: dict[str, Any] = {"ms": 6.5, "zorder": 5, "clip_on": False}
     for points, label, marker, face, edge in (
         (thin, "reference thickness", "D", "white", Colour.TEXT),
         (strong, "reference acceleration", "o", Colour.HINGE, "white"),
     ):
         if points:
-            axes.plot(*np.array(points).T, marker, mfc=face, mec=edge, label=label, **style)
+            axes.plot(*np.array(points).T, marker, mfc=face, mec=edge, label=label, **look)
     for point, factor in known.items():
         text = f"{factor:.3f}".rstrip("0") if factor else f"{point[1]:.4g}"
-        annotate(axes, text, point, (-8, 3), ha="right", zorder=6, path_effects=white_halo(2.0))
+        style.annotate(
+            axes, text, point, (-8, 3), ha="right", zorder=6, path_effects=style.white_halo(2.0)
+        )
 
 
 @validate_arguments
@@ -539,7 +526,7 @@ def draw_fall(run: History) -> Figure:
     size, margin = np.ptp(drawn, axis=0), 0.4  # [m], [inch]
     # panels have the shape of what is drawn: else they would leave much of the page white
     scale = ((np.array([Size.PAGE, 5.6]) / 2.0 - margin) / size).min()
-    figure = new_figure(*np.maximum(2.0 * (scale * size + margin), 0.5 * Size.COLUMN))
+    figure = style.new_figure(*np.maximum(2.0 * (scale * size + margin), 0.5 * Size.COLUMN))
     panels = figure.subplots(2, 2, sharex=True, sharey=True).ravel()
     for axes, time in zip(panels, instants, strict=True):
         _draw_instant(axes, falls, time)
@@ -560,12 +547,12 @@ def _select_instants(
 def _draw_instant(axes: Axes, falls: FallingBlocks, time: float) -> None:
     """Draw the loose blocks and the ground at one instant."""
     structure = falls.structure
-    style_length_axes(axes)
+    style.style_length_axes(axes)
     axes.axhline(falls.level, color=Colour.EDGE, lw=1.2, zorder=0)
     built = [block.drawn() for block in structure.blocks]
-    add_polygons(axes, built, "none", edge=Colour.UNDEFORMED, width=0.6)
+    style.add_polygons(axes, built, "none", edge=Colour.UNDEFORMED, width=0.6)
     colours = [block_colours(structure)[number] for number in falls.owners]
-    add_polygons(axes, falls.outlines(time), colours, zorder=2, gid="blocks")
+    style.add_polygons(axes, falls.outlines(time), colours, zorder=2, gid="blocks")
     axes.set_title(f"t = {time:.2f} s", fontsize=Size.TITLE, color=Colour.TEXT)
     axes.autoscale_view()
     axes.label_outer()

@@ -30,19 +30,9 @@ from archfem.joints.criteria import (
     step_lengths,
 )
 from archfem.masonry.structure import Structure
+from archfem.view import style
 from archfem.view.structure import MAX_NAME_LETTERS, short_name
-from archfem.view.style import (
-    Colour,
-    Size,
-    add_legend,
-    add_legend_below,
-    add_note,
-    annotate,
-    line_style,
-    new_figure,
-    set_title,
-    style_axes,
-)
+from archfem.view.style import Colour, Size
 
 
 @validate_arguments
@@ -89,7 +79,7 @@ def draw_envelope(
             opened = list[float]()
             for number, joints in enumerate(several):
                 places, own = panel.select(joints)
-                look = line_style(row) | {"label": "" if number else label}
+                look = style.line_style(row) | {"label": "" if number else label}
                 _draw_band(panel.axes, places, own, look, shade=shade)
                 opened += places[own["open"].any("time").values].tolist()
             height = np.full(len(opened), 0.56 + row_height * row)
@@ -100,20 +90,18 @@ def draw_envelope(
         first.plot([], [], "x", ms=4, color=Colour.GREY, label="opened")
     colours = dict(zip(runs, Colour.LINES, strict=False))
     for label, at_rest in ({"": dead} if isinstance(dead, xr.Dataset) else dead or {}).items():
-        style: dict[str, Any] = {"ls": "--" if label else ":", "lw": 1.0}
-        style["color"] = colours.get(label, Colour.TEXT)
-        _draw_state(panels, at_rest, f"dead load {label}".strip(), **style)
+        line: dict[str, Any] = {"ls": "--" if label else ":", "lw": 1.0}
+        line["color"] = colours.get(label, Colour.TEXT)
+        _draw_state(panels, at_rest, f"dead load {label}".strip(), **line)
     first.set_ylim(-0.56, 0.56 + (row_height * len(runs) if openings else 0.0))
     return _finish_panels(panels, states)
 
 
-def _draw_state(
-    panels: Sequence["PartPanel"], joints: xr.Dataset, label: str, **style: Any
-) -> None:
+def _draw_state(panels: Sequence["PartPanel"], joints: xr.Dataset, label: str, **look: Any) -> None:
     """Draw the eccentricities of joints at one instant in all panels."""
     for panel in panels:
         places, own = panel.select(joints)
-        panel.axes.plot(places, own["eccentricity"].values, label=label, **style)
+        panel.axes.plot(places, own["eccentricity"].values, label=label, **look)
 
 
 def draw_envelopes(runs: Mapping[str, History], dead: xr.Dataset | None) -> list[Figure]:
@@ -148,25 +136,25 @@ def draw_eccentricity(states: Mapping[str, xr.Dataset], *, dotted: Collection[st
     listed = {label: [joints] for label, joints in states.items()}
     panels = _make_panels(listed, None)
     for number, (label, joints) in enumerate(states.items()):
-        style = line_style(number) | ({"ls": ":"} if label in dotted else {})
-        _draw_state(panels, joints, label, marker="o", ms=2.2, lw=1.2, **style)
+        look = style.line_style(number) | ({"ls": ":"} if label in dotted else {})
+        _draw_state(panels, joints, label, marker="o", ms=2.2, lw=1.2, **look)
     panels[0].axes.set_ylim(-0.56, 0.56)
     return _finish_panels(panels, listed)
 
 
 def _draw_band(
-    axes: Axes, places: Array, joints: xr.Dataset, style: dict[str, Any], *, shade: float
+    axes: Axes, places: Array, joints: xr.Dataset, look: dict[str, Any], *, shade: float
 ) -> None:
     """Draw the least and the largest eccentricity of joints, dotted if the band is not shaded."""
     span = envelope(joints)
-    style = {"lw": 1.1, "marker": "o", "ms": 2.2} | style
+    look = {"lw": 1.1, "marker": "o", "ms": 2.2} | look
     if shade > 0.0:
         low, high = span["lowest"], span["highest"]
-        axes.fill_between(places, low, high, color=style["color"], alpha=shade, lw=0)
+        axes.fill_between(places, low, high, color=look["color"], alpha=shade, lw=0)
     else:
-        style |= {"ls": ":", "ms": 1.6}
-    axes.plot(places, span["highest"], **style)
-    axes.plot(places, span["lowest"], **style | {"label": ""})
+        look |= {"ls": ":", "ms": 1.6}
+    axes.plot(places, span["highest"], **look)
+    axes.plot(places, span["lowest"], **look | {"label": ""})
 
 
 def _draw_faces(axes: Axes, hinge: float) -> None:
@@ -262,7 +250,7 @@ def _make_panels(
         part, own = panel.part, panel.axes
         first = axes is not None or own.get_subplotspec().is_first_col()
         along = "height [m]" if panel.by_height else "joint [-]"
-        style_axes(own, along, "eccentricity e = M / (N h) [-]" if first else "")
+        style.style_axes(own, along, "eccentricity e = M / (N h) [-]" if first else "")
         _draw_faces(own, hinge)
         _label_places(panel, [short_name(name, part) for name in names[part]], every[0])
         if len(parts) > 1:
@@ -310,7 +298,7 @@ def _lay_out_panels(
             rows.append({})
         rows[-1][part] = width
     inches = (Size.COLUMN, 3.4) if len(sizes) == 1 else (Size.PAGE, 0.6 + 2.5 * len(rows))
-    figure, panels = new_figure(*inches), dict[str, Axes]()
+    figure, panels = style.new_figure(*inches), dict[str, Axes]()
     longest = max(sum(row.values()) for row in rows)
     first: Axes | None = None
     grid = figure.add_gridspec(len(rows), 1)
@@ -334,11 +322,11 @@ def _finish_panels(
     first.set_yticks(np.linspace(-0.5, 0.5, 5))
     figure = cast(Figure, first.figure)
     if len(panels) == 1:
-        add_legend(first)
+        style.add_legend(first)
     else:
-        add_legend_below(figure, 8, handles=first.get_legend_handles_labels()[0])
+        style.add_legend_below(figure, 8, handles=first.get_legend_handles_labels()[0])
     notes = {label: describe_assessed_joints(several[0]) for label, several in states.items()}
-    add_note(figure, notes)
+    style.add_note(figure, notes)
     return figure
 
 
@@ -363,7 +351,7 @@ def draw_joints(run: History, joints: Sequence[str | int] | None = None) -> Figu
     if not len(joints):
         raise InvalidInput("no joints to draw: give their names, e.g. ['main arch, joint 5']")
     selected, rows = [run.joint(joint) for joint in joints], 1 + len(joints)
-    figure = new_figure(Size.COLUMN, 0.9 + 1.15 * rows)
+    figure = style.new_figure(Size.COLUMN, 0.9 + 1.15 * rows)
     grid = figure.add_gridspec(rows, 2)
     ground = figure.add_subplot(grid[0, :])
     draw_ground(ground, run.time, run.dataset["ground"].values)
@@ -380,7 +368,7 @@ def draw_joints(run: History, joints: Sequence[str | int] | None = None) -> Figu
             axes.set_xlabel("time [s]" if row == len(selected) else "", fontsize=Size.LABEL)
             axes.tick_params(labelbottom=row == len(selected))
     figure.align_ylabels([ground, *left_panels])
-    add_note(figure, {"": describe_assessed_joints(run.joints)})
+    style.add_note(figure, {"": describe_assessed_joints(run.joints)})
     return figure
 
 
@@ -401,18 +389,20 @@ def draw_joint(runs: Mapping[str, History], joint: str | int) -> Figure:
     Raises:
         InvalidInput: a run has no such joint.
     """
-    figure = new_figure(Size.PAGE, 3.4)
+    figure = style.new_figure(Size.PAGE, 3.4)
     panels = figure.subplots(2, len(runs), sharex=True, sharey="row", squeeze=False)
     for column, (label, run) in zip(panels.T, runs.items(), strict=True):
         own = run.joint(joint)
         _draw_friction(column[0], own)
         _draw_eccentricity(column[1], own, "eccentricity M / (N h) [-]")
         column[1].set_xlabel("time [s]", fontsize=Size.LABEL)
-        set_title(column[0], f"{label}: {own['name'].values!s}")
+        style.set_title(column[0], f"{label}: {own['name'].values!s}")
         for axes in column:
             axes.set_xlim(run.time[0], run.time[-1])
             axes.label_outer()
-    add_note(figure, {label: describe_assessed_joints(run.joints) for label, run in runs.items()})
+    style.add_note(
+        figure, {label: describe_assessed_joints(run.joints) for label, run in runs.items()}
+    )
     return figure
 
 
@@ -420,32 +410,32 @@ def draw_ground(
     axes: Axes, times: Array, ground: Array, *, size: float = Size.LABEL, width: float = 0.6
 ) -> None:
     """Draw the ground acceleration (n, 2) over time, in a font size and a line width [points]."""
-    style_axes(axes, "", "ground [m/s²]", size)
+    style.style_axes(axes, "", "ground [m/s²]", size)
     axes.plot(times, ground[:, 0], color=Colour.TEXT, lw=width, label="horizontal", zorder=3)
     if ground[:, 1].any():
         axes.plot(times, ground[:, 1], color=Colour.LINES[1], lw=0.85 * width, label="vertical")
         # above the axes' right end: inside it would cover the lines
-        style: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.0, 0.95)}
-        axes.legend(ncols=2, frameon=False, fontsize=size, **style)
+        look: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.0, 0.95)}
+        axes.legend(ncols=2, frameon=False, fontsize=size, **look)
     axes.set_xlim(times[0], max(times[-1], times[0] + 1e-9))
 
 
 def _draw_eccentricity(axes: Axes, joint: xr.Dataset, label: str) -> None:
     """Draw the eccentricity of a joint between its faces."""
-    style_axes(axes, "", label)
+    style.style_axes(axes, "", label)
     hinge = Criteria.of(joint).hinge
     _draw_faces(axes, hinge)
     # above the panel: inside it would cover the line
-    style: dict[str, Any] = {"xycoords": "axes fraction", "color": Colour.HINGE}
-    style |= {"ha": "right", "va": "bottom"}
-    annotate(axes, f"hinge from |e| = {hinge:.3g}", (1.0, 1.0), (-3, 1), **style)
+    look: dict[str, Any] = {"xycoords": "axes fraction", "color": Colour.HINGE}
+    look |= {"ha": "right", "va": "bottom"}
+    style.annotate(axes, f"hinge from |e| = {hinge:.3g}", (1.0, 1.0), (-3, 1), **look)
     axes.plot(joint["time"], joint["eccentricity"], color=Colour.LINES[0], lw=0.6)
     axes.set_ylim(-0.56, 0.56)
 
 
 def _draw_friction(axes: Axes, joint: xr.Dataset) -> None:
     """Draw mobilised friction with the sign of the shear force, between its limits."""
-    style_axes(axes, "", "V / N [-]")
+    style.style_axes(axes, "", "V / N [-]")
     criteria = Criteria.of(joint)
     limit = float(criteria.coefficients(joint["friction_limit"].values))
     ratio = np.sign(joint["V"].values) * joint["friction"].values
@@ -453,9 +443,9 @@ def _draw_friction(axes: Axes, joint: xr.Dataset) -> None:
         # cohesion raises the limits above the coefficient
         limits = np.nan_to_num(sliding_limits(joint, criteria), nan=limit)
         _draw_friction_limits(axes, joint["time"].values, ratio, limits)
-        style: dict[str, Any] = {"va": "bottom", "xycoords": ("axes fraction", "data")}
-        style |= {"ha": "right", "color": Colour.SLIDING}
-        annotate(axes, f"μ = {limit:g}", (1.0, limit), (-3, 1), **style)
+        look: dict[str, Any] = {"va": "bottom", "xycoords": ("axes fraction", "data")}
+        look |= {"ha": "right", "color": Colour.SLIDING}
+        style.annotate(axes, f"μ = {limit:g}", (1.0, limit), (-3, 1), **look)
     axes.plot(joint["time"], ratio, color=Colour.LINES[0], lw=0.6)
 
 
@@ -473,9 +463,9 @@ def _draw_friction_limits(axes: Axes, times: Array, ratio: Array, limits: Array)
         beyond = np.abs(np.nan_to_num(ratio)) > top
         edge = 0.97 * top * np.sign(ratio[beyond])
         axes.scatter(times[beyond], edge, marker="d", s=6, color=Colour.HINGE, zorder=4)
-        style = {"xycoords": "axes fraction", "color": Colour.HINGE}
+        look = {"xycoords": "axes fraction", "color": Colour.HINGE}
         text = f"◆ beyond, up to {largest:.3g}"
-        annotate(axes, text, (0.0, 0.0), (3, 2), fontsize=Size.LABEL - 1.0, **style)
+        style.annotate(axes, text, (0.0, 0.0), (3, 2), fontsize=Size.LABEL - 1.0, **look)
 
 
 def _mirror_images(structure: Structure | None, numbers: Array, first: int) -> Flags:

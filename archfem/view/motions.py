@@ -15,15 +15,8 @@ from archfem.motion.record_selection import RecordSelection
 from archfem.motion.response_spectra import response_spectrum
 from archfem.motion.suite import Suite
 from archfem.units import STANDARD_GRAVITY
-from archfem.view.style import (
-    Colour,
-    Size,
-    add_legend_below,
-    annotate,
-    new_figure,
-    set_figure_title,
-    style_axes,
-)
+from archfem.view import style
+from archfem.view.style import Colour, Size
 
 # Periods at which spectra are drawn [s]
 SPECTRUM_PERIODS = np.geomspace(0.02, 3.0, 150)
@@ -40,7 +33,7 @@ def draw_motion(motion: Motion) -> Figure:
         The figure, with a column for each component.
     """
     names = motion.components
-    figure = new_figure(Size.COLUMN * (0.4 + 0.6 * len(names)), 3.4)
+    figure = style.new_figure(Size.COLUMN * (0.4 + 0.6 * len(names)), 3.4)
     axes = figure.subplots(3, len(names), sharex=True, squeeze=False)
     for column, name in zip(axes.T, names, strict=True):
         rows = (
@@ -50,10 +43,10 @@ def draw_motion(motion: Motion) -> Figure:
         )
         for axis, (values, label) in zip(column, rows, strict=True):
             _draw_history(axis, motion.times(name), values)
-            style_axes(axis, "time [s]" if axis is column[-1] else "", label)
+            style.style_axes(axis, "time [s]" if axis is column[-1] else "", label)
         if len(names) > 1:  # a single component may have any direction
             column[0].set_title(name, fontsize=Size.TITLE)
-    set_figure_title(figure, motion.name)
+    style.set_figure_title(figure, motion.name)
     return figure
 
 
@@ -107,21 +100,21 @@ def draw_accelerograms(suite: Suite) -> Figure:
     # distance of the baselines [g]: opposite peaks of neighbours do not meet
     apart = 1.6 * float(max(peaks)) or 1.0
     bases = [-apart * row for row in range(len(pairs))]
-    figure = new_figure(Size.PAGE, 1.0 + 0.55 * len(pairs))
+    figure = style.new_figure(Size.PAGE, 1.0 + 0.55 * len(pairs))
     panels = figure.subplots(1, len(names), sharex=True, sharey=True, squeeze=False)[0]
     for axes, name in zip(panels, names, strict=True):
-        style_axes(axes, "time [s]")
+        style.style_axes(axes, "time [s]")
         axes.set_title(name, fontsize=Size.LABEL)
         for base, pair in zip(bases, pairs, strict=True):
             if name in pair.components:
                 values = pair.component(name)
                 axes.plot(pair.times(name), base + values, Colour.LINES[0], lw=0.5)
-                style = {
+                look = {
                     "xycoords": ("axes fraction", "data"),
                     "fontsize": Size.NOTE,
                     "ha": "right",
                 }
-                annotate(axes, f"{np.abs(values).max():.2f} g", (1.0, base), (0, 3), **style)
+                style.annotate(axes, f"{np.abs(values).max():.2f} g", (1.0, base), (0, 3), **look)
         axes.set_yticks(bases, [pair.name for pair in pairs])
         axes.spines["left"].set_visible(False)
     panels[0].set(xlim=(0.0, None), ylim=(bases[-1] - 0.7 * apart, 0.7 * apart))
@@ -132,7 +125,7 @@ def draw_accelerograms(suite: Suite) -> Figure:
 def _set_suite_title(figure: Figure, suite: Suite) -> None:
     """Write the name of a suite, and that its motions are not yet divided by R."""
     divided = f", before division by R = {suite.reduction:g}" if suite.reduction != 1.0 else ""
-    set_figure_title(figure, f"{suite.name}{divided}")
+    style.set_figure_title(figure, f"{suite.name}{divided}")
 
 
 @validate_arguments
@@ -182,7 +175,7 @@ def draw_selection(found: RecordSelection) -> Figure:
     rule, (first, last) = found.rule, found.band
     periods = np.geomspace(0.5 * first, 1.5 * last, 120)
     spectra = found.spectra_at(periods) / STANDARD_GRAVITY
-    figure = new_figure(1.3 * Size.COLUMN, 4.2)
+    figure = style.new_figure(1.3 * Size.COLUMN, 4.2)
     axes = figure.subplots()
     shade = {"color": Colour.HINGE, "alpha": 0.06, "lw": 0.0, "zorder": 0}
     axes.axvspan(first, last, label=f"checked, {first:.3g} to {last:.3g} s", **shade)
@@ -196,11 +189,11 @@ def draw_selection(found: RecordSelection) -> Figure:
         if np.isfinite(bound):
             label = f"bound, {bound:g} times"
             axes.plot(found.periods, bound * target, Colour.HINGE, ls=":", lw=1.0, label=label)
-    style_axes(axes, "period [s]", f"spectral acceleration, {found.measure} [g]")
+    style.style_axes(axes, "period [s]", f"spectral acceleration, {found.measure} [g]")
     state = "met" if found.meets else f"missed by {found.shortfall:.2g}"
     axes.set_title(f"{rule.name}: {state}", fontsize=Size.TITLE)
     axes.set_ylim(bottom=0.0)
-    add_legend_below(figure, 3)
+    style.add_legend_below(figure, 3)
     return figure
 
 
@@ -209,8 +202,8 @@ def _draw_spectrum(axes: Axes, values: Array, index: int, name: str, *, width: f
     # colours repeat after a cycle, with other dashes; the last one, black, is that of the mean
     colours = Colour.LINES[:-1]
     cycle, place = divmod(index, len(colours))
-    style = {"color": colours[place], "ls": ("-", "--", ":", "-.")[cycle % 4], "lw": width}
-    axes.plot(SPECTRUM_PERIODS, values / STANDARD_GRAVITY, label=name, **style)
+    look = {"color": colours[place], "ls": ("-", "--", ":", "-.")[cycle % 4], "lw": width}
+    axes.plot(SPECTRUM_PERIODS, values / STANDARD_GRAVITY, label=name, **look)
 
 
 def _mark_matched_periods(axis: Axes, suite: Suite) -> None:
@@ -218,8 +211,8 @@ def _mark_matched_periods(axis: Axes, suite: Suite) -> None:
     bands = [match.band for match in suite.matches]
     if bands:
         low, high = max(low for low, _ in bands), min(high for _, high in bands)
-        style = {"color": Colour.HINGE, "alpha": 0.06, "lw": 0.0, "zorder": 0}
-        axis.axvspan(low, high, label=f"matched, {low:g} to {high:g} s", **style)
+        look = {"color": Colour.HINGE, "alpha": 0.06, "lw": 0.0, "zorder": 0}
+        axis.axvspan(low, high, label=f"matched, {low:g} to {high:g} s", **look)
 
 
 def _tabulate(spectrum: Callable[[Array], Array]) -> Array:
@@ -236,12 +229,12 @@ def _tabulate(spectrum: Callable[[Array], Array]) -> Array:
 def _add_common_legend(figure: Figure, axes: Sequence[Axes]) -> None:
     """Explain the lines below all panels; the first panel has a line of every motion."""
     handles, _ = axes[0].get_legend_handles_labels()
-    add_legend_below(figure, handles=handles)
+    style.add_legend_below(figure, handles=handles)
 
 
 def _panels(count: int) -> tuple[Figure, Sequence[Axes]]:
     """Return a figure and its panels side by side."""
-    figure = new_figure(0.75 * Size.COLUMN * max(count, 1.3), 3.4)
+    figure = style.new_figure(0.75 * Size.COLUMN * max(count, 1.3), 3.4)
     return figure, figure.subplots(1, count, squeeze=False)[0]
 
 
@@ -250,11 +243,11 @@ def _draw_history(axis: Axes, times: Array, values: Array) -> None:
     axis.plot(times, values, Colour.LINES[0], lw=0.7)
     peak = int(np.argmax(np.abs(values)))
     axis.plot(times[peak], values[peak], "o", ms=3.5, color=Colour.HINGE)
-    annotate(axis, f"{values[peak]:.3g}", (times[peak], values[peak]), (5, 0), va="center")
+    style.annotate(axis, f"{values[peak]:.3g}", (times[peak], values[peak]), (5, 0), va="center")
 
 
 def _label_panel(axis: Axes, component: str) -> None:
     """Label a panel of spectra."""
-    style_axes(axis, "period [s]", "spectral acceleration [g]")
+    style.style_axes(axis, "period [s]", "spectral acceleration [g]")
     axis.set_title(component, fontsize=Size.TITLE)
     axis.set_ylim(bottom=0.0)

@@ -11,18 +11,8 @@ from archfem._typing import Array, Metres
 from archfem._validation import validate_arguments
 from archfem.masonry.survey.drawings import Outline
 from archfem.masonry.survey.faults import CLOSED_BY_SNAP, find_faults, sketch_drawing
-from archfem.view.style import (
-    Colour,
-    Size,
-    add_legend_below,
-    add_polygons,
-    annotate,
-    new_figure,
-    set_title,
-    style_axes,
-    text_width,
-    white_halo,
-)
+from archfem.view import style
+from archfem.view.style import Colour, Size
 
 FAULT_COLOURS = {
     "overlap": Colour.HINGE,
@@ -70,15 +60,15 @@ def draw_outlines(
     extent = np.maximum(high - low, 1e-3 * max(high - low))  # polylines in x and z are flat
     scale = min(np.array([Size.PAGE - 0.8, 5.6]) / extent)  # [inch / unit]
     wide, tall = scale * (high - low) + [0.8, 1.6]
-    figure = new_figure(max(0.75 * Size.COLUMN, wide), max(0.35 * Size.COLUMN, tall))
+    figure = style.new_figure(max(0.75 * Size.COLUMN, wide), max(0.35 * Size.COLUMN, tall))
     axes = figure.add_subplot()
-    style_axes(axes, f"x [{frame.unit}]", f"y [{frame.unit}]")
+    style.style_axes(axes, f"x [{frame.unit}]", f"y [{frame.unit}]")
     axes.set_aspect("equal")
     axes.ticklabel_format(style="plain", useOffset=False)  # of a survey, to be found in a drawing
     _draw_layers(axes, closed, scale)
     for line in lines:
-        style = {"color": Colour.LOAD, "lw": 1.8, "zorder": 4}
-        axes.plot(*line.drawn.T, "o-", ms=5.0, label="not closed", **style)
+        look = {"color": Colour.LOAD, "lw": 1.8, "zorder": 4}
+        axes.plot(*line.drawn.T, "o-", ms=5.0, label="not closed", **look)
     counts = [f"{len(closed)} closed outlines"]
     found = find_faults(closed, snap, error)
     for kind, places in found.items():
@@ -87,9 +77,9 @@ def draw_outlines(
     counts += [f"{faults} fault{'s' * (faults > 1)}"] if faults else []
     counts += [f"{len(lines)} not closed"] if lines else []
     axes.autoscale_view()
-    set_title(axes, f"{Path(path).name} as read: {', '.join(counts)}")
+    style.set_title(axes, f"{Path(path).name} as read: {', '.join(counts)}")
     handles = dict(zip(*axes.get_legend_handles_labels()[::-1], strict=True))
-    add_legend_below(figure, handles=list(handles.values()))
+    style.add_legend_below(figure, handles=list(handles.values()))
     return figure
 
 
@@ -101,14 +91,16 @@ def _draw_layers(axes: Axes, closed: Sequence[Outline], scale: float) -> None:
         # the colours repeat, stronger each time
         again, colour = divmod(number, len(Colour.LINES))
         face = Colour.LINES[colour] + ("40", "80", "c0")[again % 3]
-        add_polygons(axes, own, face, label=f"layer '{layer}' ({len(own)})")
+        style.add_polygons(axes, own, face, label=f"layer '{layer}' ({len(own)})")
     for number, outline in enumerate(closed, 1):
         points = outline.drawn
         room = scale * float(np.ptp(points[:, 0]))
         names = (outline.name, outline.name.removeprefix(outline.layer).strip(), str(number))
-        text = next((t for t in names if t and text_width(len(t), Size.NOTE) < room), names[-1])
-        style = {"ha": "center", "va": "center", "zorder": 6, "path_effects": white_halo(1.5)}
-        annotate(axes, text, points.mean(axis=0), fontsize=Size.NOTE, **style)
+        text = next(
+            (t for t in names if t and style.text_width(len(t), Size.NOTE) < room), names[-1]
+        )
+        look = {"ha": "center", "va": "center", "zorder": 6, "path_effects": style.white_halo(1.5)}
+        style.annotate(axes, text, points.mean(axis=0), fontsize=Size.NOTE, **look)
 
 
 def _mark_faults(axes: Axes, faults: Sequence[Array], kind: str) -> None:
@@ -117,10 +109,12 @@ def _mark_faults(axes: Axes, faults: Sequence[Array], kind: str) -> None:
         return
     colour = FAULT_COLOURS[kind]
     if kind == CLOSED_BY_SNAP:
-        add_polygons(axes, faults, colour, edge=colour, zorder=5, label=f"{kind} ({len(faults)})")
+        style.add_polygons(
+            axes, faults, colour, edge=colour, zorder=5, label=f"{kind} ({len(faults)})"
+        )
         return
     # what is below a stone drawn twice stays visible
-    add_polygons(axes, faults, f"{colour}80", edge=colour, width=1.5, zorder=5)
+    style.add_polygons(axes, faults, f"{colour}80", edge=colour, width=1.5, zorder=5)
     places = np.array([fault.mean(axis=0) for fault in faults])
-    style = {"mfc": "none", "mec": colour, "ms": 13.0, "mew": 1.6, "ls": "", "zorder": 7}
-    axes.plot(*places.T, "o", label=f"{kind} ({len(faults)})", **style)
+    look = {"mfc": "none", "mec": colour, "ms": 13.0, "mew": 1.6, "ls": "", "zorder": 7}
+    axes.plot(*places.T, "o", label=f"{kind} ({len(faults)})", **look)

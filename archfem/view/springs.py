@@ -14,19 +14,10 @@ from archfem.joints.quadrature import JointPoints
 from archfem.models.model import Model
 from archfem.statics.equilibrium import Equilibrium
 from archfem.units import kN
+from archfem.view import style
 from archfem.view.statics import draw_block, draw_force, set_square_limits
 from archfem.view.structure import block_colours
-from archfem.view.style import (
-    Colour,
-    Size,
-    add_legend_below,
-    add_polygons,
-    drawing_scale,
-    new_figure,
-    set_title,
-    structure_figure,
-    style_length_axes,
-)
+from archfem.view.style import Colour, Size
 
 
 @validate_arguments
@@ -52,30 +43,34 @@ def draw_mesh(model: Model, block: int | str | None = None) -> Figure:
     assessed = np.flatnonzero(structure.judged)
     middle = structure.joints[assessed[len(assessed) // 2]].lower
     number = middle if block is None else structure.block_number(block)
-    wide, high = structure_figure(structure).get_size_inches()
-    figure = new_figure(wide, high + 3.2)
+    wide, high = style.structure_figure(structure).get_size_inches()
+    figure = style.new_figure(wide, high + 3.2)
     above, below = figure.subplots(2, 1, height_ratios=[high, 3.0])
     # at least 1.2 points on the page
-    gap = max(1.2 / 72.0 / drawing_scale(structure), 0.08 * float(np.median(structure.depths)))
+    gap = max(
+        1.2 / 72.0 / style.drawing_scale(structure), 0.08 * float(np.median(structure.depths))
+    )
     _draw_cells(above, model, _part_at_joints(model, gap))
     above.autoscale_view()
     count = len(model.cells.polygons)
-    set_title(above, f"{structure.name}: {count} cells, {len(points.joint)} points in joints")
+    style.set_title(above, f"{structure.name}: {count} cells, {len(points.joint)} points in joints")
     joints = [k for k, joint in enumerate(structure.joints) if number in joint.blocks]
     outline = structure.blocks[number].drawn()
     gap = 0.1 * float(np.ptp(outline, axis=0).max())
     shifts = _part_at_joints(model, gap)
     _draw_cells(below, model, shifts)
     springs = _spring_lines(model, np.flatnonzero(np.isin(points.joint, joints)), shifts)
-    style = {"colors": Colour.HINGE, "linewidths": 0.8, "zorder": 4, "gid": "springs"}
+    look = {"colors": Colour.HINGE, "linewidths": 0.8, "zorder": 4, "gid": "springs"}
     below.add_collection(
-        LineCollection(list(springs), label="spring at a point of a joint", **style)
+        LineCollection(list(springs), label="spring at a point of a joint", **look)
     )
     (left, low), (right, top) = outline.min(axis=0), outline.max(axis=0)
     margin = 0.5 * max(right - left, top - low)
     below.set(xlim=(left - 2.5 * margin, right + 2.5 * margin), ylim=(low - margin, top + margin))
-    set_title(below, f"{structure.blocks[number].name}, joints drawn open by {1e3 * gap:.0f} mm")
-    add_legend_below(figure, handles=below.get_legend_handles_labels()[0])
+    style.set_title(
+        below, f"{structure.blocks[number].name}, joints drawn open by {1e3 * gap:.0f} mm"
+    )
+    style.add_legend_below(figure, handles=below.get_legend_handles_labels()[0])
     return figure
 
 
@@ -107,14 +102,14 @@ def _part_at_joints(model: Model, gap: float) -> Array:
 
 def _draw_cells(axes: Axes, model: Model, shifts: Array) -> None:
     """Draw cells whose points are shifted (m, 2) [m], and supports."""
-    style_length_axes(axes)
+    style.style_length_axes(axes)
     cells, structure, places = model.cells, model.structure, model.cells.places + shifts
     colours = np.array(block_colours(structure))[cells.owner].tolist()
     corners = [places[polygon] for polygon in cells.polygons]
-    add_polygons(axes, corners, colours, width=0.35, zorder=2, gid="cells")
+    style.add_polygons(axes, corners, colours, width=0.35, zorder=2, gid="cells")
     fixed = [block.drawn() for block in structure.blocks if block.fixed]
-    style = {"hatch": "////", "label": "fixed support", "gid": "supports"}
-    add_polygons(axes, fixed, Colour.SUPPORT, width=0.5, **style)
+    look = {"hatch": "////", "label": "fixed support", "gid": "supports"}
+    style.add_polygons(axes, fixed, Colour.SUPPORT, width=0.5, **look)
 
 
 def _spring_places(model: Model, chosen: Numbers) -> Array:
@@ -171,7 +166,7 @@ def draw_spring_forces(dead: Equilibrium, block: int | str) -> Figure:
     largest = float(np.abs(forces[np.isin(points.joint, joints)]).max(initial=0.0))
     if largest == 0.0:
         raise InvalidInput(f"no spring at '{structure.blocks[number].name}' carries a force")
-    figure = new_figure(Size.COLUMN, 3.6 + 0.18 * len(joints))
+    figure = style.new_figure(Size.COLUMN, 3.6 + 0.18 * len(joints))
     axes = figure.add_subplot()
     drawn = [draw_block(axes, structure, number, joints)]
     # the largest force is drawn half as long as the block
@@ -189,5 +184,5 @@ def draw_spring_forces(dead: Equilibrium, block: int | str) -> Figure:
         axes.plot([], [], color=colour, lw=1.4, label=f"{joint.name}: {text}")
         drawn.append(tails)
     set_square_limits(axes, np.concatenate(drawn))
-    add_legend_below(figure, 1)
+    style.add_legend_below(figure, 1)
     return figure

@@ -22,24 +22,9 @@ from archfem.statics.free_body import FreeBody, forces_on
 from archfem.statics.modes import Modes
 from archfem.statics.pushover import Pushover
 from archfem.units import kN, mm
+from archfem.view import style
 from archfem.view.structure import DisplacedBlocks, draw_structure
-from archfem.view.style import (
-    Colour,
-    Size,
-    add_legend,
-    add_legend_below,
-    add_polygons,
-    annotate,
-    line_style,
-    new_figure,
-    outline_bounds,
-    panel_grid,
-    set_title,
-    style_axes,
-    style_length_axes,
-    text_width,
-    white_halo,
-)
+from archfem.view.style import Colour, Size
 
 # Letters of a line in the corner of a pushover's picture
 MAX_LISTED_LETTERS = 48
@@ -66,22 +51,22 @@ def draw_dead_load(dead: Equilibrium, *, criteria: Criteria | None = None) -> Fi
         f"{structure.name}: dead load, weight {structure.weight / kN:.4g} kN, "
         f"N from {_write_force(normal.min())} to {_write_force(normal.max())} kN"
     )
-    set_title(axes, title)
+    style.set_title(axes, title)
     for letter, (number, texts) in zip(ascii_lowercase, _extremes(dead).items(), strict=False):
         joint = structure.joints[number]
-        style = {"ha": "center", "va": "center", "fontweight": "bold", "zorder": 8}
+        look = {"ha": "center", "va": "center", "fontweight": "bold", "zorder": 8}
         # 9 points beyond the extrados
         offset = 9.0 * np.array(joint.tangent)
-        annotate(axes, letter, joint.ends[1], offset, fontsize=Size.TITLE, **style)
+        style.annotate(axes, letter, joint.ends[1], offset, fontsize=Size.TITLE, **look)
         # the symbol of an entry takes 0.6 inch
-        letters = int((figure.get_figwidth() - 0.6) / text_width(1))
+        letters = int((figure.get_figwidth() - 0.6) / style.text_width(1))
         label = fill(f"{joint.name}: {', '.join(texts)}", letters)
-        style = {"marker": f"${letter}$", "color": Colour.TEXT, "ms": 5, "mew": 0.4}
-        axes.plot([], [], ls="", label=label, **style)
+        look = {"marker": f"${letter}$", "color": Colour.TEXT, "ms": 5, "mew": 0.4}
+        axes.plot([], [], ls="", label=label, **look)
     # the legend is made anew: entries were added after that of the structure
     for legend in figure.legends:
         legend.remove()
-    add_legend_below(figure, 1)
+    style.add_legend_below(figure, 1)
     lines = sum(1 + text.get_text().count("\n") for text in figure.legends[0].get_texts())
     figure.set_figheight(figure.get_figheight() + 0.17 * (lines - 1))
     return figure
@@ -141,7 +126,7 @@ def mode_panels(modes: Modes, numbers: Sequence[int] | None) -> tuple[Figure, li
     if not chosen or not set(chosen) <= set(range(1, count + 1)):
         raise InvalidInput(f"modes {chosen} cannot be drawn: there are 1 to {count}")
     amplitude = ModePanel.amplitude * modes.model.structure.size
-    low, high = outline_bounds(modes.model.structure)
+    low, high = style.outline_bounds(modes.model.structure)
     low, high = low - 1.1 * amplitude, high + 1.1 * amplitude
     wide, tall = high - low
     # a few modes of a long bridge need the whole width
@@ -149,7 +134,7 @@ def mode_panels(modes: Modes, numbers: Sequence[int] | None) -> tuple[Figure, li
     rows, across = -(-len(chosen) // columns), Size.PAGE / 2.0 if columns > 1 else Size.COLUMN
     # a panel is at most 3 inches high; its title takes 0.45, the text below all panels 0.25
     up = min(across * tall / wide, 3.0) + 0.45
-    figure = new_figure(across * columns, up * rows + 0.25)
+    figure = style.new_figure(across * columns, up * rows + 0.25)
     places = figure.subplots(rows, columns, squeeze=False).ravel()
     for axes in places:
         axes.set_axis_off()
@@ -218,8 +203,8 @@ def draw_free_body(
             f"block '{body.block.name}' has {len(body.joints)} joints: forces of at most {limit} "
             "can be distinguished; choose a stone"
         )
-    rows, columns = panel_grid(2)
-    figure = new_figure(Size.PAGE, 1.1 + 2.4 * rows + 0.18 * len(body.names))
+    rows, columns = style.panel_grid(2)
+    figure = style.new_figure(Size.PAGE, 1.1 + 2.4 * rows + 0.18 * len(body.names))
     left, right = figure.subplots(rows, columns)
     colours = [Colour.LINES[k % len(Colour.LINES)] for k in range(len(body.joints))]
     colours.append(Colour.GREY)
@@ -229,7 +214,7 @@ def draw_free_body(
         Line2D([], [], color=colour, lw=2.2, label=f"{k + 1}  {text}")
         for k, (colour, text) in enumerate(zip(colours, _force_texts(body, joints), strict=True))
     ]
-    add_legend_below(figure, 1, handles=handles)
+    style.add_legend_below(figure, 1, handles=handles)
     return figure
 
 
@@ -279,20 +264,20 @@ def _draw_block_forces(
 
 def draw_block(axes: Axes, structure: Structure, number: int, joints: Sequence[int]) -> Array:
     """Draw a block between its neighbours at some joints, and return its outline (k, 2) [m]."""
-    style_length_axes(axes)
+    style.style_length_axes(axes)
     for joint in (structure.joints[k] for k in joints):
         (other,) = set(joint.blocks) - {number}
         neighbour = [structure.blocks[other].drawn()]
-        add_polygons(axes, neighbour, "none", edge=Colour.UNDEFORMED, width=0.8)
+        style.add_polygons(axes, neighbour, "none", edge=Colour.UNDEFORMED, width=0.8)
     outline = structure.blocks[number].drawn()
-    add_polygons(axes, [outline], Colour.STONE, width=1.2, zorder=2)
-    set_title(axes, structure.blocks[number].name)
+    style.add_polygons(axes, [outline], Colour.STONE, width=1.2, zorder=2)
+    style.set_title(axes, structure.blocks[number].name)
     return outline
 
 
 def _draw_force_polygon(axes: Axes, body: FreeBody, colours: list[str]) -> None:
     """Draw the forces tail to head."""
-    style_axes(axes, "horizontal force [kN]", "vertical force [kN]")
+    style.style_axes(axes, "horizontal force [kN]", "vertical force [kN]")
     axes.set_aspect("equal")
     forces = body.forces / kN
     order = np.argsort(np.arctan2(forces[:, 1], forces[:, 0]), kind="stable")
@@ -304,7 +289,7 @@ def _draw_force_polygon(axes: Axes, body: FreeBody, colours: list[str]) -> None:
         outward = np.array([y, -x])
         _number_force(axes, k, 0.5 * (tail + head), outward, colours[k])
     set_square_limits(axes, corners)
-    set_title(axes, f"closes to {body.closing_error:.0e} of the largest force")
+    style.set_title(axes, f"closes to {body.closing_error:.0e} of the largest force")
 
 
 def set_square_limits(axes: Axes, points: Array) -> None:
@@ -324,8 +309,8 @@ def draw_force(axes: Axes, tail: Array, head: Array, colour: str) -> None:
 
 def _number_force(axes: Axes, index: int, place: Array, away: Array, colour: str) -> None:
     """Write the number of a force, counted from 1, beside a place in a direction."""
-    style = {"fontsize": Size.TITLE, "ha": "center", "va": "center", "zorder": 7}
-    annotate(axes, str(index + 1), place, 9.0 * away, color=colour, **style)
+    look = {"fontsize": Size.TITLE, "ha": "center", "va": "center", "zorder": 7}
+    style.annotate(axes, str(index + 1), place, 9.0 * away, color=colour, **look)
 
 
 @validate_arguments
@@ -354,26 +339,26 @@ def draw_pushover(
     pushes = {"pushover": pushes} if isinstance(pushes, Pushover) else pushes
     if not 1 <= len(pushes) <= len(Colour.LINES):
         raise InvalidInput(f"{len(pushes)} pushovers in one picture: give 1 to {len(Colour.LINES)}")
-    axes = new_figure(Size.COLUMN, 3.8).add_subplot() if axes is None else axes
+    axes = style.new_figure(Size.COLUMN, 3.8).add_subplot() if axes is None else axes
     units = {push.curve["factor"].attrs["units"] for push in pushes.values()}
     load = "load factor λ [-]" if units == {"1"} else "work per unit of settlement [N m]"
-    style_axes(axes, "displacement [mm]", load)
+    style.style_axes(axes, "displacement [mm]", load)
     reach = max(_displacement_shown(push) for push in pushes.values())
     for number, (label, push) in enumerate(pushes.items()):
         displacement, factor = push.curve["displacement"] / mm, push.curve["factor"]
-        axes.plot(displacement, factor, label=label, **line_style(number))
+        axes.plot(displacement, factor, label=label, **style.line_style(number))
         hinges = _mark_first_hinges(axes, push, reach)
-    style = {"color": Colour.HINGE, "ms": 6.0, "mec": "white"}
-    axes.plot([], [], "o", label="first hinge of a joint", **style)
+    look = {"color": Colour.HINGE, "ms": 6.0, "mec": "white"}
+    axes.plot([], [], "o", label="first hinge of a joint", **look)
     # the list stands where no curve runs
     falls = any(p.curve["factor"][-1] < p.curve["factor"][0] for p in pushes.values())
     axes.set_xlim(0.0, reach / mm)
     if len(pushes) == 1 and hinges:
         _list_hinges(axes, hinges, at_top=falls)
     for number, (name, value) in enumerate((limits or {}).items()):
-        style = {"ls": ("--", ":", "-.")[number % 3], "color": Colour.TEXT, "lw": 1.0, "zorder": 1}
-        axes.axhline(value, label=f"{name}: {value:.4g}", **style)
-    add_legend(axes)
+        look = {"ls": ("--", ":", "-.")[number % 3], "color": Colour.TEXT, "lw": 1.0, "zorder": 1}
+        axes.axhline(value, label=f"{name}: {value:.4g}", **look)
+    style.add_legend(axes)
     return cast(Figure, axes.figure)
 
 
@@ -422,12 +407,12 @@ def _list_hinges(
     """Number the discs of a curve, and list their joints at the right, long names in the legend."""
     for first, last, place in _merge_close_discs(list(hinges), axes):
         number = f"{first}" if first == last else f"{first}–{last}"
-        annotate(axes, number, place, (4, -11), path_effects=white_halo(2.5))
+        style.annotate(axes, number, place, (4, -11), path_effects=style.white_halo(2.5))
     lines = [f"{number}  {joints}" for number, joints in enumerate(hinges.values(), start=1)]
     if len(max(lines, key=len)) > MAX_LISTED_LETTERS:
         rest = [f"… ({len(lines)} in all)"] if len(lines) > most else []
         axes.plot([], [], " ", label="\n".join([*lines[:most], *rest]))
         return
     place, alignment = ((0.97, 0.95), "top") if at_top else ((0.97, 0.05), "bottom")
-    style = {"ha": "right", "va": alignment, "multialignment": "left"}
-    annotate(axes, "\n".join(lines), place, xycoords="axes fraction", **style)
+    look = {"ha": "right", "va": alignment, "multialignment": "left"}
+    style.annotate(axes, "\n".join(lines), place, xycoords="axes fraction", **look)

@@ -23,18 +23,10 @@ from archfem.models.model import Cells, Model
 from archfem.statics.equilibrium import Equilibrium
 from archfem.statics.stress import cell_stress, corner_stress_operator, principal_values
 from archfem.units import MPa, kPa
+from archfem.view import style
 from archfem.view.joint_marks import joint_marks, model_and_coordinates
 from archfem.view.structure import draw_blocks, draw_thrust
-from archfem.view.style import (
-    CLIPPED_PERCENT,
-    Colour,
-    add_legend_below,
-    add_note,
-    add_polygons,
-    set_title,
-    structure_axes,
-    style_colour_bar,
-)
+from archfem.view.style import Colour
 
 
 class Triangles:
@@ -101,20 +93,20 @@ def draw_stress(
     stressed = np.unique(cells.block[largest > 1e-9 * largest.max()])
     blocks = _select_blocks(structure, parts, stressed)
     has_own_figure = axes is None
-    axes = structure_axes(structure, axes)
+    axes = style.structure_axes(structure, axes)
     figure = cast(Figure, axes.figure)
     draw_blocks(axes, structure)
     _shade(axes, cells, -principal_values(*corners.T)[1], blocks)
     outlines = [block.drawn() for block in structure.blocks]
-    add_polygons(axes, outlines, "none", width=0.6, zorder=3)
+    style.add_polygons(axes, outlines, "none", width=0.6, zorder=3)
     _draw_crosses(axes, cells, cell_stress(model, q), blocks)
     joints = joint_dataset(structure, model.resultants(q))
     draw_thrust(axes, joint_marks(structure, joints))
-    set_title(axes, f"{structure.name}: principal compression")
-    add_note(figure, {"": structure.assessment})
+    style.set_title(axes, f"{structure.name}: principal compression")
+    style.add_note(figure, {"": structure.assessment})
     axes.autoscale_view()
     if has_own_figure:
-        add_legend_below(figure)
+        style.add_legend_below(figure)
     return figure
 
 
@@ -139,7 +131,7 @@ def _shade(axes: Axes, cells: Cells, compression: Array, blocks: Numbers) -> Non
     shaded = np.isin(cells.owner[triangles.cell], blocks)
     x, y = triangles.corners(cells.places)[shaded].reshape(-1, 2).T
     shown = compression[np.isin(cells.block, blocks)].clip(0.0)
-    highest = max(float(np.percentile(shown, 100.0 - CLIPPED_PERCENT)), 1.0)
+    highest = max(float(np.percentile(shown, 100.0 - style.CLIPPED_PERCENT)), 1.0)
     unit, name = (MPa, "MPa") if highest >= 0.05 * MPa else (kPa, "kPa")
     # warm colours, so that the blue thrust line stands out
     colours = (Colour.STONE, "#f6d19a", "#ea9a5b", "#c9553a", "#7d1d32")
@@ -153,7 +145,7 @@ def _shade(axes: Axes, cells: Cells, compression: Array, blocks: Numbers) -> Non
     beside = axes.inset_axes((1.0 + wide, 0.0, wide, 1.0))
     extend = "max" if shown.max() > highest else "neither"
     bar = axes.figure.colorbar(painted, cax=beside, extend=extend, ticks=MaxNLocator(5))
-    style_colour_bar(bar, f"compression [{name}]")
+    style.style_colour_bar(bar, f"compression [{name}]")
 
 
 def _draw_crosses(axes: Axes, cells: Cells, stress: Array, blocks: Numbers) -> None:
@@ -182,8 +174,8 @@ def _draw_crosses(axes: Axes, cells: Cells, stress: Array, blocks: Numbers) -> N
         # shorter arms, relative to the longest, are left out
         lines = ends[sign * share > 0.08]
         if len(lines):
-            style = {"colors": colour, "linewidths": 0.8, "label": name, "gid": name}
-            axes.add_collection(LineCollection(list(lines), zorder=4, **style))
+            look = {"colors": colour, "linewidths": 0.8, "label": name, "gid": name}
+            axes.add_collection(LineCollection(list(lines), zorder=4, **look))
 
 
 def _group_cells(corners: Array, centre: Array, spacing: float, size: int = 4) -> list[Numbers]:

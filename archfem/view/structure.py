@@ -26,7 +26,7 @@ from archfem.masonry.stiffness_ratio import list_stones
 from archfem.masonry.structure import Joint, Structure
 from archfem.models.model import Model
 from archfem.statics.equilibrium import Equilibrium
-from archfem.view import positions
+from archfem.view import positions, style
 from archfem.view.joint_marks import (
     Marker,
     Marks,
@@ -37,25 +37,7 @@ from archfem.view.joint_marks import (
     round_magnification,
     support_outlines,
 )
-from archfem.view.style import (
-    Colour,
-    Size,
-    add_legend,
-    add_legend_below,
-    add_note,
-    add_polygons,
-    annotate,
-    drawing_scale,
-    harpoons,
-    limit_width,
-    new_figure,
-    outline_bounds,
-    panel_grid,
-    set_title,
-    structure_axes,
-    structure_figure,
-    white_halo,
-)
+from archfem.view.style import Colour, Size
 
 Action = BodyForce | PointLoad | Settlement
 
@@ -89,14 +71,14 @@ def draw_structure(
     Raises:
         InvalidInput: `joints` has several instants, or belongs to another structure.
     """
-    axes = structure_axes(structure, axes)
+    axes = style.structure_axes(structure, axes)
     if joints is not None:
         check_instant(structure, joints)
         joints = with_failure_flags(joints, criteria)
     _draw_state(axes, structure, joints, structure.name)
     if joints is not None:
-        add_legend(axes)
-        add_note(cast(Figure, axes.figure), {"": describe_assessed_joints(joints)})
+        style.add_legend(axes)
+        style.add_note(cast(Figure, axes.figure), {"": describe_assessed_joints(joints)})
     return cast(Figure, axes.figure)
 
 
@@ -107,7 +89,7 @@ def _draw_state(axes: Axes, structure: Structure, joints: xr.Dataset | None, nam
     if joints is not None:
         draw_marks(axes, joint_marks(structure, joints))
         title += _describe_failed_joints(structure, joints)
-    set_title(axes, title)
+    style.set_title(axes, title)
     axes.autoscale_view()
 
 
@@ -181,7 +163,9 @@ def draw_backbones(
         draw_blocks(axes, structure)
         _draw_backbone(axes, structure, run.joints, dead.get(label))
         first, last = run.time[[0, -1]]
-        set_title(axes, f"{label or structure.name}: thrust lines from {first:.4g} to {last:.4g} s")
+        style.set_title(
+            axes, f"{label or structure.name}: thrust lines from {first:.4g} to {last:.4g} s"
+        )
         axes.autoscale_view()
     _explain_panels(figure, {label: run.joints for label, run in runs.items()})
     return figure
@@ -200,12 +184,12 @@ def _draw_backbone(
     ends = [np.where(turned[:, None], a[second], b[second]) for a, b in ((low, high), (high, low))]
     bands = np.stack([low[first], high[first], *ends], axis=1)
     bands = bands[np.isfinite(bands).all(axis=(1, 2))]
-    style: dict[str, Any] = {"width": 0.0, "zorder": 4, "alpha": 0.35, "gid": "band"}
-    add_polygons(axes, list(bands), Colour.THRUST, **style)
+    look: dict[str, Any] = {"width": 0.0, "zorder": 4, "alpha": 0.35, "gid": "band"}
+    style.add_polygons(axes, list(bands), Colour.THRUST, **look)
     sides = bands[:, [[0, 3], [1, 2]]].reshape(-1, 2, 2)
-    style = {"color": Colour.THRUST, "lw": 0.8, "zorder": 5}
-    style["label"] = "least and largest eccentricity"
-    axes.plot(*_join_segments(sides).T, gid="backbones", **style)
+    look = {"color": Colour.THRUST, "lw": 0.8, "zorder": 5}
+    look["label"] = "least and largest eccentricity"
+    axes.plot(*_join_segments(sides).T, gid="backbones", **look)
     hinges = [
         structure.ends[(joints["hinge"] == side).any("time").values & shown, end]
         for side, end in ((-1, 0), (1, 1))
@@ -215,18 +199,18 @@ def _draw_backbone(
     if dead is not None:
         check_instant(structure, dead)
         links = marker.points(dead["eccentricity"].values)[pairs]
-        style = {"color": Colour.TEXT, "lw": 1.0, "ls": ":", "zorder": 6, "label": "dead load"}
-        axes.plot(*_join_segments(links).T, gid="dead load", **style)
+        look = {"color": Colour.TEXT, "lw": 1.0, "ls": ":", "zorder": 6, "label": "dead load"}
+        axes.plot(*_join_segments(links).T, gid="dead load", **look)
 
 
 def _lay_out_below(structures: Sequence[Structure]) -> tuple[Figure, Sequence[Axes]]:
     """Return panels for structures, one below the other, on axes that they share."""
-    wide, high = structure_figure(structures[0]).get_size_inches()
+    wide, high = style.structure_figure(structures[0]).get_size_inches()
     # a panel among others needs less height than a figure of its own
-    figure = new_figure(wide, max(0.78 * len(structures), 1.0) * high)
+    figure = style.new_figure(wide, max(0.78 * len(structures), 1.0) * high)
     panels = figure.subplots(len(structures), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
     for axes, structure in zip(panels, structures, strict=True):
-        structure_axes(structure, axes).label_outer()
+        style.structure_axes(structure, axes).label_outer()
     return figure, panels
 
 
@@ -237,8 +221,10 @@ def _explain_panels(figure: Figure, joints: Mapping[str, xr.Dataset]) -> None:
         handles, names = axes.get_legend_handles_labels()
         marks |= dict(zip(names, handles, strict=True))
     if marks:
-        add_legend_below(figure, handles=list(marks.values()))
-    add_note(figure, {label: describe_assessed_joints(each) for label, each in joints.items()})
+        style.add_legend_below(figure, handles=list(marks.values()))
+    style.add_note(
+        figure, {label: describe_assessed_joints(each) for label, each in joints.items()}
+    )
 
 
 def title_at_instant(name: str, joints: xr.Dataset | None) -> str:
@@ -257,7 +243,7 @@ def block_colours(structure: Structure) -> list[str]:
 def draw_blocks(axes: Axes, structure: Structure) -> None:
     """Draw the undeformed blocks, supports darker, soil paler."""
     outlines = [block.drawn() for block in structure.blocks]
-    add_polygons(axes, outlines, block_colours(structure), gid="blocks")
+    style.add_polygons(axes, outlines, block_colours(structure), gid="blocks")
 
 
 class DisplacedBlocks:
@@ -270,14 +256,14 @@ class DisplacedBlocks:
         order = np.argsort(colours != Colour.SOIL, kind="stable")
         self._polygons = [np.asarray(cells.polygons[k]) for k in order]
         # cells are outlined in their own colour, which covers the seams between them
-        style = {"facecolors": colours[order], "edgecolors": "face", "linewidths": 0.3}
-        self._cells = PolyCollection([], zorder=1, gid="blocks", **style)
+        look = {"facecolors": colours[order], "edgecolors": "face", "linewidths": 0.3}
+        self._cells = PolyCollection([], zorder=1, gid="blocks", **look)
         self._rims = LineCollection([], colors=Colour.EDGE, linewidths=0.7, zorder=2)
-        style = {"colors": Colour.UNDEFORMED, "linewidths": 0.6}
-        undeformed = LineCollection(cells.places[self._edges], zorder=0, **style)
+        look = {"colors": Colour.UNDEFORMED, "linewidths": 0.6}
+        undeformed = LineCollection(cells.places[self._edges], zorder=0, **look)
         for drawing in (undeformed, self._cells, self._rims):
             axes.add_collection(drawing)
-        add_polygons(axes, support_outlines(model, magnification), Colour.SUPPORT)
+        style.add_polygons(axes, support_outlines(model, magnification), Colour.SUPPORT)
 
     def move(self, places: Array) -> None:
         """Move the points of the cells to places (m, 2) [m]."""
@@ -287,33 +273,33 @@ class DisplacedBlocks:
 
 def draw_thrust(axes: Axes, marks: Marks) -> None:
     """Draw the thrust lines, and the points at which thrust crosses joints."""
-    style: dict[str, Any] = {"color": Colour.THRUST, "zorder": 5, "ms": 2.2, "lw": 1.3}
+    look: dict[str, Any] = {"color": Colour.THRUST, "zorder": 5, "ms": 2.2, "lw": 1.3}
     # where blocks have many joints, as in a wall, there are points alone
     label = "thrust at a joint"
     if len(marks.links):
-        halo, label = {"path_effects": white_halo(2.6)}, "_points"
-        axes.plot(*_join_segments(marks.links).T, label="thrust line", gid="links", **style, **halo)
+        halo, label = {"path_effects": style.white_halo(2.6)}, "_points"
+        axes.plot(*_join_segments(marks.links).T, label="thrust line", gid="links", **look, **halo)
     if np.isfinite(marks.thrust).any():
-        axes.plot(*marks.thrust.T, "o", label=label, gid="thrust", **style)
+        axes.plot(*marks.thrust.T, "o", label=label, gid="thrust", **look)
 
 
 def draw_marks(axes: Axes, marks: Marks, when: str = "") -> None:
     """Draw thrust line, hinges, sliding and open joints; only those that occur have a label."""
     draw_thrust(axes, marks)
-    style: dict[str, Any]
+    look: dict[str, Any]
     if len(marks.hinges):
-        style = {"mfc": Colour.HINGE, "mec": "white", "mew": 0.9, "ms": 5, "zorder": 7}
-        axes.plot(*marks.hinges.T, "o", label=f"hinge{when}", gid="hinges", **style)
+        look = {"mfc": Colour.HINGE, "mec": "white", "mew": 0.9, "ms": 5, "zorder": 7}
+        axes.plot(*marks.hinges.T, "o", label=f"hinge{when}", gid="hinges", **look)
     if len(marks.slips):
-        style = {"edge": "white", "width": 0.4, "zorder": 6, "gid": "slips"}
-        add_polygons(axes, list(marks.slips), Colour.SLIDING, **style)
-        style = {"marker": harpoons(), "ms": 13.6, "mew": 0.5, "color": Colour.SLIDING}
-        axes.plot([], [], ls="", label="sliding joint", **style)
+        look = {"edge": "white", "width": 0.4, "zorder": 6, "gid": "slips"}
+        style.add_polygons(axes, list(marks.slips), Colour.SLIDING, **look)
+        look = {"marker": style.harpoons(), "ms": 13.6, "mew": 0.5, "color": Colour.SLIDING}
+        axes.plot([], [], ls="", label="sliding joint", **look)
     if len(marks.gaps):
         edge = [withStroke(linewidth=3.8, foreground=Colour.EDGE)]
-        style = {"color": "white", "lw": 2.4, "path_effects": edge, "zorder": 4, "gid": "gaps"}
+        look = {"color": "white", "lw": 2.4, "path_effects": edge, "zorder": 4, "gid": "gaps"}
         gaps = _join_segments(marks.gaps)
-        axes.plot(*gaps.T, label=f"open joint{when}", solid_capstyle="butt", **style)
+        axes.plot(*gaps.T, label=f"open joint{when}", solid_capstyle="butt", **look)
 
 
 def _join_segments(segments: Array) -> Array:
@@ -359,11 +345,11 @@ def draw_names(structure: Structure) -> Figure:
     Returns:
         The figure.
     """
-    axes = structure_axes(structure)
+    axes = style.structure_axes(structure)
     draw_blocks(axes, structure)
     shown = [joint for joint, own in zip(structure.joints, structure.judged, strict=True) if own]
-    inch = 1.0 / drawing_scale(structure)  # [m]
-    low, high = outline_bounds(structure)
+    inch = 1.0 / style.drawing_scale(structure)  # [m]
+    low, high = style.outline_bounds(structure)
     # names beside and below the blocks need at least 0.4 inch
     axes.margins(*np.maximum([0.1, 0.15], 0.4 * inch / (high - low)))
     axes.figure.set_figheight(axes.figure.get_figheight() + 0.4)
@@ -386,10 +372,10 @@ def draw_names(structure: Structure) -> Figure:
         number = structure.joints[len(structure.joints) // 2].blocks[1]
         stone = structure.blocks[number].name
         title = f"{structure.name}: numbers of stones; {sign}{number} is '{stone}'"
-    set_title(axes, title)
+    style.set_title(axes, title)
     numbers = [] if walls else list_numbers(structure)
     note = "; ".join(filter(None, [structure.assessment, *numbers]))
-    add_note(figure := cast(Figure, axes.figure), {"": note})
+    style.add_note(figure := cast(Figure, axes.figure), {"": note})
     if not walls:
         figure.draw_without_rendering()
         _keep_apart(sorted(axes.texts, key=lambda text: text.get_text() not in parts))
@@ -417,15 +403,19 @@ def _number_stones(axes: Axes, structure: Structure, part: str, inch: float, sig
         numbers, points = np.array(numbers)[room].tolist(), points[room]
     fitting = float(points.min())
     every = max(1, int(np.ceil(Size.NOTE / fitting)))
-    style: dict[str, Any] = {"ha": "center", "va": "center", "zorder": 8, "color": Colour.TEXT}
-    style["fontsize"] = Size.NOTE
+    look: dict[str, Any] = {"ha": "center", "va": "center", "zorder": 8, "color": Colour.TEXT}
+    look["fontsize"] = Size.NOTE
     for number in numbers[::every]:
-        annotate(axes, f"{sign}{number}", structure.centroids[number], (0.0, 0.0), **style)
+        style.annotate(axes, f"{sign}{number}", structure.centroids[number], (0.0, 0.0), **look)
 
 
 def _name_part(axes: Axes, joints: Sequence[Joint], inch: float, top: float) -> None:
     """Write the names of a part and of its joints, as many as fit in legible type below a top."""
-    style: dict[str, Any] = {"color": Colour.TEXT, "zorder": 8, "path_effects": white_halo(1.6)}
+    look: dict[str, Any] = {
+        "color": Colour.TEXT,
+        "zorder": 8,
+        "path_effects": style.white_halo(1.6),
+    }
     outward = -np.array([joint.tangent for joint in joints])
     # names stand upright in an opening, where they are nearer to one another than joints
     places = np.array([joint.ends[0] for joint in joints]) + Size.NOTE / 72.0 * inch * outward
@@ -440,16 +430,16 @@ def _name_part(axes: Axes, joints: Sequence[Joint], inch: float, top: float) -> 
     for joint, name, way in list(zip(joints, names, outward, strict=True))[::every]:
         # from the face to the middle of a name, of which a figure is 0.64 of its size wide
         reach = size * (0.5 + abs(way) @ [0.32 * len(name), 0.4])
-        style |= {"ha": "center", "va": "center_baseline", "fontsize": size}
-        annotate(axes, name, joint.ends[0], reach * way, **style)
+        look |= {"ha": "center", "va": "center_baseline", "fontsize": size}
+        style.annotate(axes, name, joint.ends[0], reach * way, **look)
     if not joints[0].name.startswith(f"{joints[0].part}, "):
         return
     is_ring = joints[0].role == "ring"
     corners = np.array([joint.ends for joint in joints]).reshape(-1, 2)
     above = is_ring and corners[:, 1].max() > top - 1e-6  # a deck would strike the name through
     place = corners[:, 0].mean(), corners[:, 1].max() if above else corners[:, 1].min()
-    style |= {"fontsize": Size.LABEL, "va": "bottom" if above else "top"}
-    annotate(axes, joints[0].part, place, (0.0, 2.0 if above else -1.5 * Size.LABEL), **style)
+    look |= {"fontsize": Size.LABEL, "va": "bottom" if above else "top"}
+    style.annotate(axes, joints[0].part, place, (0.0, 2.0 if above else -1.5 * Size.LABEL), **look)
 
 
 @validate_arguments
@@ -482,16 +472,16 @@ def draw_displaced(
     model, q = model_and_coordinates(model, q)
     joints = joints_of_state(model, q, joints, criteria)
     structure, cells = model.structure, model.cells
-    axes = structure_axes(structure, axes)
+    axes = style.structure_axes(structure, axes)
     places = cells.places + magnification * cells.displacement(q)
     DisplacedBlocks(axes, model, magnification).move(places)
     axes.update_datalim(places)
     shift = magnification * model.observer().joint_ends(q)
     draw_marks(axes, joint_marks(structure, joints, shift=shift))
-    add_legend(axes)
-    add_note(cast(Figure, axes.figure), {"": describe_assessed_joints(joints)})
+    style.add_legend(axes)
+    style.add_note(cast(Figure, axes.figure), {"": describe_assessed_joints(joints)})
     scale = "" if magnification == 1.0 else f", displacements × {magnification:g}"
-    set_title(axes, title_at_instant(structure.name, joints) + scale)
+    style.set_title(axes, title_at_instant(structure.name, joints) + scale)
     _clip_to_stones(axes, structure, places, cells.block)
     return cast(Figure, axes.figure)
 
@@ -500,7 +490,7 @@ def _clip_to_stones(axes: Axes, structure: Structure, places: Array, block: Arra
     """Fit axes to a structure and its displaced stones: fill may have fallen out of sight."""
     axes.autoscale_view()
     stones = places[np.isin(block, list_stones(structure))]
-    seen, room = np.concatenate([stones, outline_bounds(structure)]), 0.1 * structure.size
+    seen, room = np.concatenate([stones, style.outline_bounds(structure)]), 0.1 * structure.size
     (left, low), (right, high) = seen.min(axis=0) - room, seen.max(axis=0) + room
     axes.set_xlim(np.clip(axes.get_xlim(), left, right))
     axes.set_ylim(np.clip(axes.get_ylim(), low, high))
@@ -511,21 +501,21 @@ def draw_critical(structure: Structure, run: History, model: Model | None = None
     joints = run.joints.sel(time=positions.decisive_instant(run), method="nearest")
     if (time := positions.peak_instant(run)) is None:
         return draw_during(structure, run, joints, model)
-    low, high = outline_bounds(structure)
+    low, high = style.outline_bounds(structure)
     # side by side, unless they would be less than half as high as wide
-    rows, columns = panel_grid(2) if 2.0 * (high - low)[1] > (high - low)[0] else (2, 1)
-    with limit_width(25.4 * Size.PAGE / columns):
-        size = structure_figure(structure).get_size_inches()
-        figure = new_figure(*size)
+    rows, columns = style.panel_grid(2) if 2.0 * (high - low)[1] > (high - low)[0] else (2, 1)
+    with style.limit_width(25.4 * Size.PAGE / columns):
+        size = style.structure_figure(structure).get_size_inches()
+        figure = style.new_figure(*size)
         figure.set_size_inches(size * [columns, rows])
         first, last = figure.subplots(rows, columns)
         for axes in (first, last):
-            structure_axes(structure, axes)
+            style.structure_axes(structure, axes)
     draw_during(structure, run, joints, model, first)
     _draw_peak(last, structure, run, run.joints.sel(time=time, method="nearest"))
     handles = {x.get_label(): x for a in (first, last) for x in a.get_legend_handles_labels()[0]}
     first.get_legend().remove()
-    add_legend_below(figure, handles=list(handles.values()))
+    style.add_legend_below(figure, handles=list(handles.values()))
     return figure
 
 
@@ -538,13 +528,13 @@ def _draw_peak(axes: Axes, structure: Structure, run: History, joints: xr.Datase
     stones = np.isin(block, list_own_stones(structure))
     by = round_magnification(float(np.abs(moved[stones]).max()) / structure.size)
     displaced = np.split(places + by * moved, np.flatnonzero(np.diff(block)) + 1)
-    add_polygons(axes, outlines, "none", edge=Colour.UNDEFORMED, width=0.6, zorder=0)
-    add_polygons(axes, displaced, block_colours(structure), gid="blocks")
+    style.add_polygons(axes, outlines, "none", edge=Colour.UNDEFORMED, width=0.6, zorder=0)
+    style.add_polygons(axes, displaced, block_colours(structure), gid="blocks")
     draw_marks(
         axes, joint_marks(structure, joints, shift=by * positions.peak_joint_ends(structure, run))
     )
     scale = "" if by == 1.0 else f", displacements × {by:g}"
-    set_title(axes, title_at_instant("largest displacement", joints) + scale)
+    style.set_title(axes, title_at_instant("largest displacement", joints) + scale)
     _clip_to_stones(axes, structure, places + by * moved, block)
 
 
@@ -590,7 +580,7 @@ def _load_arrow(structure: Structure, action: Action, length: float) -> tuple[Ar
         acceleration = np.array([action.horizontal, action.vertical])
         share = float(np.linalg.norm(acceleration))
         direction = acceleration / share
-        low, high = outline_bounds(structure)
+        low, high = style.outline_bounds(structure)
         start = np.array([0.5 * (low[0] + high[0]), high[1] + 0.08 * structure.size])
         start[0] -= 0.5 * length * direction[0]
         return start, direction, "weight" if share == 1.0 else f"{share:.3g} weight"

@@ -18,20 +18,8 @@ from archfem.dynamics.motion_scaling import CollapseScale
 from archfem.dynamics.verdict_range import VerdictRange
 from archfem.errors import InvalidInput
 from archfem.motion.hazard import MEASURES, Hazard
-from archfem.view.style import (
-    Colour,
-    Size,
-    add_legend_below,
-    annotate,
-    legend_columns,
-    new_axes,
-    new_figure,
-    panel_grid,
-    set_figure_title,
-    set_title,
-    style_axes,
-    text_width,
-)
+from archfem.view import style
+from archfem.view.style import Colour, Size
 
 # Findings of limit analyses and ratings of which codes require at least 1
 REQUIRED_FACTORS = ("factor", "without_pressure", "full_pressure", "geometric")
@@ -124,14 +112,14 @@ def draw_findings(
     names = names[: max(max_panels // len(keys), 1)]
     columns = len(keys) if len(keys) > 1 else min(len(names), 3)
     rows = -(-len(names) * len(keys) // columns)
-    figure = new_figure(max(0.6 + 2.6 * columns, Size.COLUMN), 0.9 + 1.5 * rows)
+    figure = style.new_figure(max(0.6 + 2.6 * columns, Size.COLUMN), 0.9 + 1.5 * rows)
     same: Literal["row", "none"] = "row" if len(keys) > 1 else "none"
     panels = figure.subplots(rows, columns, sharex="col", sharey=same, squeeze=False).ravel()
     for number, (axes, (name, key)) in enumerate(zip(panels, product(names, keys), strict=False)):
         is_lowest = number + columns >= len(names) * len(keys)
         axes.tick_params(labelbottom=is_lowest)
         label = "" if len(keys) > 1 and number % columns else _label_key(flat, str(name), "\n")
-        style_axes(axes, _label_key(flat, key) if is_lowest else "", label)
+        style.style_axes(axes, _label_key(flat, key) if is_lowest else "", label)
         others = [each for each in keys if each != key]
         # words first: a case says more than a number
         few = [each for each in others if frame[each].nunique() <= len(Colour.LINES)]
@@ -142,10 +130,10 @@ def draw_findings(
             axes.axhline(limits[str(name)], color=Colour.GREY, lw=0.9, ls=":")
         if number < columns and coloured is not None:
             labels = axes.get_legend_handles_labels()[1]
-            style: Any = {"fontsize": Size.LABEL, "title_fontsize": Size.LABEL, "frameon": False}
-            style |= {"ncols": legend_columns(labels, figure.get_figwidth() / columns)}
-            style |= {"title": _label_key(flat, coloured), "bbox_to_anchor": (0.5, 1.0)}
-            axes.legend(loc="lower center", **style)
+            look: Any = {"fontsize": Size.LABEL, "title_fontsize": Size.LABEL, "frameon": False}
+            look |= {"ncols": style.legend_columns(labels, figure.get_figwidth() / columns)}
+            look |= {"title": _label_key(flat, coloured), "bbox_to_anchor": (0.5, 1.0)}
+            axes.legend(loc="lower center", **look)
     for axes in panels[len(names) * len(keys) :]:
         axes.remove()
     return figure
@@ -162,13 +150,13 @@ def _draw_named_cases(
     key, *pairs = keys
     labels, columns = list(dict.fromkeys(frame[key])), min(len(names), 3)
     rows = -(-len(names) // columns)
-    longest = text_width(max(len(f"{label}") for label in labels))
+    longest = style.text_width(max(len(f"{label}") for label in labels))
     size = 0.4 + longest + 2.0 * columns, 0.3 + rows * (0.7 + 0.18 * len(labels))
-    figure = new_figure(max(size[0], Size.COLUMN), max(size[1], 1.5))
+    figure = style.new_figure(max(size[0], Size.COLUMN), max(size[1], 1.5))
     panels = figure.subplots(rows, columns, sharey=True, squeeze=False).ravel()
     frame = frame.assign(place=frame[key].map(labels.index)).replace(np.inf, np.nan)
     for axes, name in zip(panels, names, strict=False):
-        style_axes(axes, _label_key(table, str(name)))
+        style.style_axes(axes, _label_key(table, str(name)))
         if frame["place"].is_unique:
             axes.barh(frame["place"], frame[name], height=0.7, color=Colour.LINES[0])
             _hatch_falls(axes, frame[frame[name].isna()])
@@ -180,28 +168,28 @@ def _draw_named_cases(
                 axes.plot(dots[name], dots["place"], "o", ms=3.5, color=colour, **label)
             if frame[name].min() > 0.0 and frame[name].max() > WIDE_RATIO * frame[name].min():
                 axes.set_xscale("log")
-        style = {"color": Colour.GREY, "lw": 0.9}
+        look = {"color": Colour.GREY, "lw": 0.9}
         if not pairs:
-            axes.axvline(frame[name].iloc[0], ls="--", label=f"{labels[0]}, the first", **style)
+            axes.axvline(frame[name].iloc[0], ls="--", label=f"{labels[0]}, the first", **look)
         if name in limits:
-            axes.axvline(limits[name], ls=":", **style)
+            axes.axvline(limits[name], ls=":", **look)
         # those of a push are accelerations, which pass at that of the site
         if name in REQUIRED_FACTORS and "without_pressure" in table:
-            axes.axvline(1.0, label="a factor of 1", **style)
+            axes.axvline(1.0, label="a factor of 1", **look)
     panels[0].set_yticks(range(len(labels)), labels)
     panels[0].set_ylim(len(labels) - 0.5, -0.5)
     for axes in panels[len(names) :]:
         axes.remove()
-    add_legend_below(figure, handles=panels[0].get_legend_handles_labels()[0])
+    style.add_legend_below(figure, handles=panels[0].get_legend_handles_labels()[0])
     return figure
 
 
 def _hatch_falls(axes: Axes, unknown: Any) -> None:
     """Draw cases that fall, and so have no number, as hatched bars to the end of a panel."""
     falls = unknown[unknown["fall"].isin(FALLEN_STATES)] if "fall" in unknown else None
-    style = {"fc": "none", "ec": Colour.HINGE, "hatch": "////", "lw": 0.0, "label": "falls"}
+    look = {"fc": "none", "ec": Colour.HINGE, "hatch": "////", "lw": 0.0, "label": "falls"}
     if falls is not None and len(falls):
-        axes.barh(falls["place"], 1.0, height=0.7, transform=axes.get_yaxis_transform(), **style)
+        axes.barh(falls["place"], 1.0, height=0.7, transform=axes.get_yaxis_transform(), **look)
 
 
 def _label_key(table: xr.Dataset, key: str, gap: str = " ") -> str:
@@ -230,8 +218,8 @@ def _draw_over_key(
         label = None if words is None or words in colours else text
         colour = colours.setdefault(words, Colour.LINES[len(colours)])
         known = group[np.isfinite(group["value"])].sort_values(key)
-        style = {"ms": 3.5, "lw": 1.2, "color": colour, "label": label}
-        axes.plot(known[key], known["value"], "o-" if joined else "o", **style)
+        look = {"ms": 3.5, "lw": 1.2, "color": colour, "label": label}
+        axes.plot(known[key], known["value"], "o-" if joined else "o", **look)
     finite = frame["value"][np.isfinite(frame["value"])]
     if in_words and finite.min() >= 0.0:
         axes.set_ylim(0.0, 1.1 * finite.max())
@@ -260,14 +248,14 @@ def draw_study(
     scales = {definition: np.array([case[definition] for case in cases]) for definition in first}
     scales = {d: values for d, values in scales.items() if np.isfinite(values).any()}
     label = "scale of the motions at the first mechanism [-]"
-    figure, axes = new_axes(Size.PAGE, 1.9 + 0.42 * len(names), label)
+    figure, axes = style.new_axes(Size.PAGE, 1.9 + 0.42 * len(names), label)
     finite = np.concatenate([[1.0], *(each[np.isfinite(each)] for each in scales.values())])
     end = 1.3 * finite.max()
     _draw_ranges(axes, scales, end)
     for scale, text in {1.0 / reduction: f"1 / R, R = {reduction:g}", 1.0: "unscaled"}.items():
         axes.axvline(scale, color=Colour.GREY, lw=0.9, ls="--", zorder=0)
-        style: dict[str, Any] = {"xycoords": ("data", "axes fraction"), "color": Colour.EDGE}
-        annotate(axes, text, (scale, 1.0), (0, 2), ha="center", va="bottom", **style)
+        look: dict[str, Any] = {"xycoords": ("data", "axes fraction"), "color": Colour.EDGE}
+        style.annotate(axes, text, (scale, 1.0), (0, 2), ha="center", va="bottom", **look)
     axes.set_yticks(range(len(names)), names)
     axes.set_ylim(len(names) - 0.5, -0.5)
     axes.set_xscale("log")
@@ -275,14 +263,14 @@ def draw_study(
     axes.set_xticks(ticks, [f"{tick:.3g}" for tick in ticks])
     axes.set_xlim(0.85 * min(finite.min(), 1.0 / reduction), 1.06 * end)
     axes.minorticks_off()
-    style = {"color": Colour.GREY, "ms": 5, "lw": 1.4}
-    axes.plot([], [], "o-", label="median, and range of the pairs", **style)
+    look = {"color": Colour.GREY, "ms": 5, "lw": 1.4}
+    axes.plot([], [], "o-", label="median, and range of the pairs", **look)
     if any(~np.isfinite(each).all() for each in scales.values()):
-        axes.plot([], [], ">", label="above the scales tried", **style)
+        axes.plot([], [], ">", label="above the scales tried", **look)
     if title:
-        set_figure_title(figure, title)
+        style.set_figure_title(figure, title)
     head = "first mechanism: the first instant in which …"
-    add_legend_below(figure, 2, title=head, title_fontsize=Size.LABEL)
+    style.add_legend_below(figure, 2, title=head, title_fontsize=Size.LABEL)
     return figure
 
 
@@ -296,15 +284,15 @@ def _draw_ranges(axes: Axes, scales: Mapping[str, Array], end: float) -> None:
         "verified": "blocks can move (verified)",
     }
     for number, (definition, least) in enumerate(scales.items()):
-        style = {"color": Colour.LINES[number], "ms": 5}
+        look = {"color": Colour.LINES[number], "ms": 5}
         # rows of one case lie around its tick, whose distance to the next is 1
         rows = np.arange(len(least)) + 0.16 * (number - 0.5 * (len(scales) - 1))
         low, middle, high = np.quantile(least, [0.0, 0.5, 1.0], axis=1, method="nearest")
-        axes.hlines(rows, np.minimum(low, end), np.minimum(high, end), style["color"], lw=1.4)
+        axes.hlines(rows, np.minimum(low, end), np.minimum(high, end), look["color"], lw=1.4)
         known = np.isfinite(middle)
-        axes.plot([], [], "o", label=explanations.get(definition, definition), **style)
-        axes.plot(middle[known], rows[known], "o", **style)
-        axes.plot(np.full((~known).sum(), end), rows[~known], ">", **style)
+        axes.plot([], [], "o", label=explanations.get(definition, definition), **look)
+        axes.plot(middle[known], rows[known], "o", **look)
+        axes.plot(np.full((~known).sum(), end), rows[~known], ">", **look)
 
 
 def draw_ida(
@@ -330,19 +318,19 @@ def draw_ida(
     Returns:
         The figure: curves at the left, limit states at the right, with a common intensity axis.
     """
-    figure = new_figure(Size.PAGE, max(0.75 * Size.COLUMN, 3.2))
+    figure = style.new_figure(Size.PAGE, max(0.75 * Size.COLUMN, 3.2))
     left, right = figure.subplots(1, 2, sharey=True, width_ratios=(2.2, 1.0))
-    style_axes(left, demand, measure)
-    style_axes(right)
-    end, style = 0.0, {"color": Colour.GREY, "lw": 0.8}
+    style.style_axes(left, demand, measure)
+    style.style_axes(right)
+    end, look = 0.0, {"color": Colour.GREY, "lw": 0.8}
     for number, (_, intensity, demands) in enumerate(curves):
         known = np.isfinite(demands)
         x, y = np.append(0.0, demands[known]), np.append(0.0, intensity[known])
         end = max(end, x.max())
-        left.plot(x, y, marker=".", ms=3, label=None if number else "motions", **style)
+        left.plot(x, y, marker=".", ms=3, label=None if number else "motions", **look)
         if not known.all() and known.any():
             tip = 1.06 * x[-1] + 1e-12, y[-1]
-            left.annotate("", tip, (x[-1], y[-1]), arrowprops={"arrowstyle": "->"} | style)
+            left.annotate("", tip, (x[-1], y[-1]), arrowprops={"arrowstyle": "->"} | look)
     if fractiles is not None:
         names = {"16 %": ":", "50 %": "-", "84 %": "--"}
         for (name, dashes), values in zip(names.items(), fractiles[1], strict=True):
@@ -353,7 +341,7 @@ def draw_ida(
     left.legend(frameon=False, fontsize=Size.LABEL, loc="lower right")
     _draw_capacities(right, capacities)
     left.set_ylim(bottom=0.0)  # last, since it fixes the upper end as well
-    add_legend_below(figure, handles=right.get_legend_handles_labels()[0])
+    style.add_legend_below(figure, handles=right.get_legend_handles_labels()[0])
     return figure
 
 
@@ -384,9 +372,9 @@ def _explain_capacities(axes: Axes, capacities: Mapping[str, tuple[Array, Array]
         "median": (any(each.mean() > 0.5 for each in met), {"color": Colour.EDGE, "lw": 1.2}),
         "not met up to here": (any(not each.all() for each in met), {"marker": "^", "ls": ""}),
     }
-    for label, (occurs, style) in marks.items():
+    for label, (occurs, look) in marks.items():
         if occurs:
-            axes.plot([], [], label=label, **({"color": Colour.GREY, "ms": 5} | style))
+            axes.plot([], [], label=label, **({"color": Colour.GREY, "ms": 5} | look))
 
 
 @validate_arguments
@@ -402,7 +390,7 @@ def draw_ensemble(table: xr.Dataset) -> Figure:
         out.
     """
     label = "largest displacement of a corner [m]"
-    figure, axes = new_axes(Size.COLUMN, 0.75 * Size.COLUMN, "scale of the motion [-]", label)
+    figure, axes = style.new_axes(Size.COLUMN, 0.75 * Size.COLUMN, "scale of the motion [-]", label)
     rows = table[["displacement", "outcome"]].transpose("scale", ...)
     scale, shape = rows["scale"].values, (rows.sizes["scale"], -1)
     moved = rows["displacement"].values.reshape(shape)
@@ -410,9 +398,9 @@ def draw_ensemble(table: xr.Dataset) -> Figure:
     axes.plot(scale, moved, color=Colour.GREY, lw=0.6)
     for number, kind in enumerate(np.unique(outcome)):
         place, history = np.nonzero((outcome == kind) & np.isfinite(moved))
-        style = {"marker": "oxs^"[number % 4], "color": Colour.LINES[number % len(Colour.LINES)]}
+        look = {"marker": "oxs^"[number % 4], "color": Colour.LINES[number % len(Colour.LINES)]}
         name = f"{kind}: {len(place)} of {outcome.size}"
-        axes.plot(scale[place], moved[place, history], ls="", ms=4, label=name, **style)
+        axes.plot(scale[place], moved[place, history], ls="", ms=4, label=name, **look)
     if (moved > 0.0).any():
         axes.set_yscale("log")
     axes.legend(frameon=False, fontsize=Size.LABEL)
@@ -448,7 +436,7 @@ def draw_fragility(
         largest = max(curve.median for curve in named.values())
         intensity = np.linspace(0.0, 3.0 * largest, 301)[1:]
     size = Size.COLUMN, 0.7 * Size.COLUMN
-    figure, axes = new_axes(*size, measure, "probability of the limit state [-]")
+    figure, axes = style.new_axes(*size, measure, "probability of the limit state [-]")
     for (name, curve), colour in zip(named.items(), Colour.LINES, strict=False):
         if isinstance(curve, tuple):
             middle, low, high = curve
@@ -461,8 +449,8 @@ def draw_fragility(
     # one entry each for what all limit states have, in grey
     axes.fill_between([], [], color=Colour.GREY, alpha=0.3, lw=0.0, label="confidence band")
     if data:
-        style = {"color": Colour.GREY, "ms": 3.5, "mfc": "white"}
-        axes.plot([], [], "o", label="data of the fit", **style)
+        look = {"color": Colour.GREY, "ms": 3.5, "mfc": "white"}
+        axes.plot([], [], "o", label="data of the fit", **look)
     axes.set(xlim=(0.0, float(intensity.max())), ylim=(0.0, 1.0))
     axes.legend(frameon=False, fontsize=Size.LABEL, loc="lower right")
     return figure
@@ -482,17 +470,17 @@ def draw_tornado(
         The figure, with the most influential parameter at the top.
     """
     order = sorted(ranges, key=lambda name: float(np.ptp([*ranges[name], usual])))
-    figure, axes = new_axes(Size.COLUMN, 0.9 + 0.42 * len(order), quantity)
+    figure, axes = style.new_axes(Size.COLUMN, 0.9 + 0.42 * len(order), quantity)
     for row, name in enumerate(order):
         ends = zip(ranges[name], Colour.LINES, ("low", "high"), strict=False)
         # where both ends lie on one side, the nearer is drawn on top
         for value, colour, end in sorted(ends, key=lambda end: -abs(end[0] - usual)):
-            style = {"height": 0.62, "color": colour, "label": None if row else end}
-            axes.barh(row, value - usual, left=usual, **style)
+            look = {"height": 0.62, "color": colour, "label": None if row else end}
+            axes.barh(row, value - usual, left=usual, **look)
     axes.axvline(usual, color=Colour.EDGE, lw=1.0)
     axes.set_yticks(range(len(order)), order)
     axes.margins(x=0.08)
-    add_legend_below(figure, 2)
+    style.add_legend_below(figure, 2)
     return figure
 
 
@@ -509,23 +497,23 @@ def draw_collapse_risk(risk: RiskCurves) -> Figure:
     curve, hazard = risk.fragility(), risk.hazard
     word = {"pga": "PGA", "pgv": "PGV", "sa": "Sa", "sa_avg": "mean Sa"}[hazard.measure]
     label = f"{word} [{MEASURES[hazard.measure]}]"
-    rows, columns = panel_grid(3)
-    figure = new_figure(Size.PAGE, 0.4 + 2.4 * rows)
+    rows, columns = style.panel_grid(3)
+    figure = style.new_figure(Size.PAGE, 0.4 + 2.4 * rows)
     first, second, third = figure.subplots(rows, columns).ravel()
     x = np.linspace(0.0, 2.5 * curve.median, 301)[1:]
-    style_axes(first, label, "probability of a fall [-]")
+    style.style_axes(first, label, "probability of a fall [-]")
     first.fill_between(x, *curve.band(x), color=Colour.LINES[0], alpha=0.2, lw=0.0)
     first.plot(x, curve.probability(x), color=Colour.LINES[0], lw=1.8)
     first.set(xlim=(0.0, x[-1]), ylim=(0.0, 1.0))
-    style_axes(second, label, "rate of exceedance [1/year]")
+    style.style_axes(second, label, "rate of exceedance [1/year]")
     reach = np.geomspace(0.05 * curve.median, 2.5 * curve.median, 101)
     second.loglog(reach, hazard.rate_of(reach), color=Colour.LINES[1], lw=1.8)
-    style_axes(third, label, "share of the rate [-]")
+    style.style_axes(third, label, "share of the rate [-]")
     edges, shares = risk.disaggregation()
     third.bar(edges[:-1], shares, np.diff(edges), align="edge", color=Colour.LINES[2], lw=0.0)
     for axes, title in zip((first, second, third), ("fragility", "hazard", "rate"), strict=True):
-        set_title(axes, title)
-    set_figure_title(figure, risk.sentence.partition(";")[0])
+        style.set_title(axes, title)
+    style.set_figure_title(figure, risk.sentence.partition(";")[0])
     return figure
 
 
@@ -557,22 +545,22 @@ def draw_verdict_range(verdicts: VerdictRange) -> Figure:
     shares = dict(islice(shares.items(), max_panels))
     columns = min(3, len(shares), int(Size.PAGE / 1.6))
     lines = -(-len(shares) // columns)
-    figure = new_figure(Size.PAGE, 0.7 + 1.8 * lines)
+    figure = style.new_figure(Size.PAGE, 0.7 + 1.8 * lines)
     panels = figure.subplots(lines, columns, sharey=True, squeeze=False).ravel()
     for axes in panels[len(shares) :]:
         axes.set_visible(False)
     for axes, (name, share) in zip(panels, shares.items(), strict=False):
         beside = "residual\ndisplacement [mm]" if axes in panels[::columns] else ""
-        style_axes(axes, labels.get(name, name.replace("_", " ")), beside)
+        style.style_axes(axes, labels.get(name, name.replace("_", " ")), beside)
         if verdicts.is_mixed:
-            set_title(axes, f"explains {share:.0%}")
+            style.set_title(axes, f"explains {share:.0%}")
         _draw_property(axes, rows[name].values, heights, falls, parted)
         if falls.any():
             axes.axhline(top, color=Colour.GREY, lw=0.9, ls="--")
         axes.set(yscale="log", ylim=(0.7e-3 * top, 4.0 * top))
-    add_legend_below(figure, 3, handles=panels[0].get_legend_handles_labels()[0])
+    style.add_legend_below(figure, 3, handles=panels[0].get_legend_handles_labels()[0])
     shares_of = "; shares are of the variance of the outcome" * verdicts.is_mixed
-    set_figure_title(figure, verdicts.headline + shares_of)
+    style.set_figure_title(figure, verdicts.headline + shares_of)
     return figure
 
 
@@ -595,8 +583,8 @@ def _draw_property(axes: Axes, values: Array, heights: Array, falls: Flags, part
     )
     for chosen, marker, colour, label in groups:
         if chosen.any():
-            style = {"ms": 4, "alpha": 0.8, "label": label}
-            axes.plot(places[chosen], heights[chosen], marker, color=colour, **style)
+            look = {"ms": 4, "alpha": 0.8, "label": label}
+            axes.plot(places[chosen], heights[chosen], marker, color=colour, **look)
 
 
 def draw_scale(found: CollapseScale, limit: float) -> Figure:
@@ -605,7 +593,7 @@ def draw_scale(found: CollapseScale, limit: float) -> Figure:
     A run with lost blocks is drawn above all others, as the distance to the ground says nothing.
     """
     labels = "scale of the motion [-]", "residual displacement [mm]"
-    figure, axes = new_axes(Size.COLUMN, 3.0, *labels)
+    figure, axes = style.new_axes(Size.COLUMN, 3.0, *labels)
     axes.set(xscale="log", yscale="log")
     made = {**found.longer, **found.searches}
     runs = [(dt, run.scale, run.fall) for dt in made for run in made[dt].runs if run.fall]
@@ -618,8 +606,8 @@ def draw_scale(found: CollapseScale, limit: float) -> Figure:
         colour = Colour.LINES[steps.index(dt) % len(Colour.LINES)]
         axes.plot(scale, 1e3 * height, marks[fall.kind], color=colour, ms=4, alpha=0.8)
     for k, dt in enumerate(steps):
-        style = {"color": Colour.LINES[k % len(Colour.LINES)], "label": f"{1e3 * dt:g} ms"}
-        axes.plot([], [], "s", ms=4, **style)
+        look = {"color": Colour.LINES[k % len(Colour.LINES)], "label": f"{1e3 * dt:g} ms"}
+        axes.plot([], [], "s", ms=4, **look)
     for state in [state for state in marks if any(fall.kind == state for *_, fall in runs)]:
         axes.plot([], [], marks[state], color=Colour.GREY, ms=4, label=state)
     axes.axhline(1e3 * limit, color=Colour.GREY, lw=0.9, ls="--", label="limit of dislocation")
@@ -627,7 +615,7 @@ def draw_scale(found: CollapseScale, limit: float) -> Figure:
         axis.set_minor_formatter(NullFormatter())
         axis.set_major_formatter(lambda value, _: f"{value:g}")
     axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 1.5, 2.0, 3.0, 5.0, 7.0)))
-    add_legend_below(figure, 4)
+    style.add_legend_below(figure, 4)
     return figure
 
 
@@ -649,11 +637,11 @@ def draw_convergence(
         quantity, paths = quantity or paths.quantity, paths.paths
     quantity = quantity or "finding"
     wide = 0.25 * Size.COLUMN + 0.55 * Size.COLUMN * len(paths)
-    figure = new_figure(wide, 0.55 * Size.COLUMN)
+    figure = style.new_figure(wide, 0.55 * Size.COLUMN)
     panels = figure.subplots(1, len(paths), sharey=True, squeeze=False)[0]
     for axes, (name, (sizes, values, limit, error)) in zip(panels, paths.items(), strict=True):
         first = axes is panels[0]
-        style_axes(axes, f"{name}:\nsize over the finest [-]", quantity if first else "")
+        style.style_axes(axes, f"{name}:\nsize over the finest [-]", quantity if first else "")
         axes.plot(sizes, values, "o-", color=Colour.LINES[0], lw=1.4, ms=5)
         axes.errorbar(sizes[-1:], values[-1:], [error], color=Colour.LINES[1], capsize=4, lw=1.6)
         axes.plot([0.0], [limit], "D", color=Colour.LINES[2], ms=6, label="limit", clip_on=False)
@@ -678,7 +666,7 @@ def draw_accuracy(found: Accuracy) -> Figure:
         The figure.
     """
     labels = "computing time [s]", "error of the largest |e| of a joint [-]"
-    figure, axes = new_axes(7.2, 5.0, *labels)
+    figure, axes = style.new_axes(7.2, 5.0, *labels)
     axes.set(xscale="log", yscale="log")
     axes.tick_params(which="both", labelsize=Size.LABEL)
     # seconds as numbers, few enough to stay apart over three decades
@@ -696,8 +684,8 @@ def draw_accuracy(found: Accuracy) -> Figure:
     if found.choice is not None:
         chosen = found.choice
         place = (chosen.seconds, max(chosen.error, floor))
-        style = {"mfc": "none", "mec": Colour.HINGE, "mew": 1.4, "zorder": 6}
-        axes.plot(*place, "o", ms=15, label=f"chosen:\n{chosen.setting.label}", **style)
+        look = {"mfc": "none", "mec": Colour.HINGE, "mew": 1.4, "zorder": 6}
+        axes.plot(*place, "o", ms=15, label=f"chosen:\n{chosen.setting.label}", **look)
     _draw_settings(axes, found, floor)
     axes.legend(fontsize=Size.LABEL, frameon=False, loc="upper left", bbox_to_anchor=(1.0, 1.0))
     return figure
@@ -713,8 +701,8 @@ def _draw_settings(axes: Axes, found: Accuracy, floor: float) -> None:
             # other fidelities are mixed ones
             marker = shapes.get(setting.name, "*")
             colour = colours.get(str(setting.quadrature), Colour.GREY)
-            style = {"mfc": colour, "mec": "white", "mew": 0.5, "zorder": 4}
-            axes.plot(trial.seconds, max(trial.error, floor), marker, ms=6, **style)
+            look = {"mfc": colour, "mec": "white", "mew": 0.5, "zorder": 4}
+            axes.plot(trial.seconds, max(trial.error, floor), marker, ms=6, **look)
     for name in (name for name in shapes if name in {each.name for each in tried}):
         axes.plot([], [], shapes[name], color=Colour.EDGE, ms=6, label=name)
     for rule in (rule for rule in colours if rule in {each.quadrature for each in tried}):
