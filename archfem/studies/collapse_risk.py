@@ -54,7 +54,6 @@ from archfem.motion.suite import Suite
 from archfem.statics.equilibrium import Equilibrium
 from archfem.statics.fill_checks import fill_doubts
 from archfem.statics.modes import modes
-from archfem.studies import variations
 from archfem.studies.fragility import (
     Fragility,
     Rate,
@@ -64,6 +63,13 @@ from archfem.studies.fragility import (
     variance_component,
 )
 from archfem.studies.result_store import evaluate_with_progress
+from archfem.studies.variations import (
+    Variation,
+    as_falling,
+    doubt_runs,
+    draw_samples,
+    prepare_runs,
+)
 from archfem.units import STANDARD_GRAVITY
 
 # Kind of the file of all samples
@@ -108,7 +114,7 @@ USUAL_RECORD_DISPERSION = 0.3
 
 
 @dataclass(frozen=True, eq=False)
-class RiskSample(variations.Variation):
+class RiskSample(Variation):
     """One structure and record, and how its capacity is searched."""
 
     begin: float  # first scale [-]
@@ -122,7 +128,7 @@ def bracket_capacity(sample: RiskSample) -> dict[str, Any]:
     The admissible step is that which follows sliding in both; infinite if those of the runs do.
     Joints lack where the one that stands has loose blocks in strong motion.
     """
-    run = variations.prepare_runs(sample.analysis, dict(sample.changes))
+    run = prepare_runs(sample.analysis, dict(sample.changes))
     smallest, largest = admissible_range(sample.between, sample.motion)
     stands, falls, runs, states = 0.0, inf, 0, dict[float, CollapseState]()
     scale = min(max(sample.begin, smallest), largest)
@@ -217,9 +223,7 @@ def collapse_risk(  # noqa: PLR0913  (one call, one argument for each thing that
     ranges = _check_varied(vary or {})
     weights = {label: weight for label, (weight, *_) in tree.items()}
     blocks = _size_blocks(out, samples)
-    parts = [
-        variations.draw_samples(ranges, weights, len(records), *block, seed) for block in blocks
-    ]
+    parts = [draw_samples(ranges, weights, len(records), *block, seed) for block in blocks]
     draws = [row for part in parts for row in part[0]]
     labels, order = (np.concatenate([part[k] for part in parts]) for k in (1, 2))
     table = _describe_samples(ranges, draws, labels, order)
@@ -322,7 +326,7 @@ def _resolve_alternatives(
     for (label, (_, each)), weight in zip(given.items(), weights, strict=True):
         if isinstance(each, Structure) and isinstance(analysis, Analysis):
             each = replace(analysis, structure=each)
-        falling = replace(variations.as_falling(each), record=Record(whole_fall=False))
+        falling = replace(as_falling(each), record=Record(whole_fall=False))
         # a structure that does not stand is refused before any run
         tree[label] = weight / sum(weights), falling, falling.dead_load()
     return tree
@@ -640,7 +644,7 @@ class CollapseRisk(ResultDisplay):
         doubts += self._doubt_records()
         found, dt = self.dataset, self.dataset.attrs["dt"]
         steps, lacking = found["admissible_step"].values, found["lacks_joints"].values
-        doubts += variations.doubt_runs(steps.tolist(), lacking.tolist(), dt, "samples", "")
+        doubts += doubt_runs(steps.tolist(), lacking.tolist(), dt, "samples", "")
         count = len(self.dataset["sample"])
         # a twentieth of all is what the 90 % interval leaves out at each of its ends
         if count - len(self.answered) > 0.05 * count:

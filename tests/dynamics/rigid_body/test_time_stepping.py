@@ -360,7 +360,7 @@ def test_an_arch_falls_under_a_pulse_as_by_joints_of_springs(duration, least):
 @pytest.mark.parametrize("seed", range(3))
 def test_impulses_that_are_cut_short_add_no_energy(seed, monkeypatch):
     """After five sweeps of the hundreds that they take: else a run gains 1 to 3 % here."""
-    monkeypatch.setattr(simulation, "MAX_SWEEPS", 5)
+    monkeypatch.setattr(time_stepping, "MAX_SWEEPS", 5)
     monkeypatch.setattr(simulation, "FIRST_STEP_SWEEPS", 5)
     ring = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17)
     start = LooseBlocks.as_built(ring)
@@ -391,7 +391,7 @@ def test_impulses_that_are_cut_short_are_counted(monkeypatch, chords):
     settled = falling.final_frame(start, 0.1, pulse(0.7, 0.5)).settling
     assert settled.unsettled_share <= 0.02
     assert settled.sweeps >= settled.steps == 200
-    monkeypatch.setattr(simulation, "MAX_SWEEPS", 2)
+    monkeypatch.setattr(time_stepping, "MAX_SWEEPS", 2)
     cut = falling.final_frame(start, 0.1, pulse(0.7, 0.5)).settling
     assert cut.unsettled_share > 0.1
     assert cut.residual > time_stepping.SETTLED
