@@ -21,11 +21,16 @@ from archfem._validation import check_choice, validate_arguments, validate_metho
 from archfem.cases.case import Case, case_of
 from archfem.cases.motion_keys import write_motion
 from archfem.cases.run import DeadLoadResult
-from archfem.dynamics import scale_search
 from archfem.dynamics.analysis import Analysis, with_one_facet
 from archfem.dynamics.collapse_state import CollapseState, doubt_soft_blocks
 from archfem.dynamics.events import applicable_definitions
 from archfem.dynamics.history import Ending, partial_history
+from archfem.dynamics.scale_search import (
+    COLLAPSE_DEFINITION,
+    ScaledRun,
+    check_search,
+    search_scales,
+)
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.joints.criteria import assessed_joints
 from archfem.limit.mechanism_count import Mechanism, counted_mechanism
@@ -41,7 +46,7 @@ from archfem.studies.study import Study
 
 # A joint of a ring or pier hinges; four of them fail at once; the failed joints permit a motion of
 # the blocks; blocks fall, for large displacements
-LIMIT_STATES = ("first hinge", "four failures", "verified", scale_search.COLLAPSE_DEFINITION)
+LIMIT_STATES = ("first hinge", "four failures", "verified", COLLAPSE_DEFINITION)
 
 # Intensity measures, with their names on an axis
 MEASURE_LABELS = {
@@ -71,7 +76,7 @@ def search_limit_states(
 
     inputs = case.hash_inputs(presentation=False)
 
-    def run_scaled(scale: float) -> scale_search.ScaledRun:
+    def run_scaled(scale: float) -> ScaledRun:
         # kept one by one: a search that is ended loses the run that it is in
         run = compute_once(
             "runs", f"{inputs} {scale!r}", lambda: _run(result, motion.scaled(scale))
@@ -80,10 +85,10 @@ def search_limit_states(
         met = Mechanism("", "", (), None)
         reached = {limit: met if is_met else None for limit, is_met in run["reached"].items()}
         fall = CollapseState(run["fall"], None, (), nan, nan, True) if run["fall"] else None
-        return scale_search.ScaledRun(scale, reached, Ending(run["ending"]), run["outcome"], fall)
+        return ScaledRun(scale, reached, Ending(run["ending"]), run["outcome"], fall)
 
     reach = admissible_range(between, motion)
-    brackets = scale_search.search_scales(run_scaled, limits, precision, reach)
+    brackets = search_scales(run_scaled, limits, precision, reach)
     if brackets.interrupted:
         raise KeyboardInterrupt
     # Fill: up to four runs in the middle of the widest gap of the curve, unless it is narrow.
@@ -134,7 +139,7 @@ def _applicable_limits(result: DeadLoadResult, limits: Sequence[str] | None) -> 
     counts = applicable_definitions(result.case.structure, result.case.analysis.failure_criteria)
     possible = {"first hinge", "verified"}
     possible |= {"four failures"} if "any joints at once" in counts else set()
-    possible |= {scale_search.COLLAPSE_DEFINITION} if large else set()
+    possible |= {COLLAPSE_DEFINITION} if large else set()
     chosen = tuple(limit for limit in LIMIT_STATES if limit in (limits or possible))
     if impossible := [limit for limit in chosen if limit not in possible]:
         raise InvalidInput(
@@ -345,12 +350,12 @@ def ida(
     """
     for limit in limits or ():
         check_choice(limit, "limits", LIMIT_STATES)
-    scale_search.check_search(precision, between)
+    check_search(precision, between)
     options: Findings = {"limits": None if limits is None else list(limits), "precision": precision}
     options["between"] = [float(scale) for scale in between]
     case = case_of(subject)
     large = case.analysis.displacements == "large"
-    falls = large and scale_search.COLLAPSE_DEFINITION in (limits or LIMIT_STATES)
+    falls = large and COLLAPSE_DEFINITION in (limits or LIMIT_STATES)
     if falls and (coarse := with_one_facet(case.analysis)) is not case.analysis:
         facets = ("model.cells", [*coarse.cells]), ("model.cell", coarse.cell)
         case = Point.of(case, facets).case
