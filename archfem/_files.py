@@ -487,10 +487,7 @@ def _find_digests(path: Path) -> Iterator[str]:
 @contextmanager
 def replace_results(folder: Path, command: str, inputs: str) -> Iterator[Path]:
     """Yield a draft folder whose files replace those of a command when the block ends."""
-    with (
-        lock_folder(folder, WRITING_PATIENCE),
-        stage_results(folder, command, inputs) as draft,
-    ):
+    with lock_folder(folder, WRITING_PATIENCE), stage_results(folder, command, inputs) as draft:
         yield draft
 
 

@@ -46,13 +46,7 @@ from archfem.commands.cli import ExitCode
 from archfem.commands.tools import print_motions, show_both_senses
 from archfem.dynamics.history import Ending, History
 from archfem.dynamics.walls_across import check_across
-from archfem.errors import (
-    ArchfemError,
-    DidNotConverge,
-    Interrupted,
-    InvalidInput,
-    keep_warnings,
-)
+from archfem.errors import ArchfemError, DidNotConverge, Interrupted, InvalidInput, keep_warnings
 from archfem.limit.collapse import Collapse, describe_fill
 from archfem.limit.rating import Rating
 from archfem.masonry.ring_thickness import find_ring

@@ -4,11 +4,7 @@ from collections.abc import Mapping
 from functools import lru_cache
 from itertools import product
 
-from archfem.dynamics.rigid_body.rocking_body import (
-    FirstFall,
-    describe_first_fall,
-    find_first_fall,
-)
+from archfem.dynamics.rigid_body.rocking_body import FirstFall, describe_first_fall, find_first_fall
 from archfem.errors import ArchfemError, InvalidInput, logger
 from archfem.masonry.shapes.rings import columns_across
 from archfem.masonry.structure import Structure

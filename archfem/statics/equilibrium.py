@@ -36,20 +36,11 @@ from archfem.masonry.loads import BodyForce
 from archfem.masonry.parts import find_undivided
 from archfem.masonry.standing import find_bodies
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
-from archfem.masonry.structure import (
-    Joint,
-    Structure,
-    join_joint_names,
-    join_names,
-)
+from archfem.masonry.structure import Joint, Structure, join_joint_names, join_names
 from archfem.models.construction import PartialStructure
 from archfem.models.linear_blocks import LinearBlockModel
 from archfem.models.model import Doubt, Model, check_model
-from archfem.statics.fill_checks import (
-    doubt_pieces,
-    doubt_whole_fill,
-    stands_as_rigid_blocks,
-)
+from archfem.statics.fill_checks import doubt_pieces, doubt_whole_fill, stands_as_rigid_blocks
 from archfem.statics.newton import EquilibriumSolver, Newton
 from archfem.statics.relaxation import (
     MovesOn,

@@ -63,13 +63,7 @@ from archfem.studies.fragility import (
     variance_component,
 )
 from archfem.studies.result_store import evaluate_with_progress
-from archfem.studies.variations import (
-    Variation,
-    as_falling,
-    doubt_runs,
-    draw_samples,
-    prepare_runs,
-)
+from archfem.studies.variations import Variation, as_falling, doubt_runs, draw_samples, prepare_runs
 from archfem.units import STANDARD_GRAVITY
 
 # Kind of the file of all samples

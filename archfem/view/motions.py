@@ -109,11 +109,7 @@ def draw_accelerograms(suite: Suite) -> Figure:
             if name in pair.components:
                 values = pair.component(name)
                 axes.plot(pair.times(name), base + values, Colour.LINES[0], lw=0.5)
-                look = {
-                    "xycoords": ("axes fraction", "data"),
-                    "fontsize": Size.NOTE,
-                    "ha": "right",
-                }
+                look = {"xycoords": ("axes fraction", "data"), "fontsize": Size.NOTE, "ha": "right"}
                 style.annotate(axes, f"{np.abs(values).max():.2f} g", (1.0, base), (0, 3), **look)
         axes.set_yticks(bases, [pair.name for pair in pairs])
         axes.spines["left"].set_visible(False)

@@ -44,12 +44,7 @@ from archfem.masonry.materials import (
     Material,
 )
 from archfem.masonry.parts import Direction, assign_roles, find_directions
-from archfem.masonry.structure import (
-    CONTACT_TOLERANCE,
-    LARGE_STONE,
-    Structure,
-    join_names,
-)
+from archfem.masonry.structure import CONTACT_TOLERANCE, LARGE_STONE, Structure, join_names
 from archfem.masonry.survey.drawings import (
     ANNOTATIONS,
     Frame,
