@@ -50,7 +50,7 @@ from archfem.errors import ArchfemError, DidNotConverge, Interrupted, InvalidInp
 from archfem.limit.collapse import Collapse, describe_fill
 from archfem.limit.rating import Rating
 from archfem.masonry.ring_thickness import find_ring
-from archfem.masonry.structure import Structure, join_words
+from archfem.masonry.structure import join_words
 from archfem.models.model import Doubt
 from archfem.motion.motion import Motion
 from archfem.motion.suite import Suite
@@ -449,8 +449,7 @@ def compile_steps(options: argparse.Namespace) -> None:
 def print_results(case: Case, found: Iterable[Result], folder: Path) -> tuple[str, bool]:
     """Print results, write their files, and return the verdict and whether any is in doubt."""
     # `carry_out` yields dead load, pushover, suite, runs and limit analysis in this order.
-    runs, motions = dict[str, History](), dict[str, Motion]()
-    of_limit = False
+    runs, motions, of_limit = dict[str, History](), dict[str, Motion](), False
     if (survey := read_survey(case.settings, case.folder)) is not None:
         print(survey)
     with result_text.record_doubts(case.structure) as doubts:
@@ -487,16 +486,10 @@ def print_results(case: Case, found: Iterable[Result], folder: Path) -> tuple[st
     if case.suite is not None:
         _print_pairs(suite, runs, at_rest, folder)
     verdict = result_text.describe_verdicts(runs.values()) if runs else ""
-    verdict += _print_across(case.structure, motions)
-    return verdict, any([of_limit, at_rest.doubts, *(run.doubts for run in runs.values())])
-
-
-def _print_across(structure: Structure, motions: Mapping[str, Motion]) -> str:
-    """Print at which scales a wall falls across its plane; return the least below 1 in words."""
-    line, falls = check_across(structure, motions)
-    if line:
-        print(line)
-    return falls
+    across, falls = check_across(case.structure, motions)
+    if across:
+        print(across)
+    return verdict + falls, any([of_limit, at_rest.doubts, *(run.doubts for run in runs.values())])
 
 
 def _print_limit(case: Case, folder: Path, found: Collapse, text: str, *others: Any) -> None:

@@ -264,10 +264,13 @@ def _label_places(panel: PartPanel, names: Sequence[str], joints: xr.Dataset) ->
     """Label the axis of a panel that counts joints, by their names or by beds."""
     if panel.by_height:
         return
-    if panel.is_wall:
-        _label_beds(panel.axes, panel.select(joints)[1]["height"].values)
-    else:
+    if not panel.is_wall:
         _label_joints(panel.axes, names)
+        return
+    heights = panel.select(joints)[1]["height"].values
+    panel.axes.set_xlabel("height of the bed, with its joint of the largest |e| [m]")
+    shown = range(0, len(heights), -(-len(heights) // 8))  # as far as there is room
+    panel.axes.set_xticks(shown, [f"{heights[k]:.3g}" for k in shown])
 
 
 def _label_joints(axes: Axes, names: Sequence[str]) -> None:
@@ -278,13 +281,6 @@ def _label_joints(axes: Axes, names: Sequence[str]) -> None:
     labels = {float(k): name for k, name in enumerate(names)}
     axes.xaxis.set_major_locator(MaxNLocator(max(2, min(6, len(names) // 3)), integer=True))
     axes.xaxis.set_major_formatter(lambda place, _: labels.get(round(place, 6), ""))
-
-
-def _label_beds(axes: Axes, heights: Array) -> None:
-    """Write the heights of the beds of a wall, as far as there is room."""
-    axes.set_xlabel("height of the bed, with its joint of the largest |e| [m]")
-    shown = range(0, len(heights), -(-len(heights) // 8))
-    axes.set_xticks(shown, [f"{heights[k]:.3g}" for k in shown])
 
 
 def _lay_out_panels(
