@@ -502,7 +502,7 @@ def test_the_unit_of_a_drawing_is_judged_before_its_open_ends(tmp_path):
 
 
 @pytest.mark.parametrize("kind", [pytest.param("dxf", marks=pytest.mark.slow), "geojson"])
-def test_check_says_how_a_drawing_was_read(tmp_path, capsys, kind):
+def test_check_says_how_a_drawing_was_read(tmp_path, capsys, kind, undrawn):
     """Unit, the corner that snap moved by 3 mm, one outline that is ignored, least depth."""
     stones = {"ROCK": square(0, -1000, 1000), "WALL": square(0, 3, 1000), "NOTE": square(0, 9, 800)}
     if kind == "dxf":
