@@ -207,7 +207,11 @@ def _say_ratings(data: ReportData, stated: Statement) -> Iterator[str]:
     own = [row for row in stated.rows if _is_of_norm(data, row.demand)]
     others = [row for row in stated.rows if row not in own]
     for row, needed in [*((x, ", 1 is required") for x in own[:1]), *((x, "") for x in others[:1])]:
-        yield f"rating for {row.demand}: factor {row.factor}{needed}, {row.outcome}"
+        # the result has the place of the vehicle
+        passes, _, over = row.outcome.partition("; ")
+        passes = passes.partition(", with ")[0]
+        yield f"rating for {row.demand}: factor {row.factor}{needed}, {passes}"
+        yield from [over] * bool(over)
     shown, left = [*own[:1], *others[:1]], [*own[1:], *others[1:]]
     passes, fails = ([x for x in left if x.numbers["passes"] is state] for state in (True, False))
     if any(x.numbers["passes"] for x in shown):
@@ -256,7 +260,7 @@ def _say_survival(
 
 def _say_conditions(data: ReportData) -> Iterator[str]:
     """Yield rules that the motions miss, how often it falls otherwise, and what decides."""
-    if missed := join_words([check.rule for check in find_missed(data)]):
+    if missed := join_words([x.rule.partition(",")[0] for x in find_missed(data)]):
         yield f"the motions do not meet {data.case.report['norm']} by their {missed}"
     ranges = sorted(data.verdict_ranges, key=lambda x: (x.falls.sum(), x.dislocated.sum()))
     for found in ranges[-1:]:

@@ -45,11 +45,6 @@ def _list_unscaled(data: ReportData) -> dict[str, tuple[str, float]]:
     return {name: (_FAILURES[x.verdict.outcome], peak_of_ground(x)) for name, x in failed.items()}
 
 
-def _say_state(state: str, stones: str) -> str:
-    """Return a state in words, with the stones that are dislocated."""
-    return f"{_STATES[state][0]}{stones * (state == COLLAPSE_STATES[1])}"
-
-
 def find_first_failures(data: ReportData) -> Iterator[str]:
     """Yield each first failure over all motions."""
     # without a scale that holds, a fill bears tension at all of them
@@ -116,13 +111,12 @@ def describe_scales(data: ReportData) -> Iterator[tuple[float, list[str]]]:
     words += ", which it fails" * (met <= 1.0)
     words += f", of {len(made)} motions" * (len(made) > 1)
     less = {"moves": " or less" * first.moves_in_all}
-    words_of = {x: _say_state(x, first.dislocated_stones) for x in states}
-    ends = [f"{words_of[x]} at {scale:#.3g} ×{less.get(x, '')}" for x, scale in states.items()]
+    ends = [f"{_STATES[x][0]} at {scale:#.3g} ×{less.get(x, '')}" for x, scale in states.items()]
     if not {"falls", "mechanism"} & states.keys():
         ends += ["falls at none"]
-    elif first.again:  # a crossing is not claimed
-        ends += [say_again(first.again)]
     first_at = f"of the scales that were run it first {join_words(ends)}"
+    if first.again and {"falls", "mechanism"} & states.keys():  # a crossing is not claimed
+        first_at += f"; it {say_again(first.again)}"
     texts = [words, first_at, *_say_as_one(searches)]
     # a search without a scale that holds may have the least of all
     if none := [f"'{each.motion}'" for each in searches if not each.held]:
