@@ -875,8 +875,8 @@ def test_a_demand_that_overturns_it_across_its_plane_is_in_the_conclusion(ag, ov
     words = f"it was not checked, where it may overturn from {push:.3g} g on"
     words += f" (demand {1.2 * ag:.3g} g)."
     assert words in head_of(conclusion.list_facts(data))
-    (row,) = (row for name, row in conclusion._capacity_rows(data) if not name)
-    assert (row.demand, row.factor) == (f"{1.2 * ag:.3g} g", f"{push / (1.2 * ag):.3g}")
+    # head and paragraph state it, and no row repeats it
+    assert all(name for name, _ in conclusion._capacity_rows(data))
     shaken = data_of(case, a=verdict_of())
     verdict = head_of(conclusion.list_facts(shaken))
     assert verdict.startswith(f"Across the plane of the drawing {words} Under its") is overturns

@@ -595,10 +595,6 @@ def _capacity_rows(data: ReportData) -> Iterator[tuple[str, Row]]:
         falls = describe_first_fall(first, data.motions[name].pga)
         outcome = f"as one rigid body it {falls}, held by nothing else"
         yield "", Row(f"across the plane, {key}", demand, outcome, factor, {})
-    overturns, site = _find_unchecked_push(data) or (np.nan, 0.0)
-    if overturns > 0.0 and site > 0.0:
-        outcome = f"not checked; held by nothing else it may overturn from {overturns:.3g} g on"
-        yield "", Row("across the plane", f"{site:.3g} g", outcome, f"{overturns / site:.3g}", {})
     for result, statement in data.statements.items():
         of = f" of {name_spectrum(data)}" if result == "assessment" else ""
         for row in sorted(statement.rows, key=lambda x: not _is_of_norm(data, x.demand)):
