@@ -51,17 +51,11 @@ def describe_depths(structure: Structure) -> str:
     )
 
 
-def _has_bond(structure: Structure) -> bool:
-    """Return whether stones are in bond, and not pieces of fill alone."""
-    pairs = structure.pairs[structure.heads]
-    return any(not structure.blocks[number].grain for number in pairs.ravel())
-
-
 def _name_slivers(structure: Structure) -> str:
     """Return lines on stones of a wall in bond that are far shorter or less high than most."""
     bodies, lines = find_bodies(structure), ""
     stones = [x for x in structure.blocks if not (x.fixed or x.grain or x.name in bodies)]
-    stones = [each for each in stones if each.role != "ring"] if _has_bond(structure) else []
+    stones = [each for each in stones if each.role != "ring"] if structure.heads.any() else []
     remedies = "put jambs of openings further apart", "give nearly equal heads and sills one level"
     kinds = zip(("shorter", "less high"), (0.25, 0.5), remedies, strict=True)
     for axis, (word, share, remedy) in enumerate(kinds):
@@ -79,7 +73,7 @@ def _describe_bearing(structure: Structure) -> str:
     pairs = structure.pairs[beds]
     above = pairs[np.arange(len(beds)), structure.centroids[pairs, 1].argmax(axis=1)]
     bodies = find_bodies(structure)
-    for number in np.unique(above) if _has_bond(structure) else ():
+    for number in np.unique(above) if structure.heads.any() else ():
         block = structure.blocks[number]
         if block.grain or block.name in bodies:
             continue

@@ -468,10 +468,11 @@ class Structure(ResultDisplay):
         """Whether each joint is a head joint of a wall (n_joints,).
 
         That is a joint nearer to the vertical than to the horizontal, between two stones of one
-        part that is no ring. Both stones have bed joints.
+        part that is no ring, and no fill in pieces. Both stones have bed joints.
         """
         steep = np.abs(self.normals[:, 0]) > np.abs(self.normals[:, 1])
-        bedded = {k for pair in self.pairs[~steep].tolist() for k in pair} & set(self.free)
+        stones = {number for number in self.free if not self.blocks[number].grain}
+        bedded = {k for pair in self.pairs[~steep].tolist() for k in pair} & stones
         parts = [block.part for block in self.blocks]
         inner = [
             joint.role != "ring" and bedded >= {a, b} and parts[a] == parts[b]

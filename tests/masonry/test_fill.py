@@ -10,6 +10,7 @@ from backfilled import arch_bridge
 
 import archfem as af
 from archfem.cases.structure_text import describe_depths
+from archfem.dynamics.walls_across import find_falls_across
 from archfem.masonry import BACKFILL, SOIL_TO_STONE, jointed_fill
 from archfem.masonry.backfill import _incentre, _merge_slivers, _Piece, _tile_box
 from archfem.masonry.stiffness_ratio import find_soft_blocks, find_yielding_blocks
@@ -411,3 +412,15 @@ def test_joints_to_stone_are_in_series_with_the_fill_beside_them():
         law = joint.contact
         assert 1.0 / law.normal_stiffness == pytest.approx(1.0 / 0.3e9 + soil)
         assert 1.0 / law.shear_stiffness == pytest.approx(1.0 / 0.12e9 + soil)
+
+
+def test_steep_joints_of_pieces_are_no_head_joints_of_a_wall():
+    """So no run checks the bridge across its plane as a wall in bond."""
+    cut = jointed_fill(arch_bridge(), 0.8, friction_angle=35.0)
+    steep = np.abs(cut.normals[:, 0]) > np.abs(cut.normals[:, 1])
+    inner = np.array([len({cut.blocks[k].part for k in pair}) == 1 for pair in cut.pairs])
+    fill = np.array([cut.blocks[k].grain for k in cut.pairs[:, 0]])
+    assert (steep & inner & fill).sum() > 10
+    assert not cut.heads.any()
+    assert "head joint" not in cut.assessment
+    assert find_falls_across(cut, {}) == {}
