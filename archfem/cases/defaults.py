@@ -99,7 +99,10 @@ def list_fill_values(case: Case) -> Iterator[tuple[str, str, bool]]:
         # an assessment may have the fill of the limit analysis
         if (given := case.settings.get(section, {}).get("fill")) is None:
             continue
+        replaced = {"backing": "backing_height", "backing_height": "backing"}
         for key, unit in {"law": "", **declared_keys(type(fill))}.items():
+            if replaced.get(key) in given:
+                continue
             value = getattr(fill, key, given.get("law", "pressure"))  # the law is a class
             number = isinstance(value, float)
             text = f"{value:.3g} {unit}".removesuffix(" 1") if number else str(value).lower()

@@ -14,6 +14,7 @@ from archfem.cases.defaults import (
     explain_defaults,
     list_default_keys,
     list_defaults,
+    list_fill_values,
 )
 from archfem.cases.report.sections import _describe_extent
 from archfem.cases.result_text import describe_dead_load
@@ -267,3 +268,11 @@ def test_courses_of_other_weights_state_equal_defaults_once(tmp_path):
     assert describe_defaults(case).startswith(f"defaults, where the case gives no value: {values}")
     assert describe_defaults(case).count("E 30 GPa") == 1
     assert "stand" not in _describe_extent(case.structure)
+
+
+@pytest.mark.parametrize("key", ["backing", "backing_height"])
+def test_a_given_backing_has_no_default_of_the_other_key(key):
+    limit = {"horizontal": 1.0, "fill": {"friction_angle": 30.0, key: 0.5}}
+    listed = [*list_fill_values(af.Case.of({**BARE, "limit": limit}))]
+    backings = {"limit.fill.backing", "limit.fill.backing_height"}
+    assert [row for row in listed if row[0] in backings] == [(f"limit.fill.{key}", "0.5 m", True)]
