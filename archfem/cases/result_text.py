@@ -26,7 +26,7 @@ from archfem.cases.run import DeadLoadResult
 from archfem.dynamics.accuracy import Accuracy
 from archfem.dynamics.collapse_state import FALLEN_STATES
 from archfem.dynamics.history import Ending, History
-from archfem.dynamics.verdict import ALL_DEFINITIONS, Verdict
+from archfem.dynamics.verdict import ALL_DEFINITIONS, Verdict, find_farthest
 from archfem.errors import filter_log
 from archfem.joints.criteria import assessed_joints, envelope, first_time, longest_duration
 from archfem.limit.collapse import Collapse, Outcome, describe_fill
@@ -205,8 +205,14 @@ def count_outcomes(verdicts: Sequence[Verdict]) -> str:
 
 
 def describe_pairs(runs: Mapping[str, History]) -> str:
-    """Describe the runs of a suite: table, joints that are not assessed, and runs in doubt."""
+    """Describe a suite: table, largest displacement of bodies on it, joints, and runs in doubt."""
     lines = ["displacements are of each motion as it is, and were not varied"]
+    moved = [
+        (size, f"{words}, under '{name}'")
+        for name, run in runs.items()
+        for size, words in find_farthest(run.dataset, run.structure)[1]
+    ]
+    lines += [max(moved)[1]] if moved else []
     lines += dict.fromkeys(run.verdict.assessed for run in runs.values())
     if doubtful := [name for name, run in runs.items() if run.doubts]:
         lines.append(f"in doubt, as their summaries say: {', '.join(doubtful)}")

@@ -315,8 +315,8 @@ def describe_failed_joints(joints: xr.Dataset) -> str:
 
 def find_farthest(
     dataset: xr.Dataset, structure: Structure | None
-) -> tuple[tuple[str, ...], list[str]]:
-    """Return the stones of the largest and last displacement, and a sentence on each body."""
+) -> tuple[tuple[str, ...], list[tuple[float, str]]]:
+    """Return the stones of the largest and last displacement, and size and words of each body's."""
     if structure is None or "largest_displacement" not in dataset or "fall_pose" in dataset:
         return (), []
     most, left = (dataset[f"{key}_displacement"].values for key in ("largest", "residual"))
@@ -324,8 +324,11 @@ def find_farthest(
     names = [structure.blocks[stones[each[stones].argmax()]].name for each in (most, left)]
     moved = {name: structure.block_number(name) for name in bodies}
     return tuple(names), [
-        f"'{name}', which stands on it, was displaced by up to {format_mm(most[number])}, "
-        f"{format_mm(left[number])} at the end"
+        (
+            float(most[number]),
+            f"'{name}', which stands on it, was displaced by up to {format_mm(most[number])}, "
+            f"{format_mm(left[number])} at the end",
+        )
         for name, number in moved.items()
     ]
 

@@ -8,7 +8,7 @@ import pytest
 from backfilled import arch_bridge, rectangle, row_of_stones
 
 import archfem as af
-from archfem.cases.result_text import note_masses
+from archfem.cases.result_text import describe_pairs, note_masses
 from archfem.cases.structure_text import describe_depths
 from archfem.limit import Fill
 from archfem.masonry import StandingBody, carrying
@@ -311,6 +311,12 @@ def test_a_body_that_slides_has_a_line_of_its_own_and_the_structure_stands():
     largest = 1e3 * run.dataset["largest_displacement"].values[at]
     said = f"'box', which stands on it, was displaced by up to {largest:.3g} mm, "
     assert said in str(run.verdict)
+    weaker = af.Analysis(loaded, fidelity="rigid", displacements="large", dt=1e-3).run(
+        motion.scaled(0.6)
+    )
+    (line,) = [x for x in describe_pairs({"a": weaker, "b": run}).splitlines() if "'box'" in x]
+    assert line.startswith(said)
+    assert line.endswith(" at the end, under 'b'")
 
 
 def test_an_axle_beyond_the_end_of_a_bridge_is_named_with_its_place():
