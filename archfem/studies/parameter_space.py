@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from copy import deepcopy
 from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import chain, product
 from math import isfinite, log2
 from pathlib import Path
@@ -267,6 +268,20 @@ def list_varied_keys(points: Iterable[StudyPoint]) -> list[str]:
     keys = {key for point in cases for key, _ in point.changes}
     keys |= {key for each in tables for key in each if any(each[key] != t.get(key) for t in tables)}
     return sorted(keys)
+
+
+def find_nearest_cases(names: Iterable[str], points: Iterable[StudyPoint]) -> dict[str, str]:
+    """Return of each named case the other one, the first of several, with the fewest other keys."""
+    named = zip(names, points, strict=True)
+    flat = {name: flatten_tables(x.settings) for name, x in named if isinstance(x, Point)}
+    tables = {name: {**flat[name], "title": ""} for name in flat}
+
+    def count(one: str, other: str) -> int:
+        keys = tables[one].keys() | tables[other].keys()
+        return sum(tables[one].get(key) != tables[other].get(key) for key in keys)
+
+    others = {name: [each for each in tables if each != name] for name in tables}
+    return {name: min(own, key=partial(count, name)) for name, own in others.items() if own}
 
 
 def list_structures(points: Iterable[StudyPoint]) -> list[str]:

@@ -4,6 +4,7 @@ All study files have the same parts: one case or several, the values that vary, 
 compute for each. `Comparison` is the study of cases under the pairs of their suites.
 """
 
+import json
 from collections.abc import Generator, Mapping, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import replace
@@ -37,6 +38,7 @@ from archfem.studies.parameter_space import (
     changes_along,
     check_points,
     describe_changes,
+    find_nearest_cases,
     group_by_model,
     list_structures,
     list_varied_keys,
@@ -227,6 +229,9 @@ class Study:
         """Attributes of the table."""
         attributes = {"title": self.title, "archfem": describe_version()}
         attributes["varied"] = "; ".join(list_varied_keys(self.points))
+        if [axis.keys[0] for axis in self.axes] == ["case"]:
+            cases = (name for name, *_ in self.axes[0].rows)
+            attributes["nearest"] = json.dumps(find_nearest_cases(cases, self.points))
         return attributes | {f"samples {key}": value for key, value in (self.samples or {}).items()}
 
     def _collect_rows(

@@ -119,13 +119,13 @@ def test_a_study_of_lengths_says_that_the_limit_of_dislocation_is_that_of_the_ca
         (
             (),
             "in the study under 'first' and 'second' none of 9 cases falls, and 'case 8' raises "
-            "the residual displacement most, from 1 mm to 9 mm",
+            "the residual displacement most, from 1 mm of 'case 0' to 9 mm",
         ),
         (
             [8],
             "in the study under 'first' and 'second' 1 of 9 cases falls: 'case 8', under 1 of 2 "
             "motions; of the others "
-            "'case 7' raises the residual displacement most, from 1 mm to 8 mm",
+            "'case 7' raises the residual displacement most, from 1 mm of 'case 0' to 8 mm",
         ),
         (
             range(1, 9),
@@ -145,7 +145,7 @@ def test_one_sentence_says_what_changes_the_answer(falls, words):
         (
             {"dislocated": [8]},
             "none of 9 cases falls; 1 is dislocated: 'case 8', under 2 of 2 motions; of the others "
-            "'case 7' raises the residual displacement most, from 1 mm to 8 mm",
+            "'case 7' raises the residual displacement most, from 1 mm of 'case 0' to 8 mm",
         ),
         (
             {"falls": [5], "dislocated": [0, 8], "failed": [7]},
@@ -212,13 +212,14 @@ def test_a_row_has_the_largest_of_each_column_and_noise_is_no_finding():
     ]
     table["largest_displacement"][3] = 0.109
     (text,) = study_findings.say_what_changes(study_findings.collect_findings("", "", table))
-    assert text.endswith(", and 'thin' raises the largest displacement most, from 80 mm to 109 mm")
+    said = ", and 'thin' raises the largest displacement most, from 80 mm of 'as is' to 109 mm"
+    assert text.endswith(said)
 
 
 def test_of_factors_the_least_is_the_worst():
     table = xr.Dataset({"factor": ("case", [0.6, 0.7, np.inf, 0.5])}, {"case": [*"abcd"]})
     (text,) = study_findings.say_what_changes(study_findings.collect_findings("", "", table))
-    assert text == "in the study 'd' lowers the factor most, from 0.6 to 0.5"
+    assert text == "in the study 'd' lowers the factor most, from 0.6 of 'a' to 0.5"
     higher = table.isel(case=[0, 1])
     (text,) = study_findings.say_what_changes(study_findings.collect_findings("", "", higher))
     assert text == "in the study none lowers the factor of 'a', 0.6"
@@ -228,7 +229,7 @@ def test_of_factors_the_least_is_the_worst():
     )
     found = study_findings.collect_findings("", "", pushed)
     assert [*study_findings.say_what_changes(found)] == [
-        "in the study 'd' lowers the push most, from 0.25 g to 0.2 g"
+        "in the study 'd' lowers the push most, from 0.25 g of 'a' to 0.2 g"
     ]
     assert [*study_findings.say_below_site(found)] == [
         "1 of 4 cases begins to move below the site's acceleration: 'd', at 0.926 of it",
@@ -290,7 +291,7 @@ def test_words_and_states_of_the_users_own_function_are_no_findings():
     assert not [*study_findings.say_what_changes(study_findings.collect_findings("", "", words))]
     other = xr.Dataset({"factor": ("case", [0.6, 0.5]), "fall": ("case", ["leans", ""])}, cases)
     (text,) = study_findings.say_what_changes(study_findings.collect_findings("", "", other))
-    assert text.endswith("'b' lowers the factor most, from 0.6 to 0.5")
+    assert text.endswith("'b' lowers the factor most, from 0.6 of 'a' to 0.5")
 
 
 def test_the_table_of_a_study_names_what_it_varies(tmp_path):
@@ -306,6 +307,29 @@ def test_the_table_of_a_study_names_what_it_varies(tmp_path):
     assert table.attrs["varied"] == "contacts.stone to stone.friction; structure.breadth"
     found = study_findings.collect_findings("", "", table)
     assert study_findings.list_studied(found) == {"lengths", "friction"}
+
+
+def test_a_case_of_several_changes_is_compared_with_the_one_that_differs_least(tmp_path):
+    """The push of a column is its breadth over its height."""
+    (tmp_path / "column.toml").write_text(
+        '[structure]\nshape = "column"\nheights = [2.0]\nbreadth = 0.5\n[limit]\nhorizontal = 1.0\n'
+    )
+    (tmp_path / "study.toml").write_text(
+        'case = "column.toml"\ncompute = "limit"\n[cases]\n"a" = {}\n'
+        '"b" = { set = ["structure.breadth=0.4"] }\n'
+        '"c" = { set = ["structure.breadth=0.4", "structure.heights=[2.5]"] }\n'
+    )
+    table = af.Study.read(tmp_path / "study.toml").run(workers=1)
+    found = study_findings.collect_findings("", "", table)
+    assert [*study_findings.say_what_changes(found)] == [
+        "in the study 'c' lowers the push most, from 0.25 g of 'a' to 0.16 g; 'b', which differs "
+        "least from it, 0.2 g"
+    ]
+    # 'b' differs least from 'a', the first
+    two = study_findings.collect_findings("", "", table.isel(case=[0, 1]))
+    assert [*study_findings.say_what_changes(two)] == [
+        "in the study 'b' lowers the push most, from 0.25 g of 'a' to 0.2 g"
+    ]
 
 
 def test_the_least_push_of_a_study_is_that_of_both_senses(tmp_path):

@@ -1,5 +1,6 @@
 """Findings of a study in a report: the worst point of each case, falls first, and what decides."""
 
+import json
 import re
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -309,7 +310,10 @@ def _compare_cases(found: StudyFindings, rows: list[Any], given: Any) -> str:
         return f"none {verb} the {words} of {found.label(first)}, {show(first)}"
     if abs(extreme[name] - first[name]) < MIN_CHANGE * abs(first[name]):
         return ""
-    change = f"from {show(first)} to {show(extreme)}"
+    change = f"from {show(first)} of {found.label(first)} to {show(extreme)}"
+    nearest = json.loads(found.table.attrs.get("nearest", "{}")).get(extreme["case"])
+    near = [row for row in rows[1:] if row["case"] == nearest]
+    change += "".join(f"; {found.label(x)}, which differs least from it, {show(x)}" for x in near)
     return f"{found.label(extreme)} {verb} the {words} most, {change}"
 
 
