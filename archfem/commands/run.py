@@ -289,7 +289,8 @@ def rate(options: argparse.Namespace) -> int:
         if sentences and len(rated) > 1:
             words = f"only {found.vehicle.name} was varied, whose factor is nearest to 1: "
             sentences.append(f"{words}others by --vehicle, each alone")
-        if any(name == "abutments free" and cell != "not computed" for name, cell in varied.rows):
+        freed = [cell for name, cell in varied.rows if name.startswith("abutments free")]
+        if freed and "not computed" not in freed:
             lines[:] = [x for x in lines if result_text.IMMOVABLE not in str(x)]
         stated = state_ratings(ratings, varied)
         lines[:0] = [*sentences, *doubts]

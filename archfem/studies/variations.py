@@ -38,7 +38,7 @@ from archfem.errors import DidNotConverge, InvalidInput, InvalidStructure, logge
 from archfem.limit.fill_strength import PlasticFill, has_backing
 from archfem.limit.rating import ASSUMED_STRENGTH, Rating, rate_again
 from archfem.masonry.joint_closing import with_finish
-from archfem.masonry.structure import Structure
+from archfem.masonry.structure import Structure, join_words
 from archfem.models.model import Doubt, write_doubts
 from archfem.motion.motion import Motion
 from archfem.statics.fill_checks import fill_doubts
@@ -49,6 +49,7 @@ from archfem.units import MPa, in_degrees, in_unit
 
 # Row of a rating with the worst value of each property
 ALL_AT_ONCE = "all unfavourable at once"
+FREE = "abutments free"
 
 # Least coefficient of friction of a variation [-]
 LEAST_FRICTION = 0.05
@@ -444,6 +445,11 @@ def vary_rating(
     order = sorted(known, key=lambda name: np.nan_to_num(known[name], nan=inf))
     rows = [[name, f"{known[name]:.4g}".replace("nan", "-")] for name in order]
     rows += [[name, "not computed"] for name in late]
+    if np.isclose(known.get(FREE, inf), found.factor, rtol=1e-3):
+        _, arguments = case.structure.origin or ("", {})
+        walls = (f"{x.height:.3g} m high on {x.length:.3g} m" for x in arguments["sidewalls"])
+        of_free = next(row for row in rows if row[0] == FREE)
+        of_free[0] += f", no change: {join_words([*dict.fromkeys(walls)])} they do not move"
     rows = [[name, "does not stand" if cell == "0" else cell] for name, cell in rows]
     name = found.vehicle.name
     words = _say_spreads(name, listed, known, len(late))
@@ -507,7 +513,7 @@ def _list_rating_changes(case: Case, found: Rating) -> Iterator[Change]:
     yield from _list_changed_lengths(case, found)
     fixed = _list_keys(case.settings["structure"], ("state",))
     if free := {path: "free" for path, state in fixed if state == "fixed"}:
-        yield "abutments", "abutments free", free
+        yield "abutments", FREE, free
     yield from _list_changed_weights(case, found)
     if np.isfinite(found.strength):
         yield (

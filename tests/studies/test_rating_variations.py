@@ -302,3 +302,26 @@ def test_a_rating_of_the_command_is_varied(tmp_path, unplotted, capsys, monkeypa
     breadth = float(re.search(r"'pier' ([\d.]+) m broad", said)[1])
     assert max(x for x in gaps if isinstance(x, float)) == pytest.approx(0.6 + 0.1 * breadth, 1e-3)
     assert {each["structure"]["paving"]["thickness"] for each in changed} == {"0.1 m"}
+
+
+@pytest.mark.parametrize(("free", "says"), [(4.001, True), (3.9, False)])
+def test_free_abutments_that_change_nothing_say_by_which_size(tmp_path, monkeypatch, free, says):
+    walls = '[structure.sidewalls]\nlength = "5.5 m"\nheight = "0.5 m"\nstate = "fixed"\n'
+    walls += 'a = {}\nb = { length = "3 m" }\n[structure.backfill]'
+    text = CASE.replace("PIER", 'breadth = "0.9 m"').replace("[structure.backfill]", walls)
+    (tmp_path / "case.toml").write_text(text)
+    case = af.Case.read(tmp_path / "case.toml")
+    given = {"factor": 4.0, "without_pressure": 3.0, "full_pressure": 5.0, "strength": np.inf}
+    words = {"vehicle": SimpleNamespace(name="cart"), "label": "cart", "crushing": {}}
+    found = SimpleNamespace(
+        structure=case.structure, fill=case.limit.fill, width=2.5, **given, **words
+    )
+
+    def rate_changed(case, found, changes, folder):
+        return {name: free if name == "abutments free" else 3.5 for name in changes}
+
+    monkeypatch.setattr(variations, "_rate_changed", rate_changed)
+    rows = vary_rating(case, case.settings["rating"], found)[0].rows
+    (row,) = [row for row in rows if row[0].startswith("abutments free")]
+    said = ", no change: 0.5 m high on 5.5 m and 0.5 m high on 3 m they do not move"
+    assert row == [f"abutments free{said * says}", f"{free:.4g}"]
