@@ -208,9 +208,9 @@ def _say_ratings(data: ReportData, stated: Statement) -> Iterator[str]:
     others = [row for row in stated.rows if row not in own]
     for row, needed in [*((x, ", 1 is required") for x in own[:1]), *((x, "") for x in others[:1])]:
         # the result has the place of the vehicle
-        passes, _, over = row.outcome.partition("; ")
-        passes = passes.partition(", with ")[0]
-        yield f"rating for {row.demand}: factor {row.factor}{needed}, {passes}"
+        outcome, _, over = row.outcome.partition("; ")
+        outcome = outcome.partition(", with ")[0]
+        yield f"rating for {row.demand}: factor {row.factor}{needed}, {outcome}"
         yield from [over] * bool(over)
     shown, left = [*own[:1], *others[:1]], [*own[1:], *others[1:]]
     passes, fails = ([x for x in left if x.numbers["passes"] is state] for state in (True, False))
