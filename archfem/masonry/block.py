@@ -64,12 +64,7 @@ def triangulate_polygon(points: Array, tolerance: float = 0.0) -> Numbers:
     import shapely
 
     outline = shapely.Polygon(points).simplify(tolerance)
-    try:
-        triangles = shapely.constrained_delaunay_triangles(outline)
-    except shapely.GEOSException as error:
-        raise InvalidStructure(
-            f"an outline of {len(points)} vertices near {points[0]} crosses itself: correct it"
-        ) from error
+    triangles = shapely.constrained_delaunay_triangles(outline)
     # a ring of a triangle repeats its first vertex
     rings = shapely.get_coordinates(shapely.orient_polygons(triangles)).reshape(-1, 4, 2)
     # the coordinates are copies: the nearest vertex gives the number

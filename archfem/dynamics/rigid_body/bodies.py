@@ -1,7 +1,8 @@
 """Rigid bodies of a structure's blocks: convex pieces, masses, friction, poses and velocities.
 
-Contact detection works on convex polygons. Outlines are cut into triangles, which are merged while
-the union is convex (Hertel and Mehlhorn 1983): at most four times the smallest number of pieces.
+Contact detection works on convex polygons. Outlines are cut into triangles by ears (Meisters,
+American Mathematical Monthly 82 (1975) 648). Triangles are merged while the union is convex (Hertel
+and Mehlhorn 1983), which gives at most four times the smallest number of pieces.
 """
 
 from collections.abc import Mapping
@@ -15,8 +16,8 @@ from numpy.typing import NDArray
 
 from archfem._typing import Array
 from archfem._validation import check_number
-from archfem.errors import InvalidInput, logger
-from archfem.masonry.block import Block, triangulate_polygon
+from archfem.errors import InvalidInput, InvalidStructure, logger
+from archfem.masonry.block import Block
 from archfem.masonry.stiffness_ratio import find_soft_blocks
 from archfem.masonry.structure import CONTACT_TOLERANCE, Structure
 
@@ -301,7 +302,7 @@ def split_convex(points: Array) -> list[Piece]:
     outline = tuple(range(len(points)))
     if _is_convex(points, outline):
         return [outline]
-    pieces: list[Piece] = [tuple(each) for each in triangulate_polygon(points).tolist()]
+    pieces = _triangulate(points)
     while (merged := _merge_two(points, pieces)) is not None:
         pieces = merged
     return pieces
@@ -318,6 +319,35 @@ def _is_convex(points: Array, piece: Piece) -> bool:
     n = len(piece)
     turns = [_signed_area(points, piece[k - 1], piece[k], piece[(k + 1) % n]) for k in range(n)]
     return min(turns) > 0.0
+
+
+def _triangulate(points: Array) -> list[Piece]:
+    """Cut an outline into triangles, one ear after another."""
+    remaining = list(range(len(points)))
+    triangles: list[Piece] = []
+    while len(remaining) > 2:
+        count = len(remaining)
+        ear = next((k for k in range(count) if _is_ear(points, remaining, k)), None)
+        if ear is None:
+            raise InvalidStructure(
+                f"an outline of {len(points)} vertices near {points[remaining[0]]} crosses itself: "
+                "correct it there"
+            )
+        triangles.append((remaining[ear - 1], remaining[ear], remaining[(ear + 1) % count]))
+        del remaining[ear]
+    return triangles
+
+
+def _is_ear(points: Array, remaining: list[int], k: int) -> bool:
+    """Return whether the triangle at a vertex is inside, with no other vertex in it."""
+    a, b, c = remaining[k - 1], remaining[k], remaining[(k + 1) % len(remaining)]
+    if _signed_area(points, a, b, c) <= 0.0:
+        return False
+    return not any(
+        min(_signed_area(points, *edge, other) for edge in ((a, b), (b, c), (c, a))) >= 0.0
+        for other in remaining
+        if other not in (a, b, c)
+    )
 
 
 def _merge_two(points: Array, pieces: list[Piece]) -> list[Piece] | None:
