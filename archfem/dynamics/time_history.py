@@ -322,7 +322,8 @@ def _run_steps(
             if not begun:
                 begun, since = monotonic(), recorder.state.time
             spent, done = monotonic() - begun, recorder.state.time - since
-            if not is_announced and spent > 5.0 and done > 0.0:
+            # first steps, whose length is sought, are no pace
+            if not is_announced and spent > 5.0 and done > 0.01 * duration:
                 is_announced = True
                 _announce_long_run(spent, done, duration)
     return Ending.FINISHED, "reached the end of the motion"

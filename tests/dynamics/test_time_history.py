@@ -226,3 +226,14 @@ def test_a_run_of_minutes_is_announced_after_five_seconds(
     af.time_history(model, af.Motion(np.zeros(4001), 0.005), dt=0.005)
     words = [r.getMessage() for r in caplog.records if "the run takes about" in r.getMessage()]
     assert len(words) == announced
+
+
+def test_the_pace_of_a_run_is_that_of_a_hundredth_of_it(stack, monkeypatch, caplog):
+    looks = iter(np.arange(0.0, 1e6, 12.0))
+    monkeypatch.setattr("archfem.dynamics.time_history.monotonic", lambda: next(looks))
+    model = af.build(stack, fidelity="rigid")
+    af.time_history(model, af.Motion(np.zeros(4001), 0.5), dt=0.02)
+    (words,) = (r for r in caplog.records if "the run takes about" in r.getMessage())
+    _, done, duration, _ = words.args
+    assert duration == 2000.0
+    assert 20.0 < done < 40.0
