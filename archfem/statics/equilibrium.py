@@ -283,13 +283,14 @@ def _describe_failure(model: Model, error: DidNotConverge, newton: Newton | None
             f"its {friction:g} for joints that deform (give more of it, or stiffer joints)"
         )
     part = _find_carried_part(model, newton)
+    ways = f"{error}; limit analysis and dynamics.RigidBlockSimulation need no stiffness"
     if part is None:
-        return f"{text}: compare with stiffer joints; {error}"
+        return f"{text}: compare with stiffer joints; {ways}"
     # rounded up to two digits
     factor = float(f"{1.05 / part:.2g}")
     least = factor * min(joint.contact.normal_stiffness for joint in model.structure.joints)
     stiff = f"it stands if they are {factor:g} times as stiff, k_n from {least:.2g} Pa/m on"
-    return f"{text}: {stiff}; {error}"
+    return f"{text}: {stiff}; {ways}"
 
 
 def _describe_moving_pieces(model: Model, newton: Newton | None) -> str:
@@ -372,7 +373,7 @@ def _load_from_rest(
     solver = _create_solver(model, newton)
     fixed = model.with_support_motion(np.zeros_like(model.support_motion))
     unloaded = Equilibrium(fixed, np.zeros(model.size), 0, 0)
-    searches = first_search, solve_irreversible, solve_irreversible
+    searches = first_search, solve_irreversible, solve_or_relax
     loaded = _increment_load(solver, unloaded, lambda part: (fixed, part * load), "load", searches)
     return _move_supports(solver, loaded, load, model.support_motion)
 
@@ -464,7 +465,9 @@ def _increment_load(
             if step >= min_load_step and not isinstance(error, NoEquilibrium):
                 continue
             raise DidNotConverge(
-                f"no equilibrium beyond {factor:.3f} of the {what}: {error}", last=state
+                f"no equilibrium beyond {factor:.3f} of the {what}, by steps of "
+                f"{min_load_step:.3f}: {error}",
+                last=state,
             ) from error
         iterations, factor = state.iterations + solution.iterations, target
         state = Equilibrium(model, solution.q, iterations, state.steps + 1)
