@@ -102,7 +102,8 @@ class Ratios(NamedTuple):
         each = "; ".join(
             f"{format_ratio(x)} {words}" for words, x in texts.items() if x is not None
         )
-        return " with e* = 1" * bool(found) + (f" ({each})" if each else "")
+        rest = " until it moves" * (self.moved is not None)
+        return " with e* = 1" * bool(found) + rest + (f" ({each})" if each else "")
 
     def __str__(self) -> str:
         """Return all ratios in words."""

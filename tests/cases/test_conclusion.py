@@ -213,8 +213,8 @@ def test_a_check_of_what_begins_to_move_is_one_of_displacements_where_it_moves(c
     vars(data)["case"] = af.Case.of({**case.settings, "assessment": SPECTRUM})
     found = state("assessment", answers.Ratios("code", ["right"], 1.1, 1.1, moved=0.842))
     expected = [
-        "the least margin is 1.1 (0.842 by displacements), on the EC8 spectrum of PGA 0.2 g, by "
-        "code, right",
+        "the least margin is 1.1 until it moves (0.842 by displacements), on the EC8 spectrum of "
+        "PGA 0.2 g, by code, right",
         "1.1 times the spectrum begins to move it",
         "if it moved, it could be displaced by 0.842 times the demand",
     ]
@@ -438,9 +438,8 @@ def test_the_answer_has_displacements_the_first_fall_and_the_checks(case):
     assert "as its ratio, 1.04, is" in verdict
     data.statements["assessment"] = state("assessment", ratios)._replace(doubts=[bound])
     said = " ".join(say_margin(data, assessment=data.statements["assessment"]))
-    assert (
-        "the least margin is 1.04 (0.842 by displacements; 1.1 with the weights apart), on" in said
-    )
+    ratios = "1.04 until it moves (0.842 by displacements; 1.1 with the weights apart)"
+    assert f"the least margin is {ratios}, on" in said
     assert "by damage, right, an upper bound 1.04 times the spectrum" in said
     assert "is an upper bound. The runs do not decide, for 3 at least are needed." in verdict
 
@@ -589,7 +588,9 @@ def test_rewording_a_sentence_changes_no_number_of_the_report(case):
     ):
         for name, each in found.items():
             rows = [
-                row._replace(demand=words, outcome=words, factor="9 (8 by displacements)")
+                row._replace(
+                    demand=words, outcome=words, factor="9 until it moves (8 by displacements)"
+                )
                 for row in each.rows
             ]
             data.statements[name] = answers.Statement([words], rows)

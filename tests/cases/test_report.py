@@ -294,7 +294,8 @@ def test_a_check_that_passes_at_rest_says_so():
     found = SimpleNamespace(checks=[resting], direction=1.0, notes=(), doubts=())
     (row,) = answers.state_assessments({"right": found}, []).rows
     outcome = "0.11 m, passes, for the mechanism does not begin to move"
-    assert row[:4] == ("assessment: a code, right", "0.22 m", outcome, "1.5 (0.5 by displacements)")
+    factor = "1.5 until it moves (0.5 by displacements)"
+    assert row[:4] == ("assessment: a code, right", "0.22 m", outcome, factor)
     assert answers.Ratios(**row.numbers) == answers.Ratios("a code", ["right"], 1.5, 1.5, moved=0.5)
 
 
