@@ -5,6 +5,8 @@ from contextlib import suppress
 from functools import partial
 
 import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 
 from archfem.cases.answers import RESULTS, Row
 from archfem.cases.case import Case
@@ -29,9 +31,25 @@ def describe_supports(structure: Structure, max_names: int = 4) -> str:
             names = [f"'{b.name}' ({format_mm(np.ptp(b.points[:, 0]))} broad)" for b in own]
         if len(own) > max_names:
             parts = Counter(block.part or "unnamed" for block in own)
-            names = [f"{count} of '{part}'" for part, count in parts.items()]
+            stacks = {part: _count_stacks(structure, part) for part in parts}
+            names = [
+                f"{count} of '{part}'" + f" in {stacks[part]} stacks apart" * (stacks[part] > 1)
+                for part, count in parts.items()
+            ]
         groups.append(f"{word}: {join_names(names)}")
     return f"blocks that {'; '.join(groups)}"
+
+
+def _count_stacks(structure: Structure, part: str) -> int:
+    """Return the number of stacks of a pier that no joint connects; 0 for other parts."""
+    own = [
+        k for k in structure.free if (b := structure.blocks[k]).part == part and b.role == "pier"
+    ]
+    touching = np.isin(structure.pairs, own).all(axis=1)
+    links = np.ones(np.count_nonzero(touching)), structure.pairs[touching].T
+    size = len(structure.blocks)
+    pieces = connected_components(coo_matrix(links, (size, size)), directed=False)[1]
+    return len({*pieces[own].tolist()})
 
 
 def describe_depths(structure: Structure) -> str:

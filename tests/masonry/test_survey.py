@@ -11,6 +11,7 @@ from drawn import assert_same, draw_portal, dxf, geojson, square
 
 import archfem as af
 from archfem.cases.structure_keys import read_survey
+from archfem.cases.structure_text import describe_supports
 from archfem.commands import main
 
 SHIPPED = Path(__file__).parents[2] / "meshes" / "survey.toml"
@@ -140,7 +141,11 @@ def test_stones_of_one_layer_have_parts_by_place_and_ground_by_its_level(tmp_pat
 @pytest.mark.parametrize(
     ("piers", "words"),
     [
-        (PIERS.replace("-2 m", "2 m"), "no stones within x and y .* of 'west pier'"),
+        (
+            PIERS.replace("-2 m", "2 m"),
+            r"no stones within x and y .* of 'west pier': by unit = 'mm' they lie within x = "
+            r"\[-1\.8\d*, 1\.8\d*\], y = \[-1\.3\d*, 1\.\d*\] m; correct the limits, or the unit",
+        ),
         (
             PIERS.replace('"0 m", "2 m"', '"-2 m", "2 m"'),
             "within x and y of 'west pier', 'east pier': let",
@@ -151,6 +156,22 @@ def test_stones_of_one_layer_have_parts_by_place_and_ground_by_its_level(tmp_pat
 def test_limits_of_parts_must_hold_stones_and_be_apart(tmp_path, piers, words):
     with pytest.raises(af.InvalidInput, match=words):
         af.Case.read(one_layer(tmp_path / "one", piers))
+
+
+def test_the_size_in_a_question_on_the_unit_is_that_of_the_drawing_without_its_ground(tmp_path):
+    text = (path := one_layer(tmp_path / "one")).read_text()
+    path.write_text(re.sub("snap = .*", 'snap = "0.1 mm"', text))
+    with pytest.raises(af.InvalidStructure, match=r"the drawing is 3\.6\d × "):
+        af.Case.read(path)
+
+
+def test_stacks_of_one_pier_that_stand_apart_are_counted(tmp_path):
+    """As where limits of one pier are so wide that they hold the stones of both."""
+    wide = PIERS.splitlines()[1].replace('"0 m"]', '"2 m"]', 1) + "\n"
+    both = ((PIERS, "3 of 'west pier', 11 of"), (wide, "6 of 'west pier' in 2 stacks apart, "))
+    for number, (piers, said) in enumerate(both):
+        case = af.Case.read(one_layer(tmp_path / str(number), piers))
+        assert said in describe_supports(case.structure)
 
 
 def test_outlines_by_place_can_be_left_out(tmp_path):

@@ -5,6 +5,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
 from archfem._typing import Array, Metres
 from archfem._validation import check_numbers
 from archfem.errors import InvalidInput
@@ -99,7 +101,13 @@ def _check_layers(
         hidden = ignored.get(f"{missing[0]} (hidden)")
         also = f", and {hidden} outlines on it are hidden, which are not read" if hidden else ""
         if layers[missing[0]].x or layers[missing[0]].y:
-            raise InvalidInput(f"{path} has no stones within x and y [m] of '{missing[0]}'")
+            corners = np.concatenate([outline.points for outline in outlines])
+            (left, low), (right, high) = corners.min(axis=0), corners.max(axis=0)
+            raise InvalidInput(
+                f"{path} has no stones within x and y [m] of '{missing[0]}': by unit = "
+                f"'{outlines[0].frame.unit}' they lie within x = [{left:.6g}, {right:.6g}], "
+                f"y = [{low:.6g}, {high:.6g}] m; correct the limits, or the unit"
+            )
         raise InvalidInput(
             f"{path} has no outlines on layer '{missing[0]}': its layers are {sorted(there)}{also}"
         )

@@ -151,7 +151,7 @@ def read_outlines(
     outlines = read_drawing(path, unit, ignored, snap, faults)
     if faults:
         try:
-            _close_or_advise(outlines, snap)
+            _close_or_advise(outlines, snap, _measure(outlines))
         except (InvalidInput, InvalidStructure) as error:
             faults.append(f"besides, {error}")
         raise InvalidInput(f"{path}: " + ";\n  ".join(faults))
@@ -161,7 +161,7 @@ def read_outlines(
     if ground is not None:
         outlines.append(_draw_ground(outlines, ground))
     try:
-        points, moved, _ = _close_or_advise(outlines, snap)
+        points, moved, _ = _close_or_advise(outlines, snap, size)
         blocks = [
             _make_block(outline, polygon, known.get(outline.layer, Layer()), material, materials)
             for outline, polygon in zip(outlines, points, strict=True)
@@ -381,7 +381,7 @@ def write_outlines(structure: Structure, path: str | Path) -> None:
         draft.write_text(text, encoding="utf-8")
 
 
-def _close_or_advise(outlines: list[Outline], snap: float) -> Closed:
+def _close_or_advise(outlines: list[Outline], snap: float, drawn: tuple[float, float]) -> Closed:
     """Close the gaps between outlines; an error names the next tolerance that leaves no error."""
     check_between(snap, "snap [m]", 0.0, remedy="give e.g. 0.001", error=InvalidStructure)
     for outline in outlines:
@@ -408,7 +408,7 @@ def _close_or_advise(outlines: list[Outline], snap: float) -> Closed:
             asks_unit |= verb == "raise"
             break
     if asks_unit:
-        size = _say_size(_measure(outlines))
+        size = _say_size(drawn)  # without the ground that is added
         question = f"{_question_unit(frame)} By unit = '{frame.unit}' the drawing is {size}"
         breadths = [np.hypot(*np.ptp(outline.points, axis=0)) for outline in outlines]
         # no stone is that large: what is said first is what a reader tries first
