@@ -198,6 +198,9 @@ def show_both_senses(
     finally:
         found, text, site = result_text.describe_limit(case, first, opposite)
         once = [*dict.fromkeys(doubts)]  # both senses may have the same
+        slides = [doubt for doubt in once if doubt.cause.startswith("joints slide (")]
+        if len(slides) > 1 and opposite is not None:  # that of the sense which is shown is enough
+            once.remove(slides[0 if found is opposite else 1])
         show(found, "\n".join([f"{text}{left}", *result_text.mark_remarks(once)]), site, once)
 
 

@@ -671,6 +671,19 @@ def test_limit_analysis_of_a_case(tmp_path, ring, unplotted, capsys):
     assert "in the other sense" not in capsys.readouterr().out
 
 
+@pytest.mark.parametrize("push", [1.0, -1.0])
+def test_sliding_is_in_doubt_once_with_the_factor_that_is_shown(push, tmp_path, capsys):
+    """Of 6 kN at a friction of 0.1, 500 N to the right leave 100 N, whichever sense is first."""
+    stack = af.column(breadth=0.6, heights=[0.5, 0.5], contact=af.Contact(1e9, 4e8, 0.1))
+    path = tmp_path / "stack.toml"
+    af.Analysis(stack, fidelity="rigid").write(path)
+    load = f'limit={{horizontal={push}, dead=[{{x=0.0, force=["500 N", "0 N"]}}]}}'
+    assert af.commands.main(["limit", str(path), "--set", load]) == 3
+    said = capsys.readouterr().out
+    assert "at 0.01667 g, pushed to the right\n" in said
+    assert re.findall(r"in doubt: joints slide .* the factor (\S+) is", said) == ["0.01667"]
+
+
 @pytest.mark.parametrize("command", ["limit", "run"])
 def test_limit_analysis_cut_short_keeps_the_first_sense(
     command, tmp_path, unplotted, monkeypatch, capsys
