@@ -35,10 +35,10 @@ from archfem.limit.fill_strength import Fill, PlasticFill, as_pressure, has_back
 from archfem.limit.mechanism_count import Mechanism, duration_text
 from archfem.limit.rating import Rating
 from archfem.masonry.loads import Action, Settlement, describe_massless
+from archfem.masonry.out_of_plane import UNCHECKED_ACROSS, describe_transverse_push
 from archfem.masonry.standing import describe_carried, describe_widths, find_bodies
 from archfem.masonry.structure import (
     CLEAR_TURNS,
-    UNCHECKED_ACROSS,
     Structure,
     join_joint_names,
     join_names,
@@ -294,7 +294,7 @@ def describe_dead_load(result: DeadLoadResult, *, explain: bool = False) -> str:
     ]
     if has_backing(result.case.limit.fill):
         lines.append(f"{NOTE_MARK}the backing of [limit] is fill here, in dead load and runs")
-    across = structure.transverse_remark
+    across = describe_transverse_push(structure)
     if result.case.has_motion and structure.heads.any():
         across = across.replace(UNCHECKED_ACROSS, CHECKED_ACROSS)
     lines += filter(None, [structure.assessment, across])

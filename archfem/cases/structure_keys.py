@@ -72,6 +72,9 @@ _BEARERS = {"materials": "block", "contacts": "joint"}
 # Joint.contact and Block.material of most parts stand once, above the lists
 _SHARED = ("material", "contact")
 
+# Fields of a structure beside its blocks and joints
+_SIZES = ("width", "gravity", "above")
+
 # studies alternate between few structures
 _recent_structures = RecentResults[Structure](8)
 
@@ -107,6 +110,7 @@ def shape_keys(name: str) -> dict[str, Any]:
     keys = {**keys_of_part(list_shapes()[name]), "shape": str, "fill": dict, "standing": dict}
     if name == "blocks":
         keys["material"] = str
+        keys["above"] = keys["width"]  # also a length
         del keys["name"], keys["fill"]  # the name is that of the case
     elif name == "outlines":
         keys["file"] = keys.pop("path")
@@ -200,9 +204,11 @@ def _read_blocks(settings: Table) -> Structure:
         _read_part(Joint, {"contact": contact, **part}, f"structure.joints[{k}]", settings)
         for k, part in enumerate(values.pop("joints", ()))
     ]
+    above = values.pop("above", None)
     if joints:
-        return Structure(tuple(blocks), tuple(joints), **values)
-    return assembled(blocks, _resolve_preset(settings, "contacts", contact), **values)
+        return Structure(tuple(blocks), tuple(joints), above=above, **values)
+    made = assembled(blocks, _resolve_preset(settings, "contacts", contact), **values)
+    return replace(made, above=above)
 
 
 def _read_part(
@@ -516,7 +522,9 @@ def _write_argument(value: Any, names: _PresetNames) -> Any:
 
 def _write_blocks(structure: Structure, names: _PresetNames) -> dict[str, Any]:
     """Return all blocks and joints; the most frequent material and contact stand once."""
-    sizes = {key: x for key, x in given_fields(structure).items() if key in ("width", "gravity")}
+    sizes = {
+        key: x for key, x in given_fields(structure).items() if key in ("width", "gravity", "above")
+    }
     section: dict[str, Any] = {"shape": "blocks", **sizes}
     rows: dict[str, list[dict[str, Any]]] = {
         "blocks": [_write_argument(block, names) for block in structure.blocks],

@@ -2,11 +2,10 @@
 
 from collections.abc import Mapping
 from functools import lru_cache
-from itertools import product
 
 from archfem.dynamics.rigid_body.rocking_body import FirstFall, describe_first_fall, find_first_fall
 from archfem.errors import ArchfemError, InvalidInput, logger
-from archfem.masonry.shapes.rings import columns_across
+from archfem.masonry.out_of_plane import columns_across
 from archfem.masonry.structure import Structure
 from archfem.motion.motion import Motion
 
@@ -17,7 +16,7 @@ SCALES_ACROSS = 0.1, 2.0
 def find_falls_across(
     structure: Structure, motions: Mapping[str, Motion]
 ) -> dict[str, tuple[FirstFall, str]]:
-    """Return the least first fall of strip and whole of a wall across its plane, and its motion.
+    """Return the least first fall of each column of a wall across its plane, and its motion.
 
     Each is one rigid body, held by nothing else. It is an error if neither rocks. There are none of
     what has no bond.
@@ -25,13 +24,13 @@ def find_falls_across(
     if not structure.heads.any():
         return {}
     found = dict[str, tuple[FirstFall, str]]()
-    for key, name in product(("strip", "whole"), motions):
-        first = _find_falls(structure, motions[name])[key]
-        if first and (key not in found or first.scale < found[key][0].scale):
-            found[key] = first, name
+    for name, motion in motions.items():
+        for key, first in _find_falls(structure, motion).items():
+            if first and (key not in found or first.scale < found[key][0].scale):
+                found[key] = first, name
     if motions and not found:
         raise InvalidInput(
-            "as one rigid body neither strip nor whole rocks: it slides before, or its joints "
+            "as one rigid body no column of the wall rocks: it slides before, or its joints "
             "resist tension; run a case of its courses, made by archfem.masonry.columns_across"
         )
     return found
@@ -39,7 +38,7 @@ def find_falls_across(
 
 @lru_cache(maxsize=8)  # a run states its own, and those of all motions follow
 def _find_falls(structure: Structure, motion: Motion) -> dict[str, FirstFall | None]:
-    """Return the first falls of strip and whole of a wall under a motion; None of what slides."""
+    """Return the first falls of the columns of a wall under a motion; None of what slides."""
     columns = columns_across(structure).items()
     return {key: find_first_fall(column, motion, SCALES_ACROSS) for key, column in columns}
 

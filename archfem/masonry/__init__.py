@@ -7,6 +7,7 @@
     joint_closing    stiffness and closure of joints, by finish or by a test
     loads            BodyForce, PointLoad, Settlement
     materials        Material, Contact, presets
+    out_of_plane     columns of walls across their plane, and the push that overturns these
     parts            roles and axes of rings and piers
     ring_thickness   a ring with another thickness about its middle line
     shapes           parametric arches, columns, walls, arcades and bridges from a few lengths

@@ -19,9 +19,9 @@ from .materials import STONE as STONE
 from .materials import STONE_TO_STONE as STONE_TO_STONE
 from .materials import Contact as Contact
 from .materials import Material as Material
+from .out_of_plane import columns_across as columns_across
 from .ring_thickness import Ring as Ring
 from .ring_thickness import find_ring as find_ring
-from .shapes.rings import columns_across as columns_across
 from .standing import StandingBody as StandingBody
 from .standing import carrying as carrying
 from .structure import Joint as Joint

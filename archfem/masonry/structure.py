@@ -8,7 +8,7 @@ import hashlib
 import inspect
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, wraps
 from itertools import pairwise
@@ -27,10 +27,7 @@ from archfem.errors import InvalidInput, InvalidStructure
 from archfem.masonry.block import Block, Point, as_point, check_overlaps, say_place
 from archfem.masonry.materials import Contact
 from archfem.masonry.parts import assign_roles, find_misplaced, select_assessed_parts
-from archfem.units import G, format_mm
-
-# What a result in the plane of the drawing leaves open
-UNCHECKED_ACROSS = "nothing is checked across the plane of the drawing"
+from archfem.units import G
 
 
 def find_number(kind: str, names: Sequence[str], requested: str | int) -> int:
@@ -250,6 +247,10 @@ class Structure(ResultDisplay):
         name: name in titles and files.
         origin: name and arguments of the shape function that made it, or None; not compared, and
             of a changed copy still that of the original.
+        above: height above the ground of the foot of a column that `columns_across` has made; None
+            of other structures [m].
+        above: height of the foot of a column of a wall across its plane, `columns_across`, above
+            the ground; None of what is no such column [m].
     """
 
     blocks: tuple[Block, ...]
@@ -258,6 +259,7 @@ class Structure(ResultDisplay):
     gravity: MetresPerSecondSquared = G
     name: str = "structure"
     origin: tuple[str, Mapping[str, Any]] | None = field(default=None, compare=False)
+    above: Metres | None = None
 
     def __post_init__(self) -> None:
         """Assign roles; check the values, supports and outlines."""
@@ -510,83 +512,6 @@ class Structure(ResultDisplay):
         """Which joints are assessed, and what is not, in words; empty where all are."""
         parts = [joint.part for joint in self.joints]
         return describe_assessment(self.face_names, parts, self.judged, self.heads)
-
-    @cached_property
-    def transverse_push(self) -> tuple[float, str]:
-        """Push across the plane that begins to overturn a body [g], and which body, in words.
-
-        All blocks above a level turn as one body about the edge of the width there, held by nothing
-        else; or a strip of a wall in bond from bottom to top, or a pier between openings of the
-        shape `wall`. The push is undefined (NaN) for a single stack, which may be drawn across its
-        plane.
-        """
-        blocks = [self.blocks[number] for number in self.free]
-        ends = np.array([[block.points.min(axis=0), block.points.max(axis=0)] for block in blocks])
-        bottom = merge_levels(ends[..., 1])[:, 0]
-        ground = bottom.min()
-        if ends[:, 0, 0].max() < ends[:, 1, 0].min():
-            return np.nan, ""
-        weights = np.array([block.area * block.material.unit_weight for block in blocks])
-        heights = np.array([block.centroid[1] for block in blocks])
-        pushes = {}
-        for level in np.unique(bottom):
-            above = bottom >= level
-            arm = np.average(heights[above], weights=weights[above]) - level
-            up = level - ground
-            size = format_mm(up) if up < 1.0 else f"{up:.3g} m"
-            words = f"all above {size} from the base" if up else "all of it"
-            pushes[words] = 0.5 * self.width / float(arm)
-        if self.heads.any():
-            pushes["a strip from bottom to top"] = self.width / float(np.ptp(ends[:, :, 1]))
-        for pier, arm in self._find_piers(blocks):
-            words = f"the pier at x = {pier:.3g} m, with what it carries,"
-            pushes[words] = 0.5 * self.width / (arm - ground)
-        body = min(pushes, key=pushes.__getitem__)
-        return pushes[body], body
-
-    def _find_piers(self, blocks: Sequence[Block]) -> Iterator[tuple[float, float]]:
-        """Yield x of each pier between openings of a wall, and y of its centre of weight [m].
-
-        It carries the wall up to the middle of the openings beside it, but what is below these.
-        """
-        import shapely
-
-        rows: list[list[float]] = []  # left and right of openings above one another, and least head
-        for each in sorted((self.origin or ("", {}))[1].get("openings", ()), key=lambda x: x.left):
-            if rows and each.left < rows[-1][1]:
-                least = min(rows[-1][2], each.head)
-                rows[-1][1:] = max(rows[-1][1], each.right), least
-            else:
-                rows.append([each.left, each.right, each.head])
-        polygons = [shapely.Polygon(block.points) for block in blocks]
-        unit_weights = np.array([block.material.unit_weight for block in blocks])
-        far = 1e4  # beyond any wall
-        for (left, one, head), (other, right, beyond) in pairwise(rows):
-            halves = (
-                (0.5 * (left + one), head, one, far),
-                (other, beyond, 0.5 * (other + right), far),
-            )
-            boxes = [shapely.box(*each) for each in ((one, -far, other, far), *halves)]
-            cut = shapely.intersection(polygons, shapely.union_all(boxes))
-            met = shapely.area(cut) > 0.0
-            weights = shapely.area(cut[met]) * unit_weights[met]
-            heights = shapely.get_y(shapely.centroid(cut[met]))
-            yield 0.5 * (one + other), float(np.average(heights, weights=weights))
-
-    @property
-    def transverse_remark(self) -> str:
-        """What is not checked across the plane, in words, with the push that overturns it."""
-        push, body = self.transverse_push
-        if np.isnan(push):
-            return (
-                f"{UNCHECKED_ACROSS}; if that is the section of a wall, it is checked across "
-                "its own plane here, and in it by a case of its own"
-            )
-        loaded = any(self.blocks[number].material.stands_for for number in self.free)
-        return (
-            f"{UNCHECKED_ACROSS}: held by nothing else, {body} begins to overturn at {push:.3g} g"
-            f"{' or less' * loaded}, by the width over twice the height of its centre"
-        )
 
     @cached_property
     def weight(self) -> float:

@@ -75,21 +75,24 @@ class LimitState:
             options: Any = {"ends": "(]", "remedy": "give a ratio, such as 0.4 for 40 %"}
             check_between(getattr(self, key), f"{self.name}, {key} [-]", 0.0, most, **options)
 
-    def doubt(self, spectrum: DesignSpectrum | Motion) -> list[Doubt]:
-        """Return the doubt about a check of NTC against a spectrum of another code, if it is one.
+    def doubt(self, spectrum: DesignSpectrum | Motion, above: float | None = None) -> list[Doubt]:
+        """Return doubts about a spectrum of another code than NTC, and about one of the ground.
 
         Args:
             spectrum: spectrum of the demand; a table and a motion are of no code.
+            above: height of the foot of what is checked above the ground, if it is a column [m].
         """
         codes = [name for name, kind in registered_spectra.items() if kind is type(spectrum)]
-        if not self.name.startswith("NTC") or {*codes} <= {"NTC-2018", "table"}:
-            return []
-        return [
-            Doubt(
-                f"the check is one of NTC, which was not made for a spectrum of {codes[0]}",
-                "give limit_state with the rules of its code, or a spectrum of NTC-2018",
-            )
-        ]
+        found = []
+        if self.name.startswith("NTC") and not {*codes} <= {"NTC-2018", "table"}:
+            words = f"the check is one of NTC, which was not made for a spectrum of {codes[0]}"
+            remedy = "give limit_state with the rules of its code, or a spectrum of NTC-2018"
+            found.append(Doubt(words, remedy))
+        if above and not {*codes} <= {"table"}:
+            words = "the spectrum is that of the ground, and {:.3g} m above it, at the foot of this"
+            words += " column, it is larger: each ratio is {}"
+            found.append(Doubt(words, "give that as a table", (above, UPPER_BOUND)))
+        return found
 
 
 # Sources of displacement checks; the 2019 values were read in a transcription of the Circolare.

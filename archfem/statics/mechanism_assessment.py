@@ -615,7 +615,7 @@ class _Oscillator:
     @property
     def doubts(self) -> list[Doubt]:
         """Why a ratio may be too high: another code's spectrum, a fill left out, other joints."""
-        found = self.given.rules.doubt(self.given.spectrum)
+        found = self.given.rules.doubt(self.given.spectrum, self.given.structure.above)
         if self.searched:
             found.append(self.searched)
         if self.fill and self.placed.fill is None and self.path is not None:

@@ -33,6 +33,7 @@ from archfem.dynamics.walls_across import (
     find_falls_across,
 )
 from archfem.errors import InvalidInput
+from archfem.masonry.out_of_plane import find_transverse_push
 from archfem.models.model import Doubt, read_doubts, write_doubts
 from archfem.statics.assessment_checks import UPPER_BOUND
 from archfem.studies import variations
@@ -864,7 +865,7 @@ def test_a_demand_that_overturns_it_across_its_plane_is_in_the_conclusion(ag, ov
         },
     }
     case = af.Case.of(tables)
-    push, _ = case.structure.transverse_push
+    push, _ = find_transverse_push(case.structure)
     assert 0.12 < push < 0.24
     data = ReportData(case, {})
     vars(data)["statements"] = {"limit": answers.Statement([], [])}
@@ -1082,7 +1083,7 @@ def test_a_wall_that_slides_before_it_rocks_is_not_checked_across_its_plane(capl
             blocks.append(af.Block(outline, af.STONE, f"{level} {a}", part="wall", role="pier"))
     wall = af.masonry.assembled(blocks, af.Contact(1e9, 4e8, friction=0.6), width=1.0)
     motion = af.Motion(np.full(100, 8.0), 0.01, name="push")
-    with pytest.raises(InvalidInput, match="neither strip nor whole rocks"):
+    with pytest.raises(InvalidInput, match="no column of the wall rocks"):
         find_falls_across(wall, {"push": motion})
     assert find_falls_across(wall, {}) == {}
     assert check_across(wall, {"push": motion}) == ("", "")
@@ -1315,3 +1316,15 @@ def test_sentences_are_short_of_an_annual_rate_alone():
     data = ReportData(ring(), {})
     vars(data)["statements"] = {"risk": answers.state_risk(found)}
     assert long_sentences(data) == []
+
+
+def test_a_column_of_a_wall_is_not_said_to_be_unchecked_across_its_plane():
+    """It is across the plane of the wall that `columns_across` has cut it from."""
+    for above, said in ((None, True), (0.0, False)):
+        column = {"shape": "column", "breadth": 0.5, "heights": [1.0, 1.0]}
+        column |= {} if above is None else {"above": above}
+        data = ReportData(af.Case.of({"structure": column}), {})
+        vars(data)["statements"] = {"limit": answers.Statement([], [])}
+        assert bool(conclusion._build_transverse(data)) is said
+        verdict = dict(conclusion.list_facts(data)).get("verdict", "")
+        assert ("it was not checked" in verdict) is said

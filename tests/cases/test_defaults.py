@@ -18,6 +18,7 @@ from archfem.cases.defaults import (
 )
 from archfem.cases.report.sections import _describe_extent
 from archfem.cases.result_text import describe_dead_load
+from archfem.masonry.out_of_plane import find_transverse_push
 from archfem.masonry.structure import describe_assessment
 
 COLUMN = {"shape": "column", "breadth": 0.6, "heights": [1.2, 1.2]}
@@ -201,7 +202,7 @@ def test_head_joints_are_apart_in_the_line_of_the_dead_load(tmp_path):
     assert beds.endswith(f"N ≥ {1e-3 * af.STONE.unit_weight:.2f} kN")  # c rests on a and b
     assert heads.endswith("N ≥ 0.00 kN")
     # 1 m thick and 2 m high: a strip overturns no sooner than all of it
-    push, body = wall.transverse_push
+    push, body = find_transverse_push(wall)
     assert (push, body) == (pytest.approx(0.5), "all of it")
     assert "not assessed: a to b\nnothing is checked across the plane of the drawing: " in text
     assert "held by nothing else, all of it begins to overturn at 0.5 g, by the width" in text

@@ -53,7 +53,12 @@ from archfem.dynamics.collapse_state import (
 from archfem.dynamics.rigid_body.rocking_body import describe_first_fall, say_scale
 from archfem.dynamics.verdict_range import UNVARIED, VerdictRange
 from archfem.dynamics.walls_across import SCALES_ACROSS
-from archfem.masonry.structure import UNCHECKED_ACROSS, join_names, join_words
+from archfem.masonry.out_of_plane import (
+    UNCHECKED_ACROSS,
+    describe_transverse_push,
+    find_transverse_push,
+)
+from archfem.masonry.structure import join_names, join_words
 from archfem.models.model import Doubt
 from archfem.units import Ends, format_mm, format_ratio
 from archfem.view.pages.document import Grid, Section, TextBlock
@@ -155,7 +160,7 @@ def _find_unchecked_push(data: ReportData) -> tuple[float, float] | None:
     """
     if data.across[0] or not _build_transverse(data):
         return None
-    return data.case.structure.transverse_push[0], find_largest_demand(data)
+    return find_transverse_push(data.case.structure)[0], find_largest_demand(data)
 
 
 def _say_unchecked(data: ReportData) -> tuple[list[str], bool]:
@@ -384,8 +389,9 @@ def _build_transverse(data: ReportData) -> list[TextBlock]:
     """Build the paragraph on what is not checked across the plane, for results of earthquakes."""
     if not data.runs and not data.statements.keys() - {"rating", "thickness"}:
         return []
-    text, (push, _) = data.case.structure.transverse_remark, data.case.structure.transverse_push
-    demand = find_largest_demand(data)
+    if not (text := describe_transverse_push(data.case.structure)):
+        return []
+    push, demand = find_transverse_push(data.case.structure)[0], find_largest_demand(data)
     if push < demand:
         text += (
             f"; the largest demand, {demand:.3g} g, exceeds it ({format_ratio(demand / push)} ×)"

@@ -6,8 +6,8 @@ left springing.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from itertools import compress, pairwise
+from dataclasses import dataclass
+from itertools import pairwise
 from math import acos, asin, atan2, degrees, isfinite, pi, radians, sin, tan
 from typing import Any
 
@@ -23,13 +23,9 @@ from archfem._validation import (
 )
 from archfem.errors import InvalidStructure
 from archfem.masonry.block import Block, Point, as_point, check_points, measure_path
-from archfem.masonry.materials import COURSE_LENGTH, STONE, STONE_TO_STONE, Contact, Material
-from archfem.masonry.structure import Joint, Structure, join_words, merge_levels, record_origin
+from archfem.masonry.materials import STONE, STONE_TO_STONE, Contact, Material
+from archfem.masonry.structure import Joint, Structure, record_origin
 from archfem.units import G, in_degrees
-
-# Weight of a course across the plane, over the median, below which it is one block with the course
-# below it: on a joint as stiff as those of whole courses, the tip of a gable would decide the step
-LIGHT_COURSE = 0.2
 
 # Intrados and extrados of a stone, each from left to right (n, 2) [m]
 Faces = tuple[Array, Array]
@@ -180,6 +176,7 @@ def column(
     material: Material = STONE,
     contact: Contact = STONE_TO_STONE,
     gravity: MetresPerSecondSquared = G,
+    above: Metres | None = None,
 ) -> Structure:
     """Return rectangular blocks on a fixed base; one block is the classical rocking block.
 
@@ -193,6 +190,7 @@ def column(
         material: material of the blocks.
         contact: contact of the joints.
         gravity: acceleration of gravity [m/s²].
+        above: of a wall across its plane, height of its foot above the ground [m].
 
     Raises:
         InvalidStructure: a length is not positive.
@@ -212,86 +210,7 @@ def column(
         Joint((k, k + 1), (-half, y), (half, y), contact, f"joint {k}", "column", "pier")
         for k, y in enumerate(levels[1:-1])
     ]
-    return Structure(tuple(blocks), tuple(joints), width, gravity, "column")
-
-
-@validate_arguments
-def columns_across(wall: Structure, *, above: Metres | None = None) -> dict[str, Structure]:
-    """Return a wall across its plane, held by nothing else: a strip of it, and the whole.
-
-    Both are as broad as the wall is thick, and have its courses: from one bed over most of its
-    length to the next or, without any, one at each bed of a stone. A course of the whole weighs as
-    much as that of the wall, less its openings; its joints are as long as the wall. A course of
-    less than a fifth of the median weight, as the tip of a gable, is one block with the course
-    below it. The strip has a mean metre of the wall, its openings filled with stones of the course.
-    What stones stand for besides themselves, such as a floor, weighs on both, and is named there.
-
-    Args:
-        wall: structure in its plane; its width is the thickness of the wall.
-        above: level from whose next bed on it is taken, such as that of the eaves; None for all
-            [m].
-
-    Returns:
-        Columns "strip", 1 m long, and "whole".
-
-    Example:
-        >>> list(af.masonry.columns_across(af.column(breadth=3.0, heights=[1.0], width=0.5)))
-        ['strip', 'whole']
-    """
-    blocks = [wall.blocks[number] for number in wall.free]
-    levels, areas = _divide_into_courses(blocks)
-    if above is not None:
-        check_between(above, "above [m], up to the last bed,", *levels[[0, -2]].tolist(), ends="[]")
-        first = int(np.searchsorted(levels, above - 1e-9))  # but for round-off
-        levels, areas = levels[first:], areas[:, first:]
-    unit_weights = np.array([block.material.unit_weight for block in blocks])
-    words = [block.material.stands_for for block in blocks]
-    plain = np.array([not each for each in words]) if None in words else np.ones(len(words))
-    # stones that carry nothing: those of the course, or those of the wall where it has none
-    own = plain[:, None] * (areas + 1e-9 * areas.sum(axis=1, keepdims=True))
-    solid = unit_weights @ own / own.sum(axis=0)
-    # a body that stands on the wall has no masonry beside it
-    solid *= np.array([block.name != block.material.stands_for for block in blocks]) @ areas > 0.0
-    length, heights = float(np.ptp([x for each in blocks for x, _ in each.points])), np.diff(levels)
-    faces = length * heights
-    whole = unit_weights @ areas / faces
-    strip = whole + (1.0 - areas.sum(axis=0) / faces) * solid  # openings filled
-    loads = [join_words(sorted({*filter(None, compress(words, each))})) for each in areas.T]
-    material = blocks[int(plain.argmax())].material
-    contact = wall.joints[int(wall.heads.argmin())].contact
-    given: Any = {"material": material, "contact": contact, "gravity": wall.gravity}
-    bare, columns = column(breadth=wall.width, heights=heights.tolist(), **given), {}
-    for key, width, values in (("strip", bare.width, strip), ("whole", length, whole)):
-        stones = [bare.blocks[0]]
-        rows = zip(bare.blocks[1:], values.round(3).tolist(), loads, strict=True)
-        for block, weight, load in rows:  # equal ones share a material
-            stands_for = load or (COURSE_LENGTH if weight != material.unit_weight else None)
-            stone = replace(material, unit_weight=weight, stands_for=stands_for)
-            stones.append(replace(block, material=stone))
-        columns[key] = replace(bare, blocks=tuple(stones), width=width)
-    return columns
-
-
-def _divide_into_courses(blocks: Sequence[Block]) -> tuple[Array, Array]:
-    """Return the levels of a wall's courses, and the areas of stones in each (n, n_courses)."""
-    ends = np.array([[block.points.min(axis=0), block.points.max(axis=0)] for block in blocks])
-    merged = merge_levels(ends[..., 1])
-    levels, low, high = np.unique(merged), merged[:, :1], merged[:, 1:]
-    above, below, across = (
-        np.ptp(ends[..., 0], axis=1) @ met
-        for met in (low == levels, high == levels, (low < levels) & (levels < high))
-    )
-    through = np.minimum(above, below) > across  # not those of the stones of an arch
-    through[[0, -1]] = True
-    levels = levels[through] if through.sum() > 2 else levels
-    unit_weights = np.array([block.material.unit_weight for block in blocks])
-    areas = np.array([[block.area] for block in blocks]) / (high - low)
-    areas = areas * (np.clip(high, levels[:-1], levels[1:]) - np.clip(low, levels[:-1], levels[1:]))
-    while (weights := unit_weights @ areas).min() < LIGHT_COURSE * np.median(weights):
-        k = max(int(weights.argmin()), 1)  # the upper one of two that become one
-        areas[:, k - 1] += areas[:, k]
-        areas, levels = np.delete(areas, k, axis=1), np.delete(levels, k)
-    return levels, areas
+    return Structure(tuple(blocks), tuple(joints), width, gravity, "column", above=above)
 
 
 @record_origin
