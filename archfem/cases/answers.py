@@ -2,16 +2,19 @@
 
 import json
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
+from scipy.optimize import brentq
 
 from archfem._display import NOTE_MARK
 from archfem.cases.case import Case
 from archfem.cases.result_text import PushFactors, Remark, ResultTable
 from archfem.dynamics.motion_scaling import CollapseScale
 from archfem.dynamics.scale_search import MechanismScales
+from archfem.errors import InvalidInput
 from archfem.limit.fill_range import FillRange
 from archfem.limit.rating import Rating
 from archfem.masonry.loads import name_side
@@ -20,9 +23,9 @@ from archfem.models.model import Doubt, read_doubts, write_doubts
 from archfem.motion.hazard import DESIGN_PERIOD, MEASURES
 from archfem.motion.matching import DEFAULT_BAND
 from archfem.motion.motion import Motion
-from archfem.statics.assessment_checks import AssessmentCheck
+from archfem.statics.assessment_checks import AssessmentCheck, describe_difference
 from archfem.statics.mechanism_assessment import KinematicAssessment
-from archfem.units import STANDARD_GRAVITY, Ends, MPa, format_ratio
+from archfem.units import STANDARD_GRAVITY, Ends, MPa, format_ratio, kN
 
 # Results by the names of their files
 RESULTS = {
@@ -52,6 +55,9 @@ class Row(NamedTuple):
     factor: str  # "-" where there is none
     numbers: Mapping[str, Any]  # such as the fields of `Ratios`; none without an answer
 
+
+# Largest multiple of the forces of ties that is tried, and largest ratio of interest [-]
+MOST_TIED = 4.0
 
 # Begin of a note on motions that are matched up to a shorter period than that of a check
 MATCHED = "the motions of the suite are matched from"
@@ -301,9 +307,20 @@ def find_margin(found: Iterable[KinematicAssessment]) -> float:
     return min(ratios.decisive for result in found for _, ratios in list_ratios(result))
 
 
+def compare_checks(checks: Sequence[Ratios]) -> str:
+    """Say by which checks an assessment passes and by which it fails; empty where none differ."""
+    moved = {way for check in checks if not check.linear for way in check.directions}
+    last = [x.decisive for x in checks if not (x.linear and moved.issuperset(x.directions))]
+    linear = [x.decisive for x in checks if x.linear]
+    return describe_difference(min(last, default=np.inf), min(linear, default=np.inf))
+
+
 def describe_margin(found: Iterable[KinematicAssessment]) -> str:
     """Describe the least ratio of all checks, and its range over what is assumed of a fill."""
-    listed = [(*each, result.direction) for result in found for each in list_ratios(result)]
+    listed, checks = [], []
+    for number, result in enumerate(found):
+        listed += [(*each, result.direction) for each in list_ratios(result)]
+        checks += [x._replace(directions=[str(number)]) for _, x in list_ratios(result)]
     check, ratios, sense = min(listed, key=lambda each: each[1].decisive)
     alike = [(x, way) for x, _, way in listed if x.name == check.name]
     same = [x.over_fill for x, _ in alike if x.over_fill is not None]
@@ -314,9 +331,13 @@ def describe_margin(found: Iterable[KinematicAssessment]) -> str:
             text = f"{format_ratio(ratios.bodies)} with one weight a body, {text} with them apart"
         outcome = check.words if outcome == "passes" else outcome
         return f"least margin {text}, by {check.name}: {outcome}"
-    side = f", pushed to the {name_side(sense)}"
-    differs = any(way != sense and x.ratio > 1.001 * check.ratio for x, way in alike)
-    return f"least margin {ratios}, by {check.name}{side * differs}: {check.words}"
+    others = [x.decisive for x, way in alike if way != sense and x.ratio > 1.001 * check.ratio]
+    side, other = "", ""
+    if others:
+        side = f", pushed to the {name_side(sense)}"
+        other = f"; pushed to the {name_side(-sense)} {format_ratio(min(others))} by the same check"
+    outcome = compare_checks(checks) or check.words
+    return f"least margin {ratios}, by {check.name}{side}: {outcome}{other}"
 
 
 def compare_crushing(case: Case, found: Iterable[KinematicAssessment]) -> list[Remark]:
@@ -333,6 +354,35 @@ def compare_crushing(case: Case, found: Iterable[KinematicAssessment]) -> list[R
         f"by as much: the least one to {margin:.3g}"
     )
     return [f"{NOTE_MARK}{text}" if share > 0.98 else Doubt(text)]
+
+
+def note_ties(case: Case) -> list[str]:
+    """Return notes on the force of ties with which a sense just passes the linear check."""
+    settings, notes = case.assessment, list[str]()
+    loads = settings.options.get("loads", ())
+    ties = [load for load in loads if load.passive]
+
+    def exceed(scale: float, sense: float) -> float:
+        """Return the linear ratio above 1 with a multiple of the forces of all ties [-]."""
+        tied = [replace(x, force=(scale * x.force[0], scale * x.force[1])) for x in ties if scale]
+        options = {**settings.options, "loads": [x for x in loads if not x.passive] + tied}
+        own = replace(settings, directions=(sense,), options=options)
+        (found,) = own.solve(case.structure, case.demand).values()
+        return min(found.linear.decisive, MOST_TIED) - 1.0
+
+    for sense in settings.directions if ties else ():
+        with suppress(InvalidInput):  # without its ties it may not stand
+            if exceed(0.0, sense) < 0.0 < exceed(MOST_TIED, sense):
+                scale = brentq(exceed, 0.0, MOST_TIED, (sense,), xtol=1e-3)
+                of = f"{scale:.3g} times the forces of the ties"
+                if len(ties) == 1:
+                    size = scale * float(np.hypot(*ties[0].force)) / kN
+                    of = f"{size:.3g} kN of the tie at {ties[0].block}"
+                side = name_side(sense)
+                notes.append(
+                    f"{NOTE_MARK}pushed to the {side}, the linear check is just passed with {of}"
+                )
+    return notes
 
 
 def note_band(case: Case, found: Iterable[KinematicAssessment]) -> list[str]:

@@ -243,6 +243,7 @@ def assess(options: argparse.Namespace) -> int:
     # warnings of the comparison are those of the assessment, or of a sliding that it leaves out
     with keep_warnings():
         remarks = [*doubts, *answers.compare_crushing(case, found.values())]
+        remarks += [] if options.parts else answers.note_ties(case)
     remarks += answers.note_band(case, found.values())
     remarks += result_text.note_masses(case.structure, parapets=case.parapets)
     every = [*remarks, *(doubt for result in found.values() for doubt in result.doubts)]

@@ -188,6 +188,11 @@ class AssessmentCheck:
         return self.ratio if self.over_fill is None else self.over_fill.ends[0]
 
     @property
+    def decisive(self) -> float:
+        """The least ratio: over a fill, by either split of weights, or with e* = 1 [-]."""
+        return min(x for x in (self.least, self.bodies, self.floor) if x is not None)
+
+    @property
     def moved(self) -> float:
         """Ratio of capacity and demand, which counts once the mechanism is in motion [-]."""
         return self.capacity / self.demand
@@ -206,6 +211,21 @@ class AssessmentCheck:
             f"{self.unit}{period}: {self.words}, the spectrum may be "
             f"{self.ratios} times as strong{rest if self.at_rest else ''}"
         )
+
+
+def describe_difference(displaced: float, linear: float) -> str:
+    """Say that it passes by displacements and fails by the linear check; empty where it does not.
+
+    Args:
+        displaced: least ratio of the checks by which it passes [-].
+        linear: that of all linear checks [-].
+    """
+    if not displaced >= 1.0 > linear:
+        return ""
+    return (
+        f"passes by displacements ({format_ratio(displaced)}), fails by the linear check "
+        f"({format_ratio(linear)}); no clause that was read says which governs"
+    )
 
 
 def spectral_acceleration(

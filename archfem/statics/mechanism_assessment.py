@@ -64,6 +64,7 @@ from archfem.statics.assessment_checks import (
     LimitState,
     add_fill_ranges,
     check_assessable,
+    describe_difference,
     spectral_acceleration,
 )
 from archfem.statics.first_mechanism import (
@@ -199,9 +200,11 @@ class KinematicAssessment(ResultDisplay):
     def _summary(self) -> str:
         """Describe the result in one line."""
         vanishes = f"d_0* {self.d_0_star:.4g} m, " if np.isfinite(self.d_0_star) else ""
+        last = self.checks[-1]
+        outcome = describe_difference(last.decisive, self.linear.decisive) or last.outcome
         return (
             f"KinematicAssessment of '{self.structure.name}': alpha_0 {self.alpha_0:.4g}, a_0* "
-            f"{self.a_0_star:.4g} m/s², {vanishes}{self.checks[-1].outcome}"
+            f"{self.a_0_star:.4g} m/s², {vanishes}{outcome}"
         )
 
     def __str__(self) -> str:

@@ -12,7 +12,15 @@ from bonded import bonded_wall
 from scipy.optimize import brentq
 
 import archfem as af
-from archfem.cases.answers import describe_margin, find_margin, list_ratios
+from archfem.cases.answers import (
+    describe_margin,
+    find_margin,
+    list_ratios,
+    note_ties,
+    state_assessments,
+)
+from archfem.cases.report.conclusion import list_facts
+from archfem.cases.report.report_data import ReportData
 from archfem.statics import LIMIT_STATES, AssessmentCheck, LimitState, mechanism_assessment
 from archfem.statics.assessment_checks import (
     BY_MECHANISM,
@@ -192,6 +200,40 @@ def test_a_tie_bears_what_equilibrium_needs(force, factor, pull):
     )
     assert ", pushed to the left: " in describe_margin([found, free])
     assert ", pushed to" not in describe_margin([free, replace(free, direction=1.0)])
+
+
+def test_a_check_that_alone_fails_is_in_every_headline_with_the_force_of_a_tie():
+    """A block of 1 × 8 m of 160 kN: α = 1 / 8, and by a tie at 4 m α 160 4 = 160 0.5 + 4 t."""
+    spectrum = {"code": "NTC-2018", "ag": 0.25, "f0": 2.4, "tc_star": 0.32, "site": "B"}
+    tie = {"block": "block 1", "point": [0.5, 4.0], "force": [-15e3, 0.0], "passive": True}
+    column = {"shape": "column", "breadth": 1.0, "heights": [8.0]}
+    case = af.Case.of({"structure": column, "assessment": {"spectrum": spectrum, "loads": [tie]}})
+    found = case.assessment.solve(case.structure, None)
+    pga = 0.25 * (1.4 - 0.4 * 2.4 * 0.25) * 9.80665 / 9.81
+    ratios = [2.0 * alpha / 1.35 / pga for alpha in (0.125 + 15.0 / 160.0, 0.125)]
+    assert [x.linear.ratio for x in found.values()] == pytest.approx(ratios, rel=1e-4)
+    free = found["left"]
+    assert free.passes  # by displacements
+    moved = f"{free.displacement.ratio:.3g}"
+    says = f"passes by displacements ({moved}), fails by the linear check ({ratios[1]:.3g}); no "
+    says += "clause that was read says which governs"
+    assert repr(free).endswith(says)
+    margin = describe_margin(found.values())
+    assert margin.startswith(f"least margin {ratios[1]:.3g}, by linear, q = 2, FC = 1.35, pushed ")
+    other = f"; pushed to the right {ratios[0]:.3g} by the same check"
+    assert margin.endswith(f", pushed to the left: {says}{other}")
+    needed = 160.0 * (1.35 * pga / 2.0 - 0.125)
+    assert note_ties(case) == [
+        "note: pushed to the right, the linear check is just passed with "
+        f"{needed:.3g} kN of the tie at block 1"
+    ]
+    # the report has the same words
+    data = ReportData(case, {})
+    vars(data)["statements"] = {"assessment": state_assessments(found, [])}
+    verdict = dict(list_facts(data))["verdict"]
+    assert (
+        f"By the kinematic assessment on the NTC-2018 spectrum of PGA 0.29 g it {says}." in verdict
+    )
 
 
 def test_a_tie_that_holds_its_point_has_no_displacement_check():

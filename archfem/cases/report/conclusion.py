@@ -8,7 +8,7 @@ import numpy as np
 
 from archfem._files import group_of, read_file_list
 from archfem.cases import result_text
-from archfem.cases.answers import RESULTS, Ratios, Row, Statement, read_numbers
+from archfem.cases.answers import RESULTS, Ratios, Row, Statement, compare_checks, read_numbers
 from archfem.cases.case import REPORT_KEYS
 from archfem.cases.report.demands import (
     find_largest_demand,
@@ -326,7 +326,8 @@ def _judge_check(data: ReportData, check: Ratios) -> tuple[str, str]:
         return words, ", an upper bound"
     if check.moved and _say_motion(data, check.least, peak_of_spectrum(data.case)):
         return f"it withstands at rest alone, and moves in the runs, {of}", ""
-    return f"it withstands {of}", ""
+    differs = compare_checks(read_numbers(Ratios, data.statements.get("assessment")))
+    return f"on {of} it {differs}" if differs else f"it withstands {of}", ""
 
 
 def _say_test(data: ReportData) -> str:
