@@ -164,7 +164,9 @@ def tabulate_runs(runs: Mapping[str, History]) -> ResultTable:
         horizontal, vertical = run.dataset["ground"].attrs["peaks"]
         stones = verdict.fall.dislocated_stones if verdict.fall else ""
         row = [name, f"{verdict.outcome}{stones}", str(len(verdict.doubts) or "none")]
-        row += [f"{horizontal:.2f} m/s²", f"{vertical:.2f} m/s²"]
+        # of a run that ended before its motion, not the PGA
+        until = f" until {run.time[-1]:.2f} s" * (run.ending != Ending.FINISHED)
+        row += [f"{horizontal:.2f} m/s²{until}", f"{vertical:.2f} m/s²"]
         row.append(f"{format_ratio(float(size.max()))}{verdict.until}")
         row.append(str(joints["name"].values[int(largest.values.argmax())]))
         row.append(f"{format_ratio(float(joints['friction'].max()))}{verdict.until}")
@@ -175,17 +177,20 @@ def tabulate_runs(runs: Mapping[str, History]) -> ResultTable:
         row += [_mechanism_cell(verdict, definition) for definition in ALL_DEFINITIONS]
         rows.append([*row, f"{endings.get(run.ending, run.ending)} {run.time[-1]:.2f} s"])
     verdicts = [run.verdict for run in runs.values()]
-    counts = [
-        # where joints were not followed to the end there may be more
-        f"{'≥ ' * any(found is None and x.until for x, found in own)}"
-        f"{sum(found is not None for _, found in own)} of {len(runs)}"
-        if own
-        else "-"  # the definition does not apply
-        for name in ALL_DEFINITIONS
-        for own in [[(x, x.mechanisms[name]) for x in verdicts if name in x.mechanisms]]
-    ]
+    counts = [_count_mechanisms(verdicts, name) for name in ALL_DEFINITIONS]
     rows.append(["all", *["-"] * (len(RUN_COLUMNS) - 1), *counts, "-"])
     return ResultTable([*RUN_COLUMNS, *ALL_DEFINITIONS, "end"], rows)
+
+
+def _count_mechanisms(verdicts: Sequence[Verdict], definition: str) -> str:
+    """Count the runs with a mechanism; "-" where the definition does not apply."""
+    own = [x for x in verdicts if definition in x.mechanisms]
+    count = sum(x.mechanisms[definition] is not None for x in own)
+    # where joints were not followed to the end there may be more
+    more = any(x.mechanisms[definition] is None and x.until for x in own)
+    if not own or (more and not count):
+        return "unknown" if own else "-"
+    return f"{'≥ ' * more}{count} of {len(verdicts)}"
 
 
 def describe_verdicts(runs: Iterable[History]) -> str:

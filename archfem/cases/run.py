@@ -45,6 +45,7 @@ from archfem.errors import (
 from archfem.joints.criteria import assessed_joints
 from archfem.limit.collapse import Collapse, stands
 from archfem.limit.fill_strength import Fill
+from archfem.masonry.loads import describe_forces
 from archfem.masonry.stiffness_ratio import soften_joints
 from archfem.models.model import Doubt
 from archfem.motion.motion import Motion
@@ -166,6 +167,10 @@ class DeadLoadResult:
             if isinstance(limit.fill, Fill) and not stands(self.case.structure, **limit.resistance):
                 words = "limit analysis with the fill of [limit] finds no equilibrium at rest"
                 lost.append(Doubt(words, "check the thickness of rings and piers, and the fill"))
+        loads = (*limit.dead, *self.case.assessment.options.get("loads", ()))
+        if self.case.has_motion and (forces := describe_forces(loads)):
+            words = "left out of runs, which have no loads but weights: {}"
+            lost.append(Doubt(words, "a limit analysis or an assessment counts it", (forces,)))
         return (*self.dead.model.doubts, *lost, *dead_load_doubts(self.dead, friction))
 
     @cached_property

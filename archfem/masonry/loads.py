@@ -1,14 +1,16 @@
 """Loads on a structure besides self-weight: body forces, point loads, settlements."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from math import hypot
+from typing import Any
 
 import numpy as np
 
 from archfem._typing import Array, Metres, Newtons
 from archfem._validation import check_between, check_integer, check_number, check_numbers
 from archfem.errors import InvalidInput
-from archfem.masonry.structure import Structure
+from archfem.masonry.structure import Structure, join_words
 from archfem.units import kN
 
 # Distance below which points are at one place, relative to the size of a structure [-]
@@ -250,6 +252,17 @@ def find_push(live: "Action | Settlement | Sequence[Action | Settlement]") -> fl
 def name_side(direction: float) -> str:
     """Name the sense of a horizontal push along x."""
     return "right" if direction > 0.0 else "left"
+
+
+def describe_forces(loads: Iterable[Any]) -> str:
+    """Describe constant forces without mass, but ties, each once; empty where there are none."""
+    places = [
+        (load.force, load.x if isinstance(load, PointLoad) else load.point[0])
+        for load in loads
+        if isinstance(load, PointLoad) or (isinstance(load, AttachedLoad) and not load.passive)
+    ]
+    found = [f"{hypot(*force) / kN:.3g} kN at x = {x:.3g} m" for force, x in places if any(force)]
+    return join_words([*dict.fromkeys(found)])
 
 
 def describe_massless(

@@ -277,3 +277,19 @@ def test_a_given_backing_has_no_default_of_the_other_key(key):
     listed = [*list_fill_values(af.Case.of({**BARE, "limit": limit}))]
     backings = {"limit.fill.backing", "limit.fill.backing_height"}
     assert [row for row in listed if row[0] in backings] == [(f"limit.fill.{key}", "0.5 m", True)]
+
+
+def test_forces_that_a_run_leaves_out_are_doubted_once():
+    """A thrust of 5 kN in both sections, a tie and a mass, which are no forces to be left out."""
+    thrust = {"block": "block 1", "point": [-0.3, 1.0], "force": [4e3, -3e3]}
+    loads = [thrust, thrust | {"force": [-9e3, 0.0], "passive": True}]
+    loads.append({"block": "block 1", "point": [0.0, 1.0], "weight": 1e3})
+    limit = {"horizontal": 1.0, "dead": [{"x": -0.3, "y": 1.0, "force": [4e3, -3e3]}]}
+    rigid = {"model": {"fidelity": "rigid"}, "assessment": {"loads": loads}, "limit": limit}
+    shaken = {"motion": {"synthetic": {"seed": 1, "duration": 4.0, "pga": 1.0}}}
+    for motion in ({}, shaken):
+        case = af.Case.of({"structure": COLUMN, **rigid, **motion})
+        at_rest = af.cases.DeadLoadResult.of(case)
+        said = [str(doubt) for doubt in at_rest.doubts if "left out of runs" in str(doubt)]
+        words = "left out of runs, which have no loads but weights: 5 kN at x = -0.3 m; a limit "
+        assert said == [f"{words}analysis or an assessment counts it"] * bool(motion)

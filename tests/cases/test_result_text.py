@@ -14,6 +14,7 @@ import archfem as af
 from archfem.cases.analysis_keys import parse_limit
 from archfem.cases.result_folder import limit_files
 from archfem.cases.result_text import (
+    _count_mechanisms,
     _mechanism_cell,
     describe_collapse,
     describe_limit,
@@ -65,6 +66,22 @@ def test_table_of_pairs_has_the_verdict_by_each_definition(run, tmp_path):
     assert strong["ring and pier at once"] == "-"  # there is no pier
     alone = tabulate_runs({"pair": af.History.read(run.save(tmp_path / "run.nc"))})
     assert alone.rows[0][alone.head.index("verified")] == "-"
+
+
+def test_peaks_of_a_run_that_ended_early_have_its_time_and_no_mechanism_is_unknown(run):
+    """The ground's peaks are those up to the end; where joints were lost none is no count."""
+    cut = af.History(run.dataset.assign_attrs(ended="parted"), run.structure)
+    table = tabulate_runs({"whole": run, "cut": cut})
+    whole, parted, _ = (dict(zip(table.head, row, strict=True)) for row in table.rows)
+    assert parted["max |ax|"] == f"{whole['max |ax|']} until {run.time[-1]:.2f} s"
+    calm = run.with_criteria(af.Criteria(hinge=0.5, failures=18, friction=100.0)).verdict
+    found = [calm.mechanisms, run.verdict.mechanisms]
+    for until, said in (("", "1 of 2"), (" until 1 s", "≥ 1 of 2")):
+        verdicts = [SimpleNamespace(mechanisms=x, until=until) for x in found]
+        assert _count_mechanisms(verdicts, "any joints at once") == said
+    lost = SimpleNamespace(mechanisms=calm.mechanisms, until=" until 1 s")
+    assert _count_mechanisms([lost, lost], "any joints at once") == "unknown"
+    assert _count_mechanisms([lost], "ring and pier at once") == "-"
 
 
 def test_a_mechanism_too_small_to_matter_stands_beside_the_first_that_is_not():

@@ -107,7 +107,7 @@ def test_opening_takes_its_area_or_is_refused(opening, area):
     lengths = {"breadth": 4.8, "height": 5.0, "eaves": 2.8, "width": 0.4}
     lengths["openings"] = [lay_opening(*opening)]
     if area is None:
-        with pytest.raises(InvalidStructure, match=r"has room for it below 2\.3 m"):
+        with pytest.raises(InvalidStructure, match=r"below 2\.3 m from the middle, 0\.2 of a s"):
             af.shapes.wall(**lengths)
         return
     wall = af.shapes.wall(**lengths)

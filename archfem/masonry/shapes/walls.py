@@ -164,7 +164,9 @@ def _check_opening(opening: Opening, height: float, reach: float) -> None:
     if not within or max(-left, right) >= reach:
         room = "no room for it and a lintel"
         if reach > 0.0 and opening.head < height:
-            room = f"room for it below {reach:.4g} m from the middle"
+            room = (
+                f"room for it below {reach:.4g} m from the middle, {LEAST_END:g} of a stone inside,"
+            )
         why = f"the wall is {height:.4g} m high, and has {room} there: move it, or make it smaller"
         if opening.sill >= opening.head:
             why = "its sill must be below its head"
