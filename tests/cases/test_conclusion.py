@@ -1328,3 +1328,15 @@ def test_a_column_of_a_wall_is_not_said_to_be_unchecked_across_its_plane():
         assert bool(conclusion._build_transverse(data)) is said
         verdict = dict(conclusion.list_facts(data)).get("verdict", "")
         assert ("it was not checked" in verdict) is said
+
+
+def test_a_pier_beside_a_door_rocks_first_across_the_plane():
+    """Two piers of 1 × 3 m with half of 1 × 1 m above a door rock from 0.25 / 1.643 g on."""
+    door = af.shapes.Opening(left=-0.5, breadth=1.0, head=2.0, name="door")
+    wall = af.shapes.wall(breadth=3.0, height=3.0, width=0.5, openings=[door])
+    motion = af.Motion.synthetic(duration=3.0, pga=5.0, seed=1)
+    found = find_falls_across(wall, {"a": motion})
+    assert [*found] == ["strip", "whole", "pier"]
+    arm = (3.0 * 1.5 + 0.5 * 2.5) / 3.5
+    assert found["pier"][0].rocks == pytest.approx(0.25 / arm * 9.81 / motion.pga, rel=5e-3)
+    assert "under 'a' the pier falls" in describe_falls_across(found, {"a": motion})
