@@ -310,9 +310,12 @@ def find_margin(found: Iterable[KinematicAssessment]) -> float:
 def compare_checks(checks: Sequence[Ratios]) -> str:
     """Say by which checks an assessment passes and by which it fails; empty where none differ."""
     moved = {way for check in checks if not check.linear for way in check.directions}
-    last = [x.decisive for x in checks if not (x.linear and moved.issuperset(x.directions))]
-    linear = [x.decisive for x in checks if x.linear]
-    return describe_difference(min(last, default=np.inf), min(linear, default=np.inf))
+    last = [x for x in checks if not (x.linear and moved.issuperset(x.directions))]
+    if not last or min(last, key=lambda x: x.decisive).bounded:  # which shows no passing
+        return ""
+    apart = (x.decisive if x.linear else x.least for x in last)
+    ratios = (x.decisive for x in last), apart, (x.decisive for x in checks if x.linear)
+    return describe_difference(*(min(each, default=np.inf) for each in ratios))
 
 
 def describe_margin(found: Iterable[KinematicAssessment]) -> str:

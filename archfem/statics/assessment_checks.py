@@ -213,17 +213,19 @@ class AssessmentCheck:
         )
 
 
-def describe_difference(displaced: float, linear: float) -> str:
+def describe_difference(displaced: float, apart: float, linear: float) -> str:
     """Say that it passes by displacements and fails by the linear check; empty where it does not.
 
     Args:
         displaced: least ratio of the checks by which it passes [-].
-        linear: that of all linear checks [-].
+        apart: the same with the weights of blocks apart [-].
+        linear: least ratio of all linear checks [-].
     """
-    if not displaced >= 1.0 > linear:
+    if not apart >= 1.0 > linear:
         return ""
+    passes = "passes" if displaced >= 1.0 else "passes or fails, by the split of weights,"
     return (
-        f"passes by displacements ({format_ratio(displaced)}), fails by the linear check "
+        f"{passes} by displacements ({format_ratio(displaced)}), fails by the linear check "
         f"({format_ratio(linear)}); no clause that was read says which governs"
     )
 

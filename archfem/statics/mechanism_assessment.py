@@ -200,8 +200,9 @@ class KinematicAssessment(ResultDisplay):
     def _summary(self) -> str:
         """Describe the result in one line."""
         vanishes = f"d_0* {self.d_0_star:.4g} m, " if np.isfinite(self.d_0_star) else ""
-        last = self.checks[-1]
-        outcome = describe_difference(last.decisive, self.linear.decisive) or last.outcome
+        last, linear = self.checks[-1], self.linear.decisive
+        apart = last.least if self.displacement else linear
+        outcome = describe_difference(last.decisive, apart, linear) or last.outcome
         return (
             f"KinematicAssessment of '{self.structure.name}': alpha_0 {self.alpha_0:.4g}, a_0* "
             f"{self.a_0_star:.4g} m/s², {vanishes}{outcome}"

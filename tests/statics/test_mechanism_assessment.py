@@ -26,6 +26,7 @@ from archfem.statics.assessment_checks import (
     BY_MECHANISM,
     BY_SPLIT,
     UPPER_BOUND,
+    describe_difference,
     spectral_acceleration,
 )
 
@@ -227,6 +228,8 @@ def test_a_check_that_alone_fails_is_in_every_headline_with_the_force_of_a_tie()
         "note: pushed to the right, the linear check is just passed with "
         f"{needed:.3g} kN of the tie at block 1"
     ]
+    bounded = replace(free, displacement=replace(free.displacement, bounded=True))
+    assert describe_margin([bounded]).endswith(": fails")  # an upper bound shows no passing
     # the report has the same words
     data = ReportData(case, {})
     vars(data)["statements"] = {"assessment": state_assessments(found, [])}
@@ -234,6 +237,27 @@ def test_a_check_that_alone_fails_is_in_every_headline_with_the_force_of_a_tie()
     assert (
         f"By the kinematic assessment on the NTC-2018 spectrum of PGA 0.29 g it {says}." in verdict
     )
+
+
+@pytest.mark.parametrize(
+    ("ratios", "words"),
+    [
+        (
+            (1.08, 1.08, 0.63),
+            "passes by displacements (1.08), fails by the linear check (0.63); ",
+        ),
+        (
+            (0.87, 1.04, 0.43),
+            "passes or fails, by the split of weights, by displacements (0.87)",
+        ),
+        ((0.9, 0.9, 0.6), ""),
+        ((1.2, 1.2, 1.1), ""),
+    ],
+)
+def test_a_difference_of_checks_is_one_of_passing_and_failing(ratios, words):
+    said = describe_difference(*ratios)
+    assert said.startswith(words)
+    assert bool(said) is bool(words)
 
 
 def test_a_tie_that_holds_its_point_has_no_displacement_check():

@@ -316,9 +316,11 @@ def _judge_check(data: ReportData, check: Ratios) -> tuple[str, str]:
         return f"it does not withstand under some assumptions on the fill {of}", words
     if check.least < 1.0:
         return f"it does not withstand {of}", ", which it fails"
+    differs = compare_checks(read_numbers(Ratios, data.statements.get("assessment")))
+    differs = f"on {of} it {differs}" * bool(differs)
     if check.by_split:
         words = ", which it fails with one weight a body"
-        return f"it withstands or not, by the split of weights, {of}", words
+        return differs or f"it withstands or not, by the split of weights, {of}", words
     if check.bounded:
         least = min(each.decisive for each in list_checks(data) if each.bounded)
         bound = f"its ratio, {format_ratio(least)}, is an upper bound"
@@ -326,8 +328,7 @@ def _judge_check(data: ReportData, check: Ratios) -> tuple[str, str]:
         return words, ", an upper bound"
     if check.moved and _say_motion(data, check.least, peak_of_spectrum(data.case)):
         return f"it withstands at rest alone, and moves in the runs, {of}", ""
-    differs = compare_checks(read_numbers(Ratios, data.statements.get("assessment")))
-    return f"on {of} it {differs}" if differs else f"it withstands {of}", ""
+    return differs or f"it withstands {of}", ""
 
 
 def _say_test(data: ReportData) -> str:
