@@ -557,7 +557,8 @@ def compare_push(case: Case, low: float, high: float, unit: float = 1.0) -> Push
         size = f"the demand of {ground:.3g} g"
     elif rock is not None:
         open_values = describe_spectrum_defaults(case)
-        size = f"the site's {rock:.3g} g × S {ground / rock:.3g}"
+        soil = f" × S {ground / rock:.3g}"
+        size = f"the site's {rock:.3g} g{soil * (soil != ' × S 1')}"
         size += f" ({open_values} by default)" * bool(open_values)
     return PushFactors(low * unit / ground, high * unit / ground, size)
 

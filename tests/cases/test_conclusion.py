@@ -19,6 +19,7 @@ from archfem.cases.report import conclusion, demands, doubts, report_data, secti
 from archfem.cases.report.outcomes import sentence
 from archfem.cases.report.report import _collect_data
 from archfem.cases.report.report_data import ReportData
+from archfem.cases.report.scales import find_first_failures
 from archfem.cases.report.study_findings import collect_findings
 from archfem.cases.result_text import UPPER_BOUNDS, PushFactors, site_acceleration
 from archfem.cases.run import MOTION_VARIABLE
@@ -183,11 +184,12 @@ def test_a_push_is_no_margin_of_what_moves(case, outcomes, verified, moves):
     end = "to move is no collapse"
     if moves:
         end = "runs that are no stronger move it, so that this is no margin"
-    assert say_margin(data, **stated) == [
+    said = [
         f"pushed sideways as rigid blocks it begins to move at 1.04 times {site}; it is the least "
         f"that a search found, and is proved to stand up to 0.9 times; {end}",
         f"pushed sideways with elastic joints it begins to move at 1.02 times {site}; {end}",
     ]
+    assert say_margin(data, **stated) == (said if moves else said[::-1])  # of margins the least
     unproved = {"limit": state("limit analysis", PushFactors(1.04, 1.04, site, 0.0))}
     assert f"found, and {conclusion.NO_PROOF}; {end}" in say_margin(data, **unproved)[0]
     less = {"limit": state("limit analysis", PushFactors(0.9, 0.9, site))}
@@ -229,6 +231,7 @@ def test_a_check_of_what_begins_to_move_is_one_of_displacements_where_it_moves(c
 
 
 def test_the_margin_of_scales_ends_where_it_is_dislocated(case):
+    """Each state is at its least scale of all motions, with the motion."""
     every = [
         scales("a", 1.38, moves=0.85, moves_in_all=True, dislocated=1.41, falls=4.5),
         scales("b", 2.0, falls=2.1),
@@ -238,8 +241,8 @@ def test_the_margin_of_scales_ends_where_it_is_dislocated(case):
     vars(data)["pairs"] = ("a", "b", "c", "d")
     assert say_margin(data, scale=state("scale", *every)) == [
         "the least margin is 1.38 on 'a', at a PGA of 0.276 g, of 2 motions",
-        "of the scales that were run it first moves as a verified mechanism at 0.850 × or less, is "
-        "dislocated at 1.41 × and falls at 4.50 ×",
+        "of the scales that were run it first moves as a verified mechanism at 0.850 × 'a' or "
+        "less, is dislocated at 1.41 × 'a' and falls at 1.00 × 'c'",
         "no scale is known up to which it stands under 'c'",
         "'d' was not scaled",
     ]
@@ -263,6 +266,52 @@ def test_the_margin_of_scales_ends_where_it_is_dislocated(case):
         )
 
 
+def test_a_first_fall_has_scale_peak_and_motion_of_one_search(case):
+    """Two motions of unlike peaks fall at the same scale."""
+    first, third = scales("first", 4.3, falls=4.56), scales("third", 4.3, falls=4.56)
+    data = data_of(case, first=verdict_of(), third=verdict_of())
+    vars(data)["statements"] = {"scale": state("scale", first, third._replace(pga=0.198))}
+    (words,) = find_first_failures(data)
+    over = "(0.903 to 0.912 g over motions and time steps)"
+    assert words == f"first falls at 0.903 g, 4.56 × 'third' {over}"  # 4.56 × 0.198 g
+
+
+def test_the_margin_said_first_is_the_least_of_the_report(case):
+    """Across the plane it is the width over twice the height of the centre, over the demand."""
+    names = ("foot", "west", "east", "beam")
+    lows, sizes = [(-1, -1), (0, 0), (1, 0), (0, 1)], [(4, 1), (0.5, 1), (0.5, 1), (1.5, 0.4)]
+    blocks = [
+        {"name": name, "outline": [[x, y], [x + b, y], [x + b, y + h], [x, y + h]]}
+        for name, (x, y), (b, h) in zip(names, lows, sizes, strict=True)
+    ]
+    blocks[0]["fixed"] = True
+    centre = (2 * 0.5 * 0.5 + 0.6 * 1.2) / 1.6  # [m]
+    structure = {"shape": "blocks", "width": 0.25, "blocks": blocks}
+    settings = {**case.settings, "structure": structure, "assessment": SPECTRUM}
+    data = data_of(af.Case.of(settings), a=verdict_of())
+    check = state("assessment", answers.Ratios("linear, q = 2", ["right"], 1.85, 1.85))
+    push = state("limit analysis", PushFactors(1.15, 1.15, "the site's 0.2 g"))
+    least = 0.25 / (2.0 * centre) / (2.0 / 9.80665)
+    said = say_margin(data, limit=push, assessment=check)
+    assert said[0].startswith(
+        f"the least margin is {least:.3g} across the plane of the drawing, which was not checked; "
+        "pushed sideways it begins to move at 1.15 times the site's 0.2 g"
+    )
+    assert said[1].startswith("the next is 1.85, on the EC8")
+    columns = {name: ("x", [0.9, 0.7]) for name in ("least_push_over_site", "least_push", "push")}
+    table = xr.Dataset(columns, {"x": [1.0, 2.0]})
+    vars(data)["studies"] = [collect_findings("", "", table)]
+    said = " ".join(say_margin(data, limit=push, assessment=check))
+    # the head begins with it, and says it once
+    assert "study" not in said
+    assert "the least margin" not in said
+    below = "In the study the least push, 0.7 g, is 0.7 times the site's acceleration, at x = 2"
+    verdict = head_of(conclusion.list_facts(data))
+    assert f"{below}; 2 of 2 cases are below it." in verdict
+    assert verdict.count("In the study") == 1
+    assert verdict.index("In the study") < verdict.index("it survives")
+
+
 def test_what_fails_under_a_motion_that_was_not_scaled_has_a_margin_below_one(case):
     """Of runs of 2 m/s²; a state that another motion reaches at a larger scale is no first one."""
     data = data_of(case, a=verdict_of(), b=verdict_of("dislocated"), c=verdict_of())
@@ -282,8 +331,8 @@ def test_what_fails_under_a_motion_that_was_not_scaled_has_a_margin_below_one(ca
     plain = head_of(conclusion.list_facts(data))
     assert plain.startswith("It survives with damage: it is dislocated but stands under 1 of 3 mot")
     # 2 m/s² are 0.204 g
-    said = "It is first dislocated at 0.204 to 0.4 g, 1.00 × 'b' (or less, 1.00 to 2.00 × over "
-    said += "motions and time steps). It first falls at 0.8 g, 4.00 × 'a'; 1 of 3 motions was "
+    said = "It is first dislocated at 0.204 g, 1.00 × 'b' (or less, 1.00 to 2.00 ×, 0.204 to 0.4 g "
+    said += "over motions and time steps). It first falls at 0.8 g, 4.00 × 'a'; 1 of 3 motions was "
     said += "scaled."
     assert said in plain
 
@@ -302,7 +351,7 @@ def test_the_stones_that_are_dislocated_stand_in_no_sentence_of_the_conclusion(c
     }
     plain = head_of(conclusion.list_facts(data))
     assert "it is dislocated but stands under 1 of 2 motions of PGA 0.20 g: b. It" in plain
-    assert "It is first dislocated at 0.19 to 0.204 g, 0.950 × 'a' (" in plain  # 0.95 × 0.2 g
+    assert "It is first dislocated at 0.19 g, 0.950 × 'a' (" in plain  # 0.95 × 0.2 g
     assert "Under 'a' it stands at 1.00 ×, but is dislocated at 0.950 ×: not" in plain
     assert "loses" not in conclusion.build_conclusion(data).pieces[0].text
 
@@ -347,7 +396,7 @@ def test_the_margin_of_a_stack_is_the_lesser_of_courses_and_of_one_body(case):
         assert say_margin(data_of(case), scale=state("scale", found[0], one))[:2] == [
             f"the least margin is below {at:#.3g} as one rigid body (1.40 in courses) on 'a', at a "
             f"PGA of {0.2 * at:.3g} g{fails}, of 2 motions",
-            "of the scales that were run it first falls at 1.50 ×",
+            "of the scales that were run it first falls at 1.35 × 'b'",
         ]
     said = say_margin(data_of(case), scale=state("scale", *found))
     assert said[0] == "the least margin is 1.30 on 'b', at a PGA of 0.26 g, of 2 motions"
@@ -385,9 +434,8 @@ def test_the_answer_has_displacements_the_first_fall_and_the_checks(case):
     assert head_of(facts.items()) == (
         "By the kinematic assessment it does not withstand the spectrum of the motion. Under its "
         "motions it survives: it stands under all 2 motions of PGA 0.20 g, and moves by 60 to 80 "
-        "mm. It first falls at 0.26 to 0.302 g, 1.30 × 'a' (1.30 to 1.51 × over motions and time "
-        "steps). No property was varied. Across the plane of the "
-        "drawing it was not checked."
+        "mm. It first falls at 0.26 g, 1.30 × 'a' (1.30 to 1.51 ×, 0.26 to 0.302 g over motions and "
+        "time steps). No property was varied. Across the plane of the drawing it was not checked."
     )
     assert facts["in doubt"] == "scale of the motion"
     pieces = conclusion.build_conclusion(data).pieces
@@ -767,7 +815,7 @@ def test_the_head_of_a_push_says_when_it_begins_to_move(case):
 @pytest.mark.parametrize(
     ("result", "finding", "words"),
     [
-        ("limit", "least_push_over_site", "push is 0.4 times the site's acceleration"),
+        ("limit", "least_push_over_site", "push, 0.08 g, is 0.4 times the site's acceleration"),
         ("assessment", "least_margin", "margin is ≤ 0.4"),
     ],
 )
@@ -782,13 +830,17 @@ def test_a_study_that_finds_less_is_named_beside_the_result(
     stated = state(result, {"limit": push, "assessment": check}[result])
     data = data_of(case)
     vars(data)["case"] = af.Case.of({**case.settings, "assessment": SPECTRUM})
-    table = xr.Dataset({finding: ("x", [0.7, least, np.nan])}, {"x": [1.0, 2.0, 3.0]})
+    found = np.array([0.7, least, np.nan])
+    columns = {finding: ("x", found)} | dict.fromkeys(("least_push", "push"), ("x", 0.2 * found))
+    table = xr.Dataset({finding: columns.pop(finding)}, {"x": [1.0, 2.0, 3.0]})
+    table = table.assign(columns) if result == "limit" else table
     bounds = "least_margin" * (result == "assessment")
     table[UPPER_BOUNDS] = "x", [bounds] * 3
     vars(data)["studies"] = [collect_findings("", "", table)]
     margin = say_margin(data, **{result: stated})
     verdict = head_of(conclusion.list_facts(data))
-    lower = f"in the study the least {words}, at {place}{', where the check fails' * bool(bounds)}"
+    below = ", where the check fails" if bounds else "; 2 of 3 cases are below it"
+    lower = f"in the study the least {words}, at {place}{below}"
     # in the head, and not again
     assert [x for x in margin if "study" in x] == []
     assert (sentence(lower) in verdict) == ("study" in verdict) == bool(place)
@@ -1183,7 +1235,8 @@ def test_a_study_of_another_structure_has_no_part_in_the_answer(case, tmp_path, 
         data = ReportData(given, {}, study_folders=shown)
         vars(data)["statements"] = {"limit": state("limit", push)}
         facts = dict(conclusion.list_facts(data))
-        said = f"In the study '{least}' the least push is 0.75 times the site's acceleration"
+        words = "the least push, 0.15 g, is 0.75 times the site's acceleration"
+        said = f"In the study '{least}' {words}"
         verdict = head_of(facts.items())
         assert (said in verdict) == ("study" in verdict) == bool(least)
         words = "The study 'other': none of its cases is known to have the structure of this report"

@@ -89,6 +89,9 @@ NO_PROOF = "may begin at any less, as no lower bound is known"
 # What the ends of a range are of, where stones bear on fill
 OVER_FILL = "; its range is over what is assumed of the fill"
 
+# What is said of a push below which shaking moves a structure
+NO_MARGIN = "runs that are no stronger move it, so that this is no margin"
+
 # Lines of the head with the answer, in their order
 HEAD = ("verdict", "margin", "depends on", "not checked")
 
@@ -135,7 +138,8 @@ def _say_plainly(data: ReportData, doubtful: Sequence[str]) -> Iterator[tuple[st
     unchecked, overturns = _say_unchecked(data)
     answer, margin, depends, left = HEAD
     if data.runs:
-        failing = [*assessed * bool(failed), *unchecked * overturns]
+        less = [words for least, words, _ in _say_less(data) if least < 1.0]
+        failing = [*assessed * bool(failed), *unchecked * overturns, *less]
         yield from ((answer, x) for x in _say_survival(data, doubtful, failing))
         yield from ((margin, x) for x in [*_say_first_failures(data), *say_fragile(data)])
         yield from ((depends, x) for x in _say_conditions(data))
@@ -149,7 +153,7 @@ def _say_plainly(data: ReportData, doubtful: Sequence[str]) -> Iterator[tuple[st
             for row in stated.rows[:1]:
                 times = f", at {row.factor} times {row.demand}" * (row.factor != "-")
                 yield answer, f"{row.result}: {row.outcome}{times * (name != 'risk')}"
-    yield from ((margin, x) for least, x in _say_less(data) if least < 1.0 or not data.runs)
+    yield from ((margin, x) for _, x, _ in _say_less(data) if not data.runs)
     yield from [] if data.runs and overturns else ((left, x) for x in unchecked)
 
 
@@ -192,19 +196,22 @@ def _say_pushes(data: ReportData, name: str, stated: Statement) -> Iterator[str]
             yield next(_describe_push(data, name, push))
 
 
-def _say_less(data: ReportData) -> Iterator[tuple[float, str]]:
-    """Yield the least margin and the least push of studies where they are below the result's."""
+def _say_less(data: ReportData) -> Iterator[tuple[float, str, str]]:
+    """Yield the least margin and the least push of studies where they are below the result's.
+
+    They are a number, a sentence and the name of the study.
+    """
     margins = [x.decisive for x in read_numbers(Ratios, data.statements.get("assessment"))]
     pushes = [x.least for x in read_numbers(PushFactors, data.statements.get("limit")) if x.site]
-    site = "the least push is {} times the site's acceleration"
+    site = "the least push{} is {} times the site's acceleration"
     for name, words, own in (
-        ("least_margin", "the least margin is {}", margins),
+        ("least_margin", "the least margin{} is {}", margins),
         (OVER_SITE, site, pushes),
     ):
-        least, text, place, study = find_least(data.own_studies, name)
+        least, texts, place, study = find_least(data.own_studies, name)
         fails = ", where the check fails" * (name == "least_margin" and least < 1.0)
         if least < 0.999 * min(own, default=np.inf):
-            yield least, f"in {study} {words.format(text)}, at {place}{fails}"
+            yield least, f"in {study} {words.format(*texts)}, at {place}{fails}", study
 
 
 def _say_ratings(data: ReportData, stated: Statement) -> Iterator[str]:
@@ -274,8 +281,10 @@ def _say_conditions(data: ReportData) -> Iterator[str]:
         yield f"with other plausible properties it {found.count}{under}"
     # the section of a study names its cases
     every = [text for each in data.own_studies for text in say_what_changes(each)]
+    below = [study for least, _, study in _say_less(data) if least < 1.0]  # as the verdict says
     studied = [text.partition(": ")[0] for text in every]
-    if ranges or not studied:
+    studied = [text for text in studied if not any(f"in {x} " in text for x in below)]
+    if ranges or not every:
         yield _say_what_decides(data.verdict_ranges)
     yield from studied
 
@@ -486,21 +495,43 @@ def _say_causes(ranges: Sequence[VerdictRange]) -> Iterator[str]:
 
 
 def _describe_margin(data: ReportData) -> Iterator[str]:
-    """Yield the least factor on the demand of an earthquake, maybe as a range, and the others."""
+    """Yield the factors on the demands of an earthquake, the least first, maybe as ranges.
+
+    Where the least is across the plane, the next stands in the same sentence. What the head states
+    is counted and not repeated.
+    """
+    margins = sorted(_list_margins(data), key=lambda each: each[0])
+    push, demand = _find_unchecked_push(data) or (np.nan, 0.0)
+    if margins and push < demand * margins[0][0]:
+        across = f"{push / demand:.3g} across the plane of the drawing, which was not checked"
+        _, is_ranked, texts = margins[0]
+        first = "; ".join([across, *("in it " * is_ranked + x for x in texts[:1])])
+        margins[0] = push / demand, True, [first, *texts[1:]]
+    for k, (_, is_ranked, texts) in enumerate(margins):
+        rank = ("the least margin is ", "the next is ", "then follows ")[min(k, 2)] * is_ranked
+        yield from [*(f"{rank}{x}" for x in texts[:1]), *texts[1:]]
+
+
+def _list_margins(data: ReportData) -> Iterator[tuple[float, bool, list[str]]]:
+    """Yield factors on demands with their sentences, and whether they lack a subject and verb.
+
+    A push that is no margin has an infinite one.
+    """
     checks = read_numbers(Ratios, data.statements.get("assessment"))
-    margins = [*sorted(_describe_check(data, each) for each in checks)[:1], *describe_scales(data)]
+    for least, texts in sorted(_describe_check(data, each) for each in checks)[:1]:
+        yield least, True, texts
+    for least, texts in describe_scales(data):
+        yield least, True, texts
     for least, at, _, body in sorted(_say_across(data))[:1]:
         text = f"below {at}: {body} across the plane as one rigid body, held by nothing else"
-        margins.append((least, [text]))
-    for k, (_, (first, *others)) in enumerate(sorted(margins)):
-        rank = ("the least margin is", "the next is", "then follows")[min(k, 2)]
-        yield from [f"{rank} {first}", *others]
-    # the head states the others
+        yield least, True, [text]
     for name in (x for x in ("limit", "pushover") if x in data.statements):
         for push in (x for x in read_numbers(PushFactors, data.statements[name]) if x.site):
-            of_head = not data.runs or push.least < 1.0
-            yield from [*_describe_push(data, name, push)][of_head:]
-    yield from (words for least, words in _say_less(data) if data.runs and least >= 1.0)
+            texts = [*_describe_push(data, name, push)]
+            least = np.inf if NO_MARGIN in texts[0] else push.least
+            yield least, False, texts[not data.runs or push.least < 1.0 :]
+    for least, words, _ in _say_less(data):
+        yield least, False, [words] * (bool(data.runs) and least >= 1.0)
 
 
 def _say_across(data: ReportData) -> Iterator[tuple[float, str, str, str]]:
@@ -525,7 +556,7 @@ def _describe_push(data: ReportData, name: str, push: PushFactors) -> Iterator[s
         proved = push.proved and f"is proved to stand up to {format_ratio(push.proved)} times"
         text += f"; it is the least that a search found, and {proved or NO_PROOF}"
     if moves and push.least >= 1.0:  # shaken it moves before
-        yield f"{text}; runs that are no stronger move it, so that this is no margin"
+        yield f"{text}; {NO_MARGIN}"
         return
     yield f"{text}; to move is no collapse"
     if then := moves if data.runs else "shaken it may begin to move at less":

@@ -55,22 +55,22 @@ def find_first_failures(data: ReportData) -> Iterator[str]:
     some = f"; {len(searches)} of {count} motions {was} scaled" * (len(searches) < count)
     some += f"; {UNFINISHED}" * any(x.unfinished for x in searches)
     for state in ("falls", "dislocated", "mechanism"):
-        first = {x.motion: (x.states[state], x.pga) for x in searches if state in x.states}
-        first |= {name: (1.0, peak) for name, (found, peak) in unscaled.items() if found == state}
-        every = [*first.values()]
-        every += [(x.all_steps, x.pga) for x in searches if x.all_steps and state == "falls"]
-        scales = [scale for scale, _ in every]
-        if not first or min(scales) >= least:  # a dislocation beyond a fall says nothing
+        first = [(x.states[state], x.pga, x.motion) for x in searches if state in x.states]
+        first += [(1.0, peak, name) for name, (found, peak) in unscaled.items() if found == state]
+        # a dislocation beyond a fall says nothing
+        if not first or min(first)[0] >= least:
             continue
-        least, ends = min(scales), Ends.of(scales)
-        name = min(first, key=lambda motion: first[motion][0])
+        every = [(scale, scale * pga, name) for scale, pga, name in first]
+        least, peak, name = min(every)  # all three of one motion
+        steps = [(x.all_steps, x) for x in searches if state == "falls"]
+        every += [(scale, scale * x.pga, x.motion) for scale, x in steps if scale]
+        ends = [f"{Ends.of(x[0] for x in every):#.3g} ×", f"{Ends.of(x[1] for x in every):.3g} g"]
         over = " and ".join(["motions"] * several + ["time steps"])
-        notes = ["or less"] * (name in unscaled)
-        notes += [f"{ends:#.3g} × over {over}"] * (f"{ends[0]:#.3g}" != f"{ends[1]:#.3g}")
+        wide = ", ".join(x for x in ends if " to " in x)
+        notes = ["or less"] * (name in unscaled) + [f"{wide} over {over}"] * bool(wide)
         motion = f"'{name}'" if several or count > 1 else "the motion"
-        peaks = Ends.of(scale * peak for scale, peak in every)
         beside = f" ({', '.join(notes)})" * bool(notes)
-        yield f"{_STATES[state][1]} at {peaks:.3g} g, {least:#.3g} × {motion}{beside}{some}"
+        yield f"{_STATES[state][1]} at {peak:.3g} g, {least:#.3g} × {motion}{beside}{some}"
         some = ""  # once
 
 
@@ -96,13 +96,13 @@ def describe_scales(data: ReportData) -> Iterator[tuple[float, list[str]]]:
     for name, (state, peak) in unscaled.items():
         fails = f"under which it {_STATES[state][0]}, and which was not scaled"
         yield np.nextafter(1.0, 0.0), [f"below 1 on '{name}', PGA {peak:.2f} g, {fails}"]
-    made = sorted((each for each in searches if each.held), key=_bound)
+    made = sorted((each for each in searches if each.held), key=lambda x: (_bound(x), x.pga))
     if not made:
         return
-    first, states = made[0], made[0].states
+    first = made[0]
     # between the scales that were run nothing is known
-    failing = {"dislocated", "falls", "mechanism"} & states.keys()
-    met = min((states[state] for state in failing), default=np.inf)
+    failing = {"dislocated", "falls", "mechanism"} & first.states.keys()
+    met = min((first.states[state] for state in failing), default=np.inf)
     words = f"{first.held:#.3g}" + f" ({UNFINISHED})" * first.unfinished
     if _bound(first) < first.held:
         met = min(met, _bound(first))
@@ -110,13 +110,11 @@ def describe_scales(data: ReportData) -> Iterator[tuple[float, list[str]]]:
     words += f" on '{first.motion}', at a PGA of {_bound(first) * first.pga:.3g} g"
     words += ", which it fails" * (met <= 1.0)
     words += f", of {len(made)} motions" * (len(made) > 1)
-    less = {"moves": " or less" * first.moves_in_all}
-    ends = [f"{_STATES[x][0]} at {scale:#.3g} ×{less.get(x, '')}" for x, scale in states.items()]
-    if not {"falls", "mechanism"} & states.keys():
-        ends += ["falls at none"]
-    first_at = f"of the scales that were run it first {join_words(ends)}"
-    if first.again and {"falls", "mechanism"} & states.keys():  # a crossing is not claimed
-        first_at += f"; it {say_again(first.again)}"
+    states = join_words([*_say_first_states(searches, first.motion)])
+    first_at = f"of the scales that were run it first {states}"
+    falls = [x for x in searches if {"falls", "mechanism"} & x.states.keys()]
+    again = [f"it {say_again(x.again)}" for x in falls if x.again]  # a crossing is not claimed
+    first_at = "; ".join([first_at, *again[:1]])
     texts = [words, first_at, *_say_as_one(searches)]
     # a search without a scale that holds may have the least of all
     if none := [f"'{each.motion}'" for each in searches if not each.held]:
@@ -125,6 +123,21 @@ def describe_scales(data: ReportData) -> Iterator[tuple[float, list[str]]]:
     if left := [f"'{pair}'" for pair in data.pairs if pair not in known]:
         texts.append(f"{join_words(left)} {'were' if left[1:] else 'was'} not scaled")
     yield _bound(first), texts
+
+
+def _say_first_states(searches: list[Scales], motion: str) -> Iterator[str]:
+    """Yield each state with its least scale of all motions, named if one is not as given."""
+    least = dict[str, Scales]()
+    for state in _STATES:
+        if found := [x for x in searches if state in x.states]:
+            least[state] = min(found, key=lambda x: (x.states[state], x.pga))
+    others = any(each.motion != motion for each in least.values())
+    for state, each in least.items():
+        less = " or less" * (state == "moves" and each.moves_in_all)
+        of = f" '{each.motion}'" * others
+        yield f"{_STATES[state][0]} at {each.states[state]:#.3g} ×{of}{less}"
+    if not {"falls", "mechanism"} & least.keys():
+        yield "falls at none"
 
 
 def _bound(search: Scales) -> float:

@@ -266,18 +266,23 @@ def say_below_site(found: StudyFindings) -> Iterator[str]:
         yield f"{count} below the site's acceleration: {list_first(listed, MAX_NAMES, '; ')}"
 
 
-def find_least(studies: Sequence[StudyFindings], name: str) -> tuple[float, str, str, str]:
+def find_least(
+    studies: Sequence[StudyFindings], name: str
+) -> tuple[float, tuple[str, str], str, str]:
     """Return the least value of a finding in studies, its words, its case and its study.
 
-    It is infinite without one.
+    It is infinite without one. The words are a push in g, if it is one, and the value.
     """
-    rows = [
-        (row[name], mark_bound(row, name, f"{row[name]:.3g}"), found.label(row), found.name)
-        for found in studies
-        if name in found.names
-        for row in found.worst.to_dict("records")
-    ]
-    return min((row for row in rows if row[0] == row[0]), default=(np.inf, "", "", ""))
+    rows = list[tuple[float, tuple[str, str], str, str]]()
+    for found in (each for each in studies if name in each.names):
+        worst = found.worst.to_dict("records")
+        below = sum(row.get(name, np.nan) < 1.0 for row in worst)
+        count = f"; {below} of {len(worst)} cases are below it" * (name == OVER_SITE and below > 1)
+        for row in worst:
+            push = row.get("least_push", np.nan) if name == OVER_SITE else np.nan
+            words = f", {push:.3g} g," * (push == push), mark_bound(row, name, f"{row[name]:.3g}")
+            rows.append((row[name], words, f"{found.label(row)}{count}", found.name))
+    return min((row for row in rows if row[0] == row[0]), default=(np.inf, ("", ""), "", ""))
 
 
 def _find_reached_ends(found: StudyFindings, row: Any) -> list[str]:
