@@ -267,7 +267,11 @@ def describe_margins_at_rest(case: Case, structure: Structure) -> list[str]:
         return high
     least = least_friction(structure) or 0.0
     open_ones = [each.name for each in contacts if "friction" in list_default_keys(case, each)]
-    lines = [f"as rigid blocks {sentence}", describe_geometric_factor(structure), *high]
+    lines = [
+        f"as rigid blocks {sentence}",
+        describe_geometric_factor(structure, case.limit.strength),
+        *high,
+    ]
     if open_ones and least > DRY_FRICTION[0]:
         names = join_names([f'contacts."{name}"' for name in sorted(open_ones)])
         words = f"friction decides whether it stands: {_OF_DRY}"

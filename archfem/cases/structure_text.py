@@ -130,7 +130,8 @@ def describe_thickness(case: Case, ring: Ring) -> tuple[list[Row], list[str]]:
         f"{describe_crushing(limit.strength, case.structure)}",
     ]
     rows = [Row(RESULTS["thickness"], "at rest", words, f"{factor:.4g}", {"most": factor})]
-    if len(ring.stones) < len(case.structure.free) and (whole := geometric_factor(case.structure)):
+    whole = geometric_factor(case.structure, limit.strength)
+    if len(ring.stones) < len(case.structure.free) and whole:
         depth = f"{1.0 / whole:.3g} of what is built"
         rows.append(
             Row("least depth of all joints", "at rest", depth, f"{whole:.4g}", {"most": whole})

@@ -352,9 +352,8 @@ def extremes_remark(dataset: xr.Dataset) -> list[str]:
         left = abs(np.diff(joints["slip"].values[[0, -1], number]).item())
         part = ", elastic: |V| stays below its limit there"
         if left > 0.05 * slips.max():
-            part = (
-                f", of which parts of the face keep {left / mm:.3g} mm: |V| stays below its limit"
-            )
+            part = f", of which {left / mm:.3g} mm remain, as part of the face slid"
+            part += ": |V| stays below its limit"
     return [f"{rotation}, largest slip {_peak_text(joints, slips, mm, 'mm')}{part}"]
 
 

@@ -102,7 +102,7 @@ def least_friction(structure: Structure) -> float | None:
 
 
 @lru_cache(maxsize=8)
-def geometric_factor(structure: Structure) -> float | None:
+def geometric_factor(structure: Structure, strength: float | None = np.inf) -> float | None:
     """Find Heyman's geometric factor of safety of a structure at rest: of all joints at once.
 
     The joints become less deep about their middles, at the same weight, until a thrust line
@@ -111,6 +111,7 @@ def geometric_factor(structure: Structure) -> float | None:
 
     Args:
         structure: structure with its friction and cohesion; fill does not press.
+        strength: as for `collapse_factor`, where the joints crush [Pa]; they do not by default.
 
     Returns:
         Depth of the joints over the least one [-], 20 where it is that or more; None where the
@@ -125,15 +126,17 @@ def geometric_factor(structure: Structure) -> float | None:
         1.89
     """
     check_type(structure, Structure, "structure", "give one, e.g. circular_arch(…)")
-    least = _find_least(structure, "depth", _LITTLE_DEPTH, 1.0)
+    least = _find_least(structure, "depth", _LITTLE_DEPTH, 1.0, strength)
     return None if least is None else 1.0 / least
 
 
-def _find_least(structure: Structure, name: str, low: float, high: float) -> float | None:
+def _find_least(
+    structure: Structure, name: str, low: float, high: float, strength: float | None = np.inf
+) -> float | None:
     """Return the least value of a property with which it stands, from `low` on."""
     try:
         refuse_bonds(structure)
-        _, dead = self_weight_programme(structure, "coulomb", np.inf, None)
+        _, dead = self_weight_programme(structure, "coulomb", strength, None)
         if _stands(dead, **{name: low}):
             return low
         find = _least_friction if name == "cap" else _least_value
@@ -150,9 +153,9 @@ def describe_friction(structure: Structure) -> str:
     return f"{_say_friction(least)}{less}"
 
 
-def describe_geometric_factor(structure: Structure) -> str:
+def describe_geometric_factor(structure: Structure, strength: float | None) -> str:
     """Describe the geometric factor of safety at rest, of a structure that stands."""
-    factor = geometric_factor(structure) or 1.0
+    factor = geometric_factor(structure, strength) or 1.0
     more = " or more" if factor >= 1.0 / _LITTLE_DEPTH else ""
     return (
         f"geometric factor of safety at rest: {factor:.3g}{more}, as it stands with all joints "
@@ -262,7 +265,9 @@ def _stands(
         coefficient = np.maximum(coefficient, friction)
     coefficient = np.minimum(coefficient, cap)
     deepened, cohesion = DeepenedBlocks(blocks.structure, depth), depth * dead.cohesion
-    relaxed = replace(dead, blocks=deepened, friction=coefficient, cohesion=cohesion)
+    crushing = None if dead.crushing is None else depth * dead.crushing
+    limits = {"friction": coefficient, "cohesion": cohesion, "crushing": crushing}
+    relaxed = replace(dead, blocks=deepened, **limits)
     return is_balanced(relaxed.minimise_residual(), relaxed)
 
 

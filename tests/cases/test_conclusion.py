@@ -899,6 +899,26 @@ def test_ratings_that_disagree_are_all_in_the_headline(case, norm, says):
     assert all(f"{name}: factor" in verdict or name in says for name in found)
 
 
+def test_without_a_norm_a_rating_without_a_code_comes_first(case):
+    """Those by codes, which none has asked for, are in the head where they fail."""
+    codes = {"lorry by CS 454": ("1.6", True), "lorry": ("4.1", True)}
+    codes |= {"lorry alone at walking pace (1.1 × 1, from memory)": ("4.5", True)}
+    for least, passes in (("1.6", True), ("0.9", False)):
+        codes["lorry by CS 454"] = least, passes
+        rows = [
+            answers.Row("rating", name, f"in words {name}", factor, {"passes": each})
+            for name, (factor, each) in codes.items()
+        ]
+        settings = {key: value for key, value in case.settings.items() if key != "motion"}
+        data = ReportData(af.Case.of(settings), {})
+        vars(data)["statements"] = {"rating": answers.Statement([], rows)}
+        fails = "" if passes else " It fails for lorry by CS 454 (0.9)."
+        verdict = dict(conclusion.list_facts(data))["verdict"]
+        assert verdict == f"Rating for lorry: factor 4.1, in words lorry.{fails}"
+        tables = [x for x in conclusion.build_conclusion(data).pieces if hasattr(x, "rows")]
+        assert tables[0].rows[0][1] == "lorry"
+
+
 @pytest.mark.parametrize(("ag", "overturns"), [(0.1, False), (0.2, True)])
 def test_a_demand_that_overturns_it_across_its_plane_is_in_the_conclusion(ag, overturns):
     """An arch on piers that overturns across its plane at 0.15 g; a site of 1.2 ag."""
@@ -935,7 +955,9 @@ def test_a_demand_that_overturns_it_across_its_plane_is_in_the_conclusion(ag, ov
     verdict = head_of(conclusion.list_facts(shaken))
     assert verdict.startswith(f"Across the plane of the drawing {words} Under its") is overturns
     assert verdict.count("it was not checked") == 1
-    # a vehicle is no earthquake
+    # a least thickness is one in the plane, and a vehicle is no earthquake
+    vars(data)["statements"] = {"thickness": answers.Statement([], [])}
+    assert words in dict(conclusion.list_facts(data))["verdict"]
     vars(data)["statements"] = {"rating": answers.Statement([], [])}
     assert conclusion._build_transverse(data) == []
 

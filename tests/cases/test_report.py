@@ -570,7 +570,7 @@ def test_every_input_has_its_mark():
     expected = {
         "breadth": ("1 m", "given"),
         "gravity": ("9.81 m/s²", "default"),
-        "stone: E": ("5 GPa", "given"),
+        "stone: E": ("5 GPa (unused: blocks are rigid)", "given"),
         "stone: weight": ("20 kN/m³ (table 2 of Demirel and Aldemir (2021))", "default"),
         "stone to stone: μ": ("0.6 (dry stone has 0.4 to 0.8)", "default"),
         "stone to stone: cohesion": ("2 kPa", "given"),
@@ -602,7 +602,8 @@ def test_a_value_is_given_by_the_table_of_its_material_whatever_its_name(young, 
     assert case.settings["materials"].keys() == {"stone 2"}
     assert case.structure.blocks[1].material.name == "stone"
     rows = {row[0]: row[1:] for row in tabulate_inputs(report_data.ReportData(case, {})).rows}
-    assert rows["stone: E"] == (f"{young / 1e9:g} GPa", "given")
+    unused = " (unused: blocks are rigid)"
+    assert rows["stone: E"] == (f"{young / 1e9:g} GPa{unused}", "given")
     assert rows["stone: weight"] == ("24.03 kN/m³", "given")
     assert "materials" not in "".join(each.key for each in list_defaults(case))
     # a strength under that key counts in limit analyses, too
@@ -654,7 +655,7 @@ def test_materials_that_differ_in_weight_alone_stand_once():
     rows = [row for row in tabulate_inputs(data).rows if row[0].startswith("m")]
     assert rows[:3] == [
         ("m1 and 2 more: stands also for", "the wall above", "given"),
-        ("m1 and 2 more: E", "30 GPa", "given"),
+        ("m1 and 2 more: E", "30 GPa (unused: blocks are rigid)", "given"),
         ("m1 and 2 more: weight", "20 kN/m³ to 60 kN/m³", "given"),
     ]
     assert not [row for row in rows if row[0].startswith("m2")]
@@ -1095,6 +1096,9 @@ def test_a_history_alone_has_a_report_and_a_film_by_the_command_line(
     assert af.commands.main(["report", str(path)]) == 0
     words = words_of(tmp_path / "moved.html")
     assert "It survives: it forms no mechanism under the motion 'first' of PGA 0.05 g" in words
+    # no folder is beside it
+    assert "attribute 'case' of the history" in words
+    assert "case.toml" not in words
     given = ["--out", str(tmp_path / "film.gif"), "--size", "480x320", "--fps", "5"]
     assert af.commands.main(["animate", str(path), *given]) == 0
     assert (tmp_path / "film.gif").is_file()
@@ -1205,7 +1209,8 @@ def test_a_study_stands_in_a_report(kept, unplotted, tmp_path, capsys):
         "In the study 'Breadths' the push is least, 0.25 g, at structure.breadth = 0.5."
         in conclusion
     )
-    assert "Lengths" not in conclusion.partition("were not varied")[0]
+    unvaried = conclusion.partition("were not varied")[0].rpartition(". ")[2]
+    assert "engths (varied in statics alone), stiffness, friction, damp" in unvaried
     assert af.commands.main(["report", str(kept), "--study", str(tmp_path)]) == 1
     assert "has no study.txt: run `archfem study`" in capsys.readouterr().err
     (tmp_path / "progress.json").write_text("{}", encoding="utf-8")

@@ -247,6 +247,24 @@ def test_of_factors_the_least_is_the_worst():
     assert text == "in the study the factor is least, 0.4, at friction = 0.4, width = 2"
 
 
+def test_what_changes_nothing_is_said_once():
+    table = xr.Dataset({"push": ("case", [0.6, 0.7, 0.6])}, {"case": ["as is", "thick", "soft"]})
+    found = study_findings.collect_findings("t", "", table)
+    assert study_findings.tabulate_study(found).caption == "Study: t; 'soft' changed nothing"
+    axes = {"friction": [0.5, 0.4], "young": [1.0, 2.0]}
+    for values, said in (
+        ([[0.6, 0.6], [0.5, 0.5]], "; young changed nothing"),
+        ([[0.6, 0.7], [0.5, 0.5]], ""),
+    ):
+        varied = xr.Dataset({"push": ((*axes,), values)}, axes)
+        found = study_findings.collect_findings("t", "", varied)
+        assert study_findings.tabulate_study(found).caption == f"Study: t{said}"
+    # samples differ in all of what is varied
+    rows = {"friction": ("point", [0.5, 0.4]), "young": ("point", [1.0, 2.0])}
+    sampled = xr.Dataset({"push": ("point", [0.6, 0.6])}, rows)
+    assert study_findings.collect_findings("t", "", sampled).idle == []
+
+
 @pytest.mark.parametrize(
     ("values", "said"),
     [

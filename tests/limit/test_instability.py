@@ -76,7 +76,11 @@ def test_the_geometric_factor_of_a_block_on_a_slope(slope, factor):
         assert found is None
         return
     assert found == pytest.approx(factor, rel=2e-3)  # of the bisection
-    assert ("20 or more" in describe_geometric_factor(stone)) == (factor == 20.0)
+    assert ("20 or more" in describe_geometric_factor(stone, np.inf)) == (factor == 20.0)
+    # where it crushes, half the depth is the eccentricity and half the stress block
+    normal = STONE.unit_weight * 0.5 * np.cos(np.arctan(slope))
+    found = af.limit.geometric_factor(stone, 10.0 * normal)
+    assert found == pytest.approx(1.0 / (0.5 * slope + 0.1), rel=2e-3)
 
 
 def test_cohesion_of_less_deep_joints_is_less():

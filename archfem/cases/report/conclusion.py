@@ -215,29 +215,38 @@ def _say_less(data: ReportData) -> Iterator[tuple[float, str, str]]:
 
 
 def _say_ratings(data: ReportData, stated: Statement) -> Iterator[str]:
-    """Yield the least rating by the norm of the report, the least of others, and unlike ones."""
+    """Yield the least rating by the norm of the report, the least of others, and unlike ones.
+
+    Without a norm the least without a code comes first, and others only if they are unlike.
+    """
     own = [row for row in stated.rows if _is_of_norm(data, row.demand)]
     others = [row for row in stated.rows if row not in own]
-    for row, needed in [*((x, ", 1 is required") for x in own[:1]), *((x, "") for x in others[:1])]:
+    has_norm = bool(data.case.report.get("norm"))
+    shown = [*own[:1], *others[: has_norm or not own]]
+    for row in shown:
+        needed = ", 1 is required" * (has_norm and row in own)
         # the result has the place of the vehicle
         outcome, _, over = row.outcome.partition("; ")
         outcome = outcome.partition(", with ")[0]
         yield f"rating for {row.demand}: factor {row.factor}{needed}, {outcome}"
         yield from [over] * bool(over)
-    shown, left = [*own[:1], *others[:1]], [*own[1:], *others[1:]]
+    left = [row for row in (*own, *others) if row not in shown]
     passes, fails = ([x for x in left if x.numbers["passes"] is state] for state in (True, False))
     if any(x.numbers["passes"] for x in shown):
         passes = []  # one is enough
     elif not passes:
         fails = []  # as all do
-    for words, rows in ("fails too", fails), ("passes", passes):
+    too = " too" * any(not x.numbers["passes"] for x in shown)
+    for words, rows in (f"fails{too}", fails), ("passes", passes):
         if rows:
             yield f"it {words} for {join_words([f'{x.demand} ({x.factor})' for x in rows])}"
 
 
 def _is_of_norm(data: ReportData, text: str) -> bool:
-    """Return whether a text on a rating is of the norm of the report."""
+    """Return whether a text on a rating is of the norm of the report; of no code without one."""
     norm = data.case.report.get("norm", "").upper().replace(" ", "")
+    if not norm:
+        return not any(words in text for words in (" by Eurocodes", " by CS 454", "from memory"))
     codes = {"EUROCODE": "by Eurocodes", "EN199": "by Eurocodes", "CS454": "by CS 454"}
     return any(key in norm and words in text for key, words in codes.items())
 
@@ -398,7 +407,7 @@ def build_conclusion(data: ReportData) -> Section:
 
 def _build_transverse(data: ReportData) -> list[TextBlock]:
     """Build the paragraph on what is not checked across the plane, for results of earthquakes."""
-    if not data.runs and not data.statements.keys() - {"rating", "thickness"}:
+    if not data.runs and not data.statements.keys() - {"rating"}:
         return []
     if not (text := describe_transverse_push(data.case.structure)):
         return []
@@ -458,7 +467,8 @@ def _build_paragraphs(data: ReportData, doubtful: Sequence[str]) -> dict[str, li
     changes += [f"by its finish {name} is {wider}" for name, *_, wider in ranges if wider]
     if single := list_unvaried(data):
         none = "; displacements have no range" * (bool(data.runs) and not data.verdict_ranges)
-        verb = "were" if len(single) > 1 or single[0].endswith("s") else "was"
+        several = len(single) > 1 or single[0].partition(" (")[0].endswith("s")
+        verb = "were" if several else "was"
         changes.append(f"{join_words(single)} {verb} not varied{none}")
     given = [key for key in ("suite", "motion") if data.case.settings.get(key)]
     if given and not data.runs and not {"scale", "risk"} & data.statements.keys():

@@ -222,10 +222,12 @@ def list_elastic_fill(data: ReportData) -> list[str]:
 
 def list_unvaried(data: ReportData) -> list[str]:
     """Return what was not varied, without which "no doubt" says little."""
-    studied = {each for study in data.own_studies for each in list_studied(study)}
+    studied, static = set[str](), set[str]()
+    for study in data.own_studies:
+        (static if data.runs and study.is_static else studied).update(list_studied(study))
     if not data.runs:
-        static = {"limit", "assessment", "pushover"} & data.statements.keys()
-        return [each for each in ("lengths", "friction") if static and each not in studied]
+        computed = {"limit", "assessment", "pushover"} & data.statements.keys()
+        return [each for each in ("lengths", "friction") if computed and each not in studied]
     single = ["motion"] if len(data.runs) == 1 else []
     if not data.verdict_ranges:
         single += ["lengths", "stiffness", "friction", "damping"]
@@ -243,7 +245,8 @@ def list_unvaried(data: ReportData) -> list[str]:
         steps = {run.partition(",")[0] for x in searches for run in x.splitlines()[1:]}
         stepped = "dt" in list_varied(data) or len(steps) > 1
         single += ["fidelity"] if stepped else ["time step", "fidelity"]
-    return [each for each in single if each not in studied]
+    alone = " (varied in statics alone)"
+    return [f"{each}{alone * (each in static)}" for each in single if each not in studied]
 
 
 def peak_of_ground(run: History) -> float:

@@ -115,13 +115,15 @@ def _structure_rows(data: ReportData) -> Iterator[Row]:
     kinds = shape_keys(table["shape"])
     parts = {**PARTS_BY_NAME.get(table["shape"], {}), "backfill": Backfill}
     drawn = ("blocks", "joints") if "drawing.txt" in data.files else ()
+    alone = data.runs and not data.folder
+    corners = ", maybe of a drawing: a history keeps their corners alone" if alone else ""
     for key, value in table.items():
         if key in ("material", "contact", "width", "gravity"):
             continue
         mark = "inferred" if key in drawn else "given"
         text = describe_value(value, kinds.get(key))
         if key == "shape":
-            text = "outlines" if drawn else _say_key(value)
+            text = "outlines" if drawn else f"{_say_key(value)}{corners * (value == 'blocks')}"
         if key in ("blocks", "joints"):
             text = f"{len(value)}, by their corners"
         yield key.replace("_", " "), text, mark
@@ -247,6 +249,8 @@ def _list_given(data: ReportData, item: Material | Contact) -> Iterator[Row]:
             if own != text:  # the compliance of pieces is in their joints
                 yield word, own, mark
                 word, mark = f"{word} of its pieces", "inferred"
+        stated = (_FURTHER_PROPERTIES["poisson"][0], *[_YOUNG] * (mark == "given"))
+        text += " (unused: blocks are rigid)" * (word in stated and data.fidelity == "rigid")
         yield word, text, mark
 
 

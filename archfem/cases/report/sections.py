@@ -506,5 +506,6 @@ def build_source_section(data: ReportData) -> Section:
         if "inputs" in run.dataset.attrs
     ]
     rows.append(("SHA-256 of the case", sha256(data.case.text().encode()).hexdigest()))
-    rows.append(("the case as a file", "case.toml in the folder of the results"))
+    place = "case.toml in the folder of the results"
+    rows.append(("the case as a file", place if data.folder else "attribute 'case' of the history"))
     return Section("Versions and digests", [Grid((), rows)])

@@ -91,6 +91,27 @@ class StudyFindings:
         return self.names[0]
 
     @property
+    def is_static(self) -> bool:
+        """Whether its cases are computed without histories."""
+        return "fall" not in self.table and not {*_FACTORS}.isdisjoint(self.names)
+
+    @property
+    def idle(self) -> list[str]:
+        """Cases, or keys that were varied one by one, that change no finding."""
+        rows, names = self.worst, [*self.names]
+        texts = rows[names].map("{:.6g}".format)
+        if self.keys == ("case",):
+            same = (texts == texts.iloc[0]).all(axis=1)
+            return [f"'{name}'" for name in rows["case"][same][1:]]
+        idle = list[str]()
+        for key in self.keys:
+            others = [rows[each] for each in self.keys if each != key] or [rows[key].isna()]
+            groups = texts.groupby(others)
+            if groups.size().min() > 1 and groups.nunique().max(axis=None) == 1:
+                idle.append(key)
+        return idle
+
+    @property
     def under(self) -> str:
         """Under which motions of a suite the cases were run, in words; "" without a suite."""
         found = [self.table[name].values for name in _MOTIONS if name in self.table.coords]
@@ -203,6 +224,7 @@ def tabulate_study(found: StudyFindings) -> Grid:
         rows.append([*cells, f"{row['fall']}{count}"] if state else cells)
     caption = f"Study: {found.title}{found.under}"
     caption += "; of each case the worst of each column over its motions" if several else ""
+    caption += f"; {join_words(found.idle)} changed nothing" * bool(found.idle)
     if left := order.iloc[MAX_CASES:].to_dict("records"):
         falls = sum(row["falls"] > 0 for row in left)
         caption += f"; {len(left)} of {len(order)} cases are left out, of which {falls} fall"
