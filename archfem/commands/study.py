@@ -84,7 +84,8 @@ def _write_results(definition: "Study", table: xr.Dataset, folder: Path) -> list
         if isinstance(definition, Comparison) and factors:
             picture = draw_study(factors, definition.reduction, title)
         else:
-            picture = draw_findings(table)
+            # the push in g, as in the table, is the factor in its unit
+            picture = draw_findings(found.numbers if "push" in found.names else table)
         write_files({"study.png": picture}, folder)
     except InvalidInput as error:
         print(f"no picture: {error}")

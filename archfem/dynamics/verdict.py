@@ -9,7 +9,12 @@ import xarray as xr
 from archfem._display import DOUBT_MARK
 from archfem._threads import single_threaded
 from archfem._typing import Array
-from archfem.dynamics.collapse_state import DISLOCATION, CollapseState, shallowest_part
+from archfem.dynamics.collapse_state import (
+    DISLOCATION,
+    FALLEN_STATES,
+    CollapseState,
+    shallowest_part,
+)
 from archfem.joints.criteria import (
     Criteria,
     assessed_joints,
@@ -58,6 +63,9 @@ ROCKS_SOFTLY = (
 # Displacement up to which a mechanism is too small to matter, over the depth of the shallowest
 # part, a hundredth of a dislocation [-]
 SMALL_DISPLACEMENT = 0.001
+
+# Why a fall by hinges may have no verified mechanism before
+HELD = ", as joints that had not failed, assessed or not, held it"
 
 # What a run without doubts still leaves open
 NO_RANGE = "one motion, one set of properties: range not computed"
@@ -158,7 +166,9 @@ class Verdict:
         lines += self.remarks
         for words, names in groups.items():
             subject, until = ("mechanism by ", self.until) if words == "none" else ("", "")
-            lines.append(f"{subject}{join_names(names)}: {words}{until}")
+            fell = self.fall is not None and self.fall.kind in FALLEN_STATES
+            held = HELD * (fell and words == "none" and "verified" in names)
+            lines.append(f"{subject}{join_names(names)}: {words}{until}{held}")
         return "\n".join(lines)
 
     def __repr__(self) -> str:

@@ -900,7 +900,7 @@ def test_ratings_that_disagree_are_all_in_the_headline(case, norm, says):
 
 
 def test_without_a_norm_a_rating_without_a_code_comes_first(case):
-    """Those by codes, which none has asked for, are in the head where they fail."""
+    """Ratings by codes stand in the head where they fail."""
     codes = {"lorry by CS 454": ("1.6", True), "lorry": ("4.1", True)}
     codes |= {"lorry alone at walking pace (1.1 × 1, from memory)": ("4.5", True)}
     for least, passes in (("1.6", True), ("0.9", False)):

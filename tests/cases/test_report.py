@@ -9,6 +9,7 @@ from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
 from types import SimpleNamespace
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -677,7 +678,7 @@ def test_of_outlines_the_inputs_have_lengths_that_are_measured():
         replace(ring, origin=None): [
             ("arch", f"clear span {span:.3g} m, rise {rise:.3g} m, thickness 0.55 m"),
             ("stones", f"17 that can move, of {areas:.2g} m²"),
-            ("blocks", "19, by their corners"),
+            ("blocks", "17 and 2 fixed, by their corners"),
         ],
         portal("ring"): [
             ("lintel", "clear span 2 m, bearings 0.5 m"),
@@ -1188,7 +1189,7 @@ def test_a_motion_is_measured_to_its_end_where_the_structure_falls_before(tmp_pa
 
 
 @pytest.mark.slow
-def test_a_study_stands_in_a_report(kept, unplotted, tmp_path, capsys):
+def test_a_study_stands_in_a_report(kept, unplotted, tmp_path, capsys, monkeypatch):
     table = tomllib.loads(CASE)["suite"]["pairs"]["first"]["synthetic"]
     study, folder = tmp_path / "study.toml", tmp_path / "study"
     (tmp_path / "one.toml").write_text(
@@ -1199,7 +1200,12 @@ def test_a_study_stands_in_a_report(kept, unplotted, tmp_path, capsys):
         'title = "Breadths"\ncase = "one.toml"\ncompute = "limit"\nset = ["limit.horizontal=1"]\n'
         "[vary]\nstructure.breadth = [0.5, 1.0]\n"
     )
+    drawn = Mock(side_effect=af.errors.InvalidInput("not drawn"))
+    monkeypatch.setattr("archfem.view.studies.draw_findings", drawn)
     assert af.commands.main(["study", str(study), "--out", str(folder), "--workers", "1"]) == 0
+    (shown,) = drawn.call_args.args
+    assert shown["push"].attrs["units"] == "g"
+    assert "factor" not in shown
     assert af.commands.main(["report", str(kept), "--study", str(folder)]) == 0
     shown = " ".join(words_of(kept / "report.html").split("Study of many cases")[2].split())
     assert "Study: Breadths." in shown

@@ -116,7 +116,8 @@ def list_facts(data: ReportData) -> list[tuple[str, str]]:
         if report.get(key) and key != "demand"  # it stands beside the capacities
     ]
     structure = data.case.structure
-    blocks = [("structure", f"{len(structure.free)} blocks, {len(structure.joints)} joints")]
+    joints = len({*structure.face_names})
+    blocks = [("structure", f"{len(structure.free)} blocks, {joints} joints")]
     blocks += [("joints", structure.assessment)] if structure.assessment else []
     doubtful = list_decisive_doubts(data, list_doubts(data))
     doubts = [("in doubt", ", ".join(doubtful))] if doubtful else []

@@ -115,7 +115,9 @@ def _structure_rows(data: ReportData) -> Iterator[Row]:
     kinds = shape_keys(table["shape"])
     parts = {**PARTS_BY_NAME.get(table["shape"], {}), "backfill": Backfill}
     drawn = ("blocks", "joints") if "drawing.txt" in data.files else ()
-    alone = data.runs and not data.folder
+    free, alone = len(structure.free), data.runs and not data.folder
+    counts = {"blocks": f"{free} and {len(structure.blocks) - free} fixed"}
+    counts["joints"] = f"{len({*structure.face_names})}"
     corners = ", maybe of a drawing: a history keeps their corners alone" if alone else ""
     for key, value in table.items():
         if key in ("material", "contact", "width", "gravity"):
@@ -125,7 +127,7 @@ def _structure_rows(data: ReportData) -> Iterator[Row]:
         if key == "shape":
             text = "outlines" if drawn else f"{_say_key(value)}{corners * (value == 'blocks')}"
         if key in ("blocks", "joints"):
-            text = f"{len(value)}, by their corners"
+            text = f"{counts[key]}, by their corners"
         yield key.replace("_", " "), text, mark
         if key in parts:
             own = [set(each) for each in value.values() if isinstance(each, Mapping)]
@@ -140,7 +142,7 @@ def _structure_rows(data: ReportData) -> Iterator[Row]:
     yield "width", f"{structure.width:g} m", _mark("width" in table)
     yield "gravity", f"{structure.gravity:g} m/s²", _mark("gravity" in table)
     if "joints" not in table and table["shape"] in ("blocks", "outlines"):
-        yield "joints", f"{len(structure.joints)}, where outlines touch", "inferred"
+        yield "joints", f"{counts['joints']}, where outlines touch", "inferred"
 
 
 def _measure_rows(structure: Structure) -> Iterator[Row]:
@@ -303,7 +305,8 @@ def _command_rows(data: ReportData) -> Iterator[Row]:
             continue
         for key, value in table.items():
             if key != "fill":
-                yield f"{section}: {key.replace('_', ' ')}", describe_value(value), "given"
+                unit = "× the weight" * (key in ("horizontal", "vertical"))
+                yield f"{section}: {key.replace('_', ' ')}", describe_value(value, unit), "given"
         if section in _FUNCTIONS:
             inherited = (
                 dict.fromkeys(data.case.assessment.of_limit) if section == "assessment" else {}

@@ -214,7 +214,7 @@ def _describe_extent(structure: Structure) -> str:
     text = (
         f"{length:.3g} m long, {height:.3g} m high and {structure.width:g} m wide; {len(moving)} "
         f"blocks that can move, weighing {structure.weight / kN:.4g} kN, and "
-        f"{len(structure.joints)} joints."
+        f"{len({*structure.face_names})} joints."
     )
     loads = Counter(block.material.stands_for for block in moving)
     for load, count in ((x, k) for x, k in loads.items() if x not in (None, COURSE_LENGTH)):
