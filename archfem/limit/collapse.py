@@ -544,7 +544,7 @@ def _solve_collapse(
         if friction is not None and not structure.tension.any():  # bonds that hold stay closed
             warn_cohesion(structure, tuple(failing), result.joints, result.factor)
     if friction == "coulomb":
-        warn_sliding(result.sliding_names, result.factor)
+        warn_sliding(structure, result.sliding, result.factor)
     return result
 
 
@@ -610,7 +610,7 @@ def read_bounds(structure: Structure, bounds: FillBounds, friction: str | None) 
     joints = _read_joints(structure, blocks, regions, bounds.below.forces)
     result = Collapse(lower, outcome, hinges, slides, joints, regions.expand_motion(motion))
     if friction is not None:
-        warn_sliding(result.sliding_names, result.factor)
+        warn_sliding(structure, result.sliding, result.factor)
     return replace(result, soil=bounds.contact_stress, fill_motion=bounds.fill_motion, upper=upper)
 
 

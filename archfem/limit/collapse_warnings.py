@@ -31,9 +31,9 @@ def warn_dilatancy(structure: Structure) -> None:
         )
 
 
-def warn_sliding(names: Sequence[str], factor: float) -> None:
-    """Warn of joints that slide and, by associated flow, dilate."""
-    if names:
+def warn_sliding(structure: Structure, sliding: Sequence[int], factor: float) -> None:
+    """Warn of joints that slide and, by associated flow, dilate; of curved faces as one."""
+    if names := [*dict.fromkeys(structure.face_names[k] for k in sliding)]:
         logger.warning(
             "joints slide (%s): with the dilatancy of associated flow the factor %.4g is an "
             "upper estimate; friction='nonassociated' does without it",

@@ -17,7 +17,12 @@ from archfem._typing import Array
 from archfem._validation import check_type
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.limit.linear_programme import Programme, RigidBlocks
-from archfem.limit.self_weight import is_balanced, refuse_bonds, self_weight_programme
+from archfem.limit.self_weight import (
+    check_options,
+    is_balanced,
+    refuse_bonds,
+    self_weight_programme,
+)
 from archfem.masonry.block import Block, as_point, say_place
 from archfem.masonry.structure import CONTACT_TOLERANCE, Structure, join_joint_names
 
@@ -126,6 +131,7 @@ def geometric_factor(structure: Structure, strength: float | None = np.inf) -> f
         1.89
     """
     check_type(structure, Structure, "structure", "give one, e.g. circular_arch(…)")
+    strength = check_options(structure, "coulomb", strength)
     least = _find_least(structure, "depth", _LITTLE_DEPTH, 1.0, strength)
     return None if least is None else 1.0 / least
 
@@ -266,8 +272,8 @@ def _stands(
     coefficient = np.minimum(coefficient, cap)
     deepened, cohesion = DeepenedBlocks(blocks.structure, depth), depth * dead.cohesion
     crushing = None if dead.crushing is None else depth * dead.crushing
-    limits = {"friction": coefficient, "cohesion": cohesion, "crushing": crushing}
-    relaxed = replace(dead, blocks=deepened, **limits)
+    relaxed = replace(dead, blocks=deepened, friction=coefficient, cohesion=cohesion)
+    relaxed = replace(relaxed, crushing=crushing)
     return is_balanced(relaxed.minimise_residual(), relaxed)
 
 

@@ -230,6 +230,6 @@ def name_joints(joints: Sequence[Joint], blocks: Sequence[Block]) -> list[Joint]
     for k, joint in enumerate(joints):
         words = " to ".join(blocks[number].name for number in joint.blocks)
         if pairs.count(joint.blocks) > 1:
-            words += f", face {pairs[: k + 1].count(joint.blocks)}"
+            words += f", {pairs[: k + 1].count(joint.blocks)}"
         named.append(replace(joint, name=words))
     return named

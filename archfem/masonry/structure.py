@@ -499,7 +499,7 @@ class Structure(ResultDisplay):
             # a step, of 90°, has two faces
             if len(numbers) > 1 and min(turns) > 0.5:
                 for number in numbers:
-                    names[number] = re.sub(r", face \d+$", "", names[number])
+                    names[number] = re.sub(r", \d+$", "", names[number])
         return names
 
     @cached_property

@@ -35,10 +35,11 @@ def test_a_load_that_lifts_is_named(force, said, warned):
 
 
 def test_joints_that_slide_are_named_with_their_factor(warned):
-    collapse_warnings.warn_sliding([], 0.3)
+    structure = SimpleNamespace(face_names=["a", "b", "c", "c"])  # the last of two chords
+    collapse_warnings.warn_sliding(structure, [], 0.3)
     assert not warned()
-    collapse_warnings.warn_sliding(["a", "b"], 0.31416)
-    assert "joints slide (a; b)" in warned()
+    collapse_warnings.warn_sliding(structure, [0, 2, 3], 0.31416)
+    assert "joints slide (a; c)" in warned()
     assert "factor 0.3142 is" in warned()
 
 

@@ -81,6 +81,8 @@ def test_the_geometric_factor_of_a_block_on_a_slope(slope, factor):
     normal = STONE.unit_weight * 0.5 * np.cos(np.arctan(slope))
     found = af.limit.geometric_factor(stone, 10.0 * normal)
     assert found == pytest.approx(1.0 / (0.5 * slope + 0.1), rel=2e-3)
+    with pytest.raises(af.errors.InvalidInput, match="strength"):
+        af.limit.geometric_factor(stone, -1.0)
 
 
 def test_cohesion_of_less_deep_joints_is_less():
