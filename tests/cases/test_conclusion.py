@@ -434,8 +434,9 @@ def test_the_answer_has_displacements_the_first_fall_and_the_checks(case):
     assert head_of(facts.items()) == (
         "By the kinematic assessment it does not withstand the spectrum of the motion. Under its "
         "motions it survives: it stands under all 2 motions of PGA 0.20 g, and moves by 60 to 80 "
-        "mm. It first falls at 0.26 g, 1.30 × 'a' (1.30 to 1.51 ×, 0.26 to 0.302 g over motions and "
-        "time steps). No property was varied. Across the plane of the drawing it was not checked."
+        "mm. It first falls at 0.26 g, 1.30 × 'a' (1.30 to 1.51 ×, 0.26 to 0.302 g over motions "
+        "and time steps). No property was varied. "
+        "Across the plane of the drawing it was not checked."
     )
     assert facts["in doubt"] == "scale of the motion"
     pieces = conclusion.build_conclusion(data).pieces
@@ -957,7 +958,7 @@ def test_a_demand_that_overturns_it_across_its_plane_is_in_the_conclusion(ag, ov
     assert verdict.count("it was not checked") == 1
     # a least thickness is one in the plane, and a vehicle is no earthquake
     vars(data)["statements"] = {"thickness": answers.Statement([], [])}
-    assert words in dict(conclusion.list_facts(data))["verdict"]
+    assert words in head_of(conclusion.list_facts(data))
     vars(data)["statements"] = {"rating": answers.Statement([], [])}
     assert conclusion._build_transverse(data) == []
 

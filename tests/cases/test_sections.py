@@ -375,7 +375,9 @@ def test_numbers_of_joints_say_until_when_where_loose_blocks_followed(ended, run
     for key, values in ("max |e|", run.joints["eccentricity"]), ("max V/N", run.joints["friction"]):
         assert row[key] == f"{float(abs(values).max()):.3f}{until}"
     assert row["any joints at once"] == f"none{until}"
-    assert table.rows[-1][table.head.index("any joints at once")] == ("unknown" if until else "0 of 1")
+    assert table.rows[-1][table.head.index("any joints at once")] == (
+        "unknown" if until else "0 of 1"
+    )
     assert response.describe_mechanism(run.verdict) == f"none by any definition{until}"
     data = SimpleNamespace(dead=run.joints.isel(time=0))
     assert ("until 0.10 s, before" in response._tabulate_joints(data, run).caption) is bool(until)
