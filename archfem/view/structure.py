@@ -429,9 +429,10 @@ def _name_part(axes: Axes, joints: Sequence[Joint], inch: float, top: float) -> 
         names = [str(k) for k in range(len(names))]
     for joint, name, way in list(zip(joints, names, outward, strict=True))[::every]:
         # from the face to the middle of a name, of which a figure is 0.64 of its size wide
-        reach = size * (0.5 + abs(way) @ [0.32 * len(name), 0.4])
+        reach = size * (0.5 + abs(way) @ [0.32 * len(name), 0.4]) * way
+        reach[1] += 0.5 * size * (name == "base")  # above the line of the ground
         look |= {"ha": "center", "va": "center_baseline", "fontsize": size}
-        style.annotate(axes, name, joint.ends[0], reach * way, **look)
+        style.annotate(axes, name, joint.ends[0], reach, **look)
     if not joints[0].name.startswith(f"{joints[0].part}, "):
         return
     is_ring = joints[0].role == "ring"

@@ -435,8 +435,8 @@ def test_the_answer_has_displacements_the_first_fall_and_the_checks(case):
         "By the kinematic assessment it does not withstand the spectrum of the motion. Under its "
         "motions it survives: it stands under all 2 motions of PGA 0.20 g, and moves by 60 to 80 "
         "mm. It first falls at 0.26 g, 1.30 × 'a' (1.30 to 1.51 ×, 0.26 to 0.302 g over motions "
-        "and time steps). No property was varied. "
-        "Across the plane of the drawing it was not checked."
+        "and time steps). No property was varied. Across the plane of the drawing it was not "
+        "checked."
     )
     assert facts["in doubt"] == "scale of the motion"
     pieces = conclusion.build_conclusion(data).pieces

@@ -93,6 +93,18 @@ def test_no_name_is_written_over_another_in_the_figures_of_a_report():
         assert [joint.name for joint in own] == sides.split(" and ")
 
 
+def test_names_of_bases_stand_above_the_ground(bridge):
+    figure = draw_names(bridge)
+    figure.draw_without_rendering()
+    feet = [note for word, note in written(figure) if word == "base"]
+    assert len(feet) > 1
+    for note in feet:
+        ground = figure.axes[0].transData.transform(note.xy)[1]
+        # the letters have room for descenders below them
+        box = note.get_window_extent()
+        assert box.y0 + 0.25 * box.height > ground
+
+
 # a ring without anything above it
 PIERS = af.Case.of(
     {

@@ -468,8 +468,7 @@ def _build_paragraphs(data: ReportData, doubtful: Sequence[str]) -> dict[str, li
     changes += [f"by its finish {name} is {wider}" for name, *_, wider in ranges if wider]
     if single := list_unvaried(data):
         none = "; displacements have no range" * (bool(data.runs) and not data.verdict_ranges)
-        several = len(single) > 1 or single[0].partition(" (")[0].endswith("s")
-        verb = "were" if several else "was"
+        verb = "were" if len(single) > 1 or single[0].partition(" (")[0].endswith("s") else "was"
         changes.append(f"{join_words(single)} {verb} not varied{none}")
     given = [key for key in ("suite", "motion") if data.case.settings.get(key)]
     if given and not data.runs and not {"scale", "risk"} & data.statements.keys():
