@@ -300,6 +300,14 @@ def test_the_margin_said_first_is_the_least_of_the_report(case):
     assert said[1].startswith("the next is 1.85, on the EC8")
     columns = {name: ("x", [0.9, 0.7]) for name in ("least_push_over_site", "least_push", "push")}
     table = xr.Dataset(columns, {"x": [1.0, 2.0]})
+    # one between them, which the head states, is counted
+    higher = table.assign(least_push_over_site=("x", [0.9, 0.85]))
+    vars(data)["studies"] = [collect_findings("", "", higher)]
+    said = say_margin(data, assessment=check)
+    assert said[0].endswith(
+        f"is {least:.3g} across the plane of the drawing, which was not checked"
+    )
+    assert said[1].startswith("then follows 1.85, on the EC8")
     vars(data)["studies"] = [collect_findings("", "", table)]
     said = " ".join(say_margin(data, limit=push, assessment=check))
     # the head begins with it, and says it once

@@ -516,7 +516,7 @@ def _describe_margin(data: ReportData) -> Iterator[str]:
         across = f"{push / demand:.3g} across the plane of the drawing, which was not checked"
         _, is_ranked, texts = margins[0]
         first = "; ".join([across, *("in it " * is_ranked + x for x in texts[:1])])
-        margins[0] = push / demand, True, [first, *texts[1:]]
+        margins[: bool(texts)] = [(push / demand, True, [first, *texts[1:]])]
     for k, (_, is_ranked, texts) in enumerate(margins):
         rank = ("the least margin is ", "the next is ", "then follows ")[min(k, 2)] * is_ranked
         yield from [*(f"{rank}{x}" for x in texts[:1]), *texts[1:]]
