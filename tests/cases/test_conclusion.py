@@ -15,7 +15,7 @@ from pages import head_of
 import archfem as af
 from archfem._files import read_sealed_json, write_sealed_json
 from archfem.cases import answers
-from archfem.cases.report import conclusion, demands, doubts, report_data, sections
+from archfem.cases.report import conclusion, demands, doubts, margins, report_data, sections
 from archfem.cases.report.outcomes import sentence
 from archfem.cases.report.report import _collect_data
 from archfem.cases.report.report_data import ReportData
@@ -93,7 +93,7 @@ def scales(motion, held, **given):
 def say_margin(data, **statements):
     """Sentences on the margin of made-up results."""
     vars(data)["statements"] = statements
-    return [*conclusion._describe_margin(data)]
+    return [*margins.describe_margin(data)]
 
 
 def range_of(*displacements, outcome="stands", motion="first", sampled=False, error=""):
@@ -191,7 +191,7 @@ def test_a_push_is_no_margin_of_what_moves(case, outcomes, verified, moves):
     ]
     assert say_margin(data, **stated) == (said if moves else said[::-1])  # of margins the least
     unproved = {"limit": state("limit analysis", PushFactors(1.04, 1.04, site, 0.0))}
-    assert f"found, and {conclusion.NO_PROOF}; {end}" in say_margin(data, **unproved)[0]
+    assert f"found, and {margins.NO_PROOF}; {end}" in say_margin(data, **unproved)[0]
     less = {"limit": state("limit analysis", PushFactors(0.9, 0.9, site))}
     least = f"pushed sideways it begins to move at 0.9 times {site}; to move is no collapse"
     # the head has it, and the margin does not repeat it
@@ -515,14 +515,14 @@ def test_a_search_of_scales_by_several_time_steps_has_varied_the_step(case, seco
 
 def test_an_upper_bound_is_no_doubt_about_a_study_whose_cases_all_fail_by_it(case):
     bound, other = Doubt(f"the curve is {UPPER_BOUND}"), Doubt("no step converges")
-    for margins, doubt, listed in (
+    for each_margin, doubt, listed in (
         ([0.76, 0.72], bound, []),
         ([0.76, 1.02], bound, ["study"]),
         ([0.76, 0.72], other, ["study"]),
         ([], bound, ["study"]),
     ):
         data = data_of(case)
-        found = SimpleNamespace(worst={"least_margin": margins}, doubts=[doubt], is_own=True)
+        found = SimpleNamespace(worst={"least_margin": each_margin}, doubts=[doubt], is_own=True)
         vars(data)["studies"] = [found]
         assert doubts.list_decisive_doubts(data, [(doubts.STUDIES, doubt)]) == listed
 
@@ -950,7 +950,7 @@ def test_a_demand_that_overturns_it_across_its_plane_is_in_the_conclusion(ag, ov
     assert 0.12 < push < 0.24
     data = ReportData(case, {})
     vars(data)["statements"] = {"limit": answers.Statement([], [])}
-    (block,) = conclusion._build_transverse(data)
+    (block,) = margins.build_transverse(data)
     assert block.text.startswith("Held by nothing else, all of it begins to overturn at ")
     assert (block.manner == "doubt") is overturns
     words = f". The largest demand, {1.2 * ag:.3g} g, exceeds it ({1.2 * ag / push:.3g} ×)"
@@ -968,7 +968,7 @@ def test_a_demand_that_overturns_it_across_its_plane_is_in_the_conclusion(ag, ov
     vars(data)["statements"] = {"thickness": answers.Statement([], [])}
     assert words in head_of(conclusion.list_facts(data))
     vars(data)["statements"] = {"rating": answers.Statement([], [])}
-    assert conclusion._build_transverse(data) == []
+    assert margins.build_transverse(data) == []
 
 
 def wall_in_bond(**section):
@@ -1010,7 +1010,7 @@ def test_a_report_of_a_wall_has_its_falls_across_the_plane_as_one_rigid_body(mon
     )
     assert "was not computed" not in verdict
     assert "survives" not in verdict
-    (text,) = conclusion._build_transverse(data)
+    (text,) = margins.build_transverse(data)
     assert text.text.startswith("Held by nothing else, ")
     rows = [row for name, row in conclusion._capacity_rows(data) if not name]
     assert [(row.demand, row.factor) for row in rows] == [("'strong', of 0.1 to 2 ×", scale)] * 2
@@ -1029,7 +1029,7 @@ def test_a_report_of_a_wall_has_its_falls_across_the_plane_as_one_rigid_body(mon
     data = data_of(data.case, weak=verdict_of())
     vars(data)["motions"] = {"weak": sine(1.0, edge, 1, 1e-3)}
     monkeypatch.setattr(report_data, "find_falls_across", Mock(side_effect=InvalidInput("no face")))
-    (text,) = conclusion._build_transverse(data)
+    (text,) = margins.build_transverse(data)
     assert text.text.endswith(". Not checked against the motions across: no face.")
     # a column is no wall in bond, and may be drawn across its plane
     column = data_of(af.Case.of({"structure": {"shape": "column", "breadth": 1, "heights": [2]}}))
@@ -1115,7 +1115,7 @@ def test_a_structure_with_rings_that_stands_across_its_plane_was_checked(monkeyp
     assert "ring" in {joint.role for joint in data.case.structure.joints}
     falls = {"strip": (FirstFall(np.inf, None), "m"), "whole": (FirstFall(np.inf, None), "m")}
     monkeypatch.setattr(report_data, "find_falls_across", lambda *_: falls)
-    (text,) = conclusion._build_transverse(data)
+    (text,) = margins.build_transverse(data)
     assert text.text.startswith("Held by nothing else, ")
     assert "not checked" not in head_of(conclusion.list_facts(data))
     rows = [row.outcome for name, row in conclusion._capacity_rows(data) if not name]
@@ -1217,9 +1217,9 @@ def test_runs_beyond_the_push_of_a_demand_say_nothing_of_it():
     data = data_of(case, a=verdict_of("stands", verified="rocks"))
     run = data.runs["a"]
     run.dataset.attrs["pga"] = 0.3 * 9.80665
-    assert conclusion._say_motion(data, 2.0, 0.2) == "in the runs it moves, and falls in none"
-    assert conclusion._say_motion(data, 2.0, 0.1) == ""
-    assert conclusion._say_motion(data, 2.0, np.nan) != ""
+    assert margins._say_motion(data, 2.0, 0.2) == "in the runs it moves, and falls in none"
+    assert margins._say_motion(data, 2.0, 0.1) == ""
+    assert margins._say_motion(data, 2.0, np.nan) != ""
 
 
 def test_a_demand_of_limit_analysis_comes_before_that_of_the_site():
@@ -1409,7 +1409,7 @@ def test_a_column_of_a_wall_is_not_said_to_be_unchecked_across_its_plane():
         column |= {} if above is None else {"above": above}
         data = ReportData(af.Case.of({"structure": column}), {})
         vars(data)["statements"] = {"limit": answers.Statement([], [])}
-        assert bool(conclusion._build_transverse(data)) is said
+        assert bool(margins.build_transverse(data)) is said
         head = head_of(conclusion.list_facts(data))
         assert ("it was not checked" in head.lower()) is said
 

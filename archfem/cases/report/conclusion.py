@@ -8,10 +8,10 @@ import numpy as np
 
 from archfem._files import group_of, read_file_list
 from archfem.cases import result_text
-from archfem.cases.answers import RESULTS, Ratios, Row, Statement, compare_checks, read_numbers
+from archfem.cases.answers import RESULTS, Row, Statement, read_numbers
 from archfem.cases.case import REPORT_KEYS
+from archfem.cases.report import margins
 from archfem.cases.report.demands import (
-    find_largest_demand,
     list_demands,
     name_spectrum,
     tabulate_demands,
@@ -27,8 +27,6 @@ from archfem.cases.report.doubts import (
     list_notes,
     list_ranges,
     list_unvaried,
-    object_to_motions,
-    peak_of_ground,
     spans_run,
 )
 from archfem.cases.report.motion_rules import find_missed, find_rule
@@ -41,26 +39,21 @@ from archfem.cases.report.outcomes import (
     sentence,
 )
 from archfem.cases.report.report_data import SHOWN_RESULTS, ReportData
-from archfem.cases.report.scales import describe_scales, find_first_failures, say_fragile
-from archfem.cases.report.study_findings import OVER_SITE, find_least, say_what_changes
-from archfem.cases.result_text import PushFactors, peak_of_spectrum, site_acceleration
+from archfem.cases.report.scales import find_first_failures, say_fragile
+from archfem.cases.report.study_findings import say_what_changes
+from archfem.cases.result_text import PushFactors
 from archfem.cases.run import CASE_FILE
 from archfem.dynamics.collapse_state import (
     COLLAPSE_STATES,
     FALLEN_STATES,
     RANGE_REMEDY,
 )
-from archfem.dynamics.rigid_body.rocking_body import describe_first_fall, say_scale
+from archfem.dynamics.rigid_body.rocking_body import describe_first_fall
 from archfem.dynamics.verdict_range import UNVARIED, VerdictRange
 from archfem.dynamics.walls_across import SCALES_ACROSS
-from archfem.masonry.out_of_plane import (
-    UNCHECKED_ACROSS,
-    describe_transverse_push,
-    find_transverse_push,
-)
 from archfem.masonry.structure import join_names, join_words
 from archfem.models.model import Doubt
-from archfem.units import Ends, format_mm, format_ratio
+from archfem.units import Ends, format_mm
 from archfem.view.pages.document import Grid, Section, TextBlock
 
 # Doubts of a result that the conclusion states; the others stand in the section of the result
@@ -82,15 +75,6 @@ VARIED_FIDELITY = "rigid"
 
 # What commands keep of results that they have not finished
 _BEGUN = {RESULTS["risk"]: "risk_samples.nc"}
-
-# What is known below the least push that a search has found, if nothing is
-NO_PROOF = "may begin at any less, as no lower bound is known"
-
-# What the ends of a range are of, where stones bear on fill
-OVER_FILL = "; its range is over what is assumed of the fill"
-
-# What is said of a push below which shaking moves a structure
-NO_MARGIN = "runs that are no stronger move it, so that this is no margin"
 
 # Lines of the head with the answer, in their order
 HEAD = ("verdict", "margin", "depends on", "not checked")
@@ -134,12 +118,12 @@ def _say_plainly(data: ReportData, doubtful: Sequence[str]) -> Iterator[tuple[st
     """Yield the answer for a client, in the lines of the head."""
     checks = list_checks(data)
     failed = [check for check in checks if check.least < 1.0]
-    found = dict.fromkeys(_judge_check(data, check)[0] for check in failed or checks)
+    found = dict.fromkeys(margins.judge_check(data, check)[0] for check in failed or checks)
     assessed = [f"by the kinematic assessment {words}" for words in found]
     unchecked, overturns = _say_unchecked(data)
     answer, margin, depends, left = HEAD
     if data.runs:
-        less = [words for least, words, _ in _say_less(data) if least < 1.0]
+        less = [words for least, words, _ in margins.say_less(data) if least < 1.0]
         failing = [*assessed * bool(failed), *unchecked * overturns, *less]
         yield from ((answer, x) for x in _say_survival(data, doubtful, failing))
         yield from ((margin, x) for x in [*_say_first_failures(data), *say_fragile(data)])
@@ -154,23 +138,13 @@ def _say_plainly(data: ReportData, doubtful: Sequence[str]) -> Iterator[tuple[st
             for row in stated.rows[:1]:
                 times = f", at {row.factor} times {row.demand}" * (row.factor != "-")
                 yield answer, f"{row.result}: {row.outcome}{times * (name != 'risk')}"
-    yield from ((margin, x) for _, x, _ in _say_less(data) if not data.runs)
+    yield from ((margin, x) for _, x, _ in margins.say_less(data) if not data.runs)
     yield from [] if data.runs and overturns else ((left, x) for x in unchecked)
-
-
-def _find_unchecked_push(data: ReportData) -> tuple[float, float] | None:
-    """Return which push may overturn it across its plane, and the demand; None if it was checked.
-
-    The push is NaN where it is unknown, as of a single stack [g].
-    """
-    if data.across[0] or not _build_transverse(data):
-        return None
-    return find_transverse_push(data.case.structure)[0], find_largest_demand(data)
 
 
 def _say_unchecked(data: ReportData) -> tuple[list[str], bool]:
     """Say that nothing was checked across the plane, and whether the demand may overturn it."""
-    if (found := _find_unchecked_push(data)) is None:
+    if (found := margins.find_unchecked_push(data)) is None:
         return [], False
     push, demand = found
     beside = f" (demand {demand:.3g} g)" * (demand > 0.0)
@@ -180,7 +154,7 @@ def _say_unchecked(data: ReportData) -> tuple[list[str], bool]:
 
 def _say_first_failures(data: ReportData) -> Iterator[str]:
     """Yield where it first fails: across its plane as one rigid body, and in its plane."""
-    across = sorted(_say_across(data))[:1]
+    across = sorted(margins.say_across(data))[:1]
     plane = "in its plane " * bool(across)
     for _, _, falls, body in across:
         yield f"across its plane, held by nothing else, it {falls}: {body} as one rigid body"
@@ -194,25 +168,7 @@ def _say_pushes(data: ReportData, name: str, stated: Statement) -> Iterator[str]
     """Yield where a push begins to move it: beside runs only at less than the site's."""
     for push in read_numbers(PushFactors, stated):
         if push.site and (not data.runs or push.least < 1.0):
-            yield next(_describe_push(data, name, push))
-
-
-def _say_less(data: ReportData) -> Iterator[tuple[float, str, str]]:
-    """Yield the least margin and the least push of studies where they are below the result's.
-
-    They are a number, a sentence and the name of the study.
-    """
-    margins = [x.decisive for x in read_numbers(Ratios, data.statements.get("assessment"))]
-    pushes = [x.least for x in read_numbers(PushFactors, data.statements.get("limit")) if x.site]
-    site = "the least push{} is {} times the site's acceleration"
-    for name, words, own in (
-        ("least_margin", "the least margin{} is {}", margins),
-        (OVER_SITE, site, pushes),
-    ):
-        least, texts, place, study = find_least(data.own_studies, name)
-        fails = ", where the check fails" * (name == "least_margin" and least < 1.0)
-        if least < 0.999 * min(own, default=np.inf):
-            yield least, f"in {study} {words.format(*texts)}, at {place}{fails}", study
+            yield next(margins.describe_push(data, name, push))
 
 
 def _say_ratings(data: ReportData, stated: Statement) -> Iterator[str]:
@@ -270,7 +226,7 @@ def _say_survival(
     sizes = [x.displacement for x in verdicts if x.outcome in COLLAPSE_STATES[:2]]
     known = bool(sizes) and np.isfinite(sizes).all()
     moved = f", and moves by {Ends.of(sizes):mm}" if known else ""
-    beside = any(scale <= 1.0 for scale, *_ in _say_across(data))
+    beside = any(scale <= 1.0 for scale, *_ in margins.say_across(data))
     lead = f"in its plane{in_doubt} it" if beside else f"{answer}: it"
     if survives and (reason or find_missed(data)):
         lead = f"it{in_doubt * (not reason)}"
@@ -291,7 +247,8 @@ def _say_conditions(data: ReportData) -> Iterator[str]:
         yield f"with other plausible properties it {found.count}{under}"
     # the section of a study names its cases
     every = [text for each in data.own_studies for text in say_what_changes(each)]
-    below = [study for least, _, study in _say_less(data) if least < 1.0]  # as the verdict says
+    # the verdict has these
+    below = [study for least, _, study in margins.say_less(data) if least < 1.0]
     studied = [text.partition(": ")[0] for text in every]
     studied = [text for text in studied if not any(f"in {x} " in text for x in below)]
     if ranges or not every:
@@ -327,42 +284,6 @@ def _say_what_decides(ranges: Sequence[VerdictRange]) -> str:
     return "no property that was varied decides" if ranges else "no property was varied"
 
 
-def _judge_check(data: ReportData, check: Ratios) -> tuple[str, str]:
-    """Return whether the structure withstands the spectrum by a check, and why its ratio fails."""
-    of = name_spectrum(data)
-    if check.needed:
-        words = f"; it is passed only with {check.needed}"
-        return f"it does not withstand under some assumptions on the fill {of}", words
-    if check.least < 1.0:
-        return f"it does not withstand {of}", ", which it fails"
-    differs = compare_checks(read_numbers(Ratios, data.statements.get("assessment")))
-    differs = f"on {of} it {differs}" * bool(differs)
-    if check.by_split:
-        words = ", which it fails with one weight a body"
-        return differs or f"it withstands or not, by the split of weights, {of}", words
-    if check.bounded:
-        least = min(each.decisive for each in list_checks(data) if each.bounded)
-        bound = f"its ratio, {format_ratio(least)}, is an upper bound"
-        words = f"it is not shown to withstand {of}, as {bound}. {_say_test(data)}"
-        return words, ", an upper bound"
-    if check.moved and _say_motion(data, check.least, peak_of_spectrum(data.case)):
-        return f"it withstands at rest alone, and moves in the runs, {of}", ""
-    return differs or f"it withstands {of}", ""
-
-
-def _say_test(data: ReportData) -> str:
-    """Say whether the runs decide what a ratio that is an upper bound does not."""
-    if not data.runs:
-        return "Time histories with large displacements under motions of this spectrum can test it"
-    if objection := object_to_motions(data):
-        return f"The runs do not decide, for {objection}"
-    count = len(data.runs)
-    motions = f"The {count} motions" if count > 1 else "The motion"
-    of = "matched to" if (data.case.suite or {}).get("matched") else "of"
-    decide = f"decide{'s' * (count == 1)}"
-    return f"{motions} {of} this spectrum, under which it {find_worst(data)[0]}, {decide}"
-
-
 def build_conclusion(data: ReportData) -> Section:
     """Build the section on the answer in sentences, its doubts, and demands and capacities."""
     doubts: dict[str, list[Doubt]] = {}
@@ -385,7 +306,7 @@ def build_conclusion(data: ReportData) -> Section:
         if data.statements.keys() != {"rating"}:  # of a result that stands alone each is one
             sentences = [" ".join(sentences)] if sentences else []
         blocks += [TextBlock(each, lead=lead * (k == 0)) for k, each in enumerate(sentences)]
-    blocks += _build_transverse(data)
+    blocks += margins.build_transverse(data)
     for result in filter(doubts.get, doubtful):
         # those that a range answers are of the outcome
         ordered = sorted(doubts[result], key=lambda x: not x.remedy.startswith(RANGE_REMEDY))
@@ -404,23 +325,6 @@ def build_conclusion(data: ReportData) -> Section:
         blocks.append(Grid(head, rows, f"Demand and capacity{factors}", "words"))
     blocks += map(TextBlock, _list_outdated(data))
     return Section("Conclusion", [*blocks, _build_signatures(data.case.report)])
-
-
-def _build_transverse(data: ReportData) -> list[TextBlock]:
-    """Build the paragraph on what is not checked across the plane, for results of earthquakes."""
-    if not data.runs and not data.statements.keys() - {"rating"}:
-        return []
-    if not (text := describe_transverse_push(data.case.structure)):
-        return []
-    push, demand = find_transverse_push(data.case.structure)[0], find_largest_demand(data)
-    if push < demand:
-        text += (
-            f"; the largest demand, {demand:.3g} g, exceeds it ({format_ratio(demand / push)} ×)"
-        )
-    # the head says that it was not checked
-    text = text.removeprefix(f"{UNCHECKED_ACROSS}: ") + data.across[1]
-    manner = "doubt" if push < demand else "plain"
-    return [TextBlock(sentence(text), manner, lead="Across its plane?")]
 
 
 def _list_outdated(data: ReportData) -> Iterator[str]:
@@ -475,7 +379,7 @@ def _build_paragraphs(data: ReportData, doubtful: Sequence[str]) -> dict[str, li
         changes.append(f"no motion was run, though [{given[0]}] is in the case")
     return {
         "What else was found?" if data.runs else "Result:": answer,
-        "By which margin?": [*_describe_margin(data)],
+        "By which margin?": [*margins.describe_margin(data)],
         "What would change the answer?": changes,
     }
 
@@ -502,106 +406,6 @@ def _say_causes(ranges: Sequence[VerdictRange]) -> Iterator[str]:
             texts.setdefault(text, []).append(f"'{each.dataset.attrs.get('motion')}'")
     for text, motions in texts.items():
         yield f"under {join_words(motions)}: {text}" if len(ranges) > 1 else text
-
-
-def _describe_margin(data: ReportData) -> Iterator[str]:
-    """Yield the factors on the demands of an earthquake, the least first, maybe as ranges.
-
-    Where the least is across the plane, the next stands in the same sentence. What the head states
-    is counted and not repeated.
-    """
-    margins = sorted(_list_margins(data), key=lambda each: each[0])
-    push, demand = _find_unchecked_push(data) or (np.nan, 0.0)
-    if margins and push < demand * margins[0][0]:
-        across = f"{push / demand:.3g} across the plane of the drawing, which was not checked"
-        _, is_ranked, texts = margins[0]
-        first = "; ".join([across, *("in it " * is_ranked + x for x in texts[:1])])
-        margins[: bool(texts)] = [(push / demand, True, [first, *texts[1:]])]
-    for k, (_, is_ranked, texts) in enumerate(margins):
-        rank = ("the least margin is ", "the next is ", "then follows ")[min(k, 2)] * is_ranked
-        yield from [*(f"{rank}{x}" for x in texts[:1]), *texts[1:]]
-
-
-def _list_margins(data: ReportData) -> Iterator[tuple[float, bool, list[str]]]:
-    """Yield factors on demands with their sentences, and whether they lack a subject and verb.
-
-    A push that is no margin has an infinite one.
-    """
-    checks = read_numbers(Ratios, data.statements.get("assessment"))
-    for least, texts in sorted(_describe_check(data, each) for each in checks)[:1]:
-        yield least, True, texts
-    for least, texts in describe_scales(data):
-        yield least, True, texts
-    for least, at, _, body in sorted(_say_across(data))[:1]:
-        text = f"below {at}: {body} across the plane as one rigid body, held by nothing else"
-        yield least, True, [text]
-    for name in (x for x in ("limit", "pushover") if x in data.statements):
-        for push in (x for x in read_numbers(PushFactors, data.statements[name]) if x.site):
-            texts = [*_describe_push(data, name, push)]
-            least = np.inf if NO_MARGIN in texts[0] else push.least
-            yield least, False, texts[not data.runs or push.least < 1.0 :]
-    for least, words, _ in _say_less(data):
-        yield least, False, [words] * (bool(data.runs) and least >= 1.0)
-
-
-def _say_across(data: ReportData) -> Iterator[tuple[float, str, str, str]]:
-    """Yield the scale at which each body across the plane first falls, in words, and the body."""
-    for key, (first, name) in data.across[0].items():
-        if first.scale < np.inf:
-            given = data.motions[name].pga, f"'{name}'"
-            at, falls = say_scale(first.scale, *given), describe_first_fall(first, *given)
-            yield first.scale, at, falls, f"the {key}"
-
-
-def _describe_push(data: ReportData, name: str, push: PushFactors) -> Iterator[str]:
-    """Yield at which multiple of the site's acceleration a push begins to move a structure."""
-    elastic = name == "pushover"
-    moves = _say_motion(data, push.least, site_acceleration(data.case))
-    bounded = push.proved is not None  # the least found, without proof that none is less
-    of = " with elastic joints" if elastic else " as rigid blocks" * bounded
-    over = OVER_FILL * (push.most > push.least)
-    size = f"{Ends((push.least, push.most)):ratio} times {push.site}{over}"
-    text = f"pushed sideways{of} it begins to move at {size}"
-    if bounded:
-        proved = push.proved and f"is proved to stand up to {format_ratio(push.proved)} times"
-        text += f"; it is the least that a search found, and {proved or NO_PROOF}"
-    if moves and push.least >= 1.0:  # shaken it moves before
-        yield f"{text}; {NO_MARGIN}"
-        return
-    yield f"{text}; to move is no collapse"
-    if then := moves if data.runs else "shaken it may begin to move at less":
-        yield then
-
-
-def _describe_check(data: ReportData, check: Ratios) -> tuple[float, list[str]]:
-    """Return the ratio of a check of an assessment, and its sentences."""
-    over = OVER_FILL * (check.most > check.least)
-    by = f"on {name_spectrum(data)}, by {check.name}"
-    moves = _say_motion(data, check.least, peak_of_spectrum(data.case))
-    if check.moved is not None and moves:  # what moves at less than the push that begins it is
-        begins = f"the check passes for what is at rest, and {moves}"  # judged by how far
-        return check.moved, [f"{check.moved:.3g} by displacements, {by}", begins]
-    _, fails = _judge_check(data, check)
-    texts = [f"{check.ends:ratio}{check.beside}, {by}{fails}{over}"]
-    if check.moved is not None:
-        texts.append(f"{check.ends:ratio} times the spectrum begins to move it")
-        texts.append(f"if it moved, it could be displaced by {check.moved:.3g} times the demand")
-    return check.decisive, texts
-
-
-def _say_motion(data: ReportData, factor: float, site: float) -> str:
-    """Say that a structure moves in a run no stronger than a multiple of the site's acceleration.
-
-    It is empty if it moves in none. Without a spectrum the runs are the demand.
-    """
-    push = np.nan_to_num(factor * site, nan=np.inf)
-    runs = [run for run in data.runs.values() if peak_of_ground(run) <= push]
-    verdicts = [run.verdict for run in runs]
-    if not any(x.mechanisms.get("verified") or x.outcome in FALLEN_STATES for x in verdicts):
-        return ""
-    held = all(verdict.outcome in COLLAPSE_STATES[:2] for verdict in verdicts)
-    of = f" of up to {push:.2f} g" * (len(runs) < len(data.runs))
-    return f"in the runs{of} it moves{', and falls in none' * held}"
 
 
 def _build_signatures(report: Mapping[str, str]) -> Grid:

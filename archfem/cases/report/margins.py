@@ -1,0 +1,213 @@
+"""Margins of a report: checks, pushes, scales and falls across the plane over their demands."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from archfem.cases.answers import Ratios, compare_checks, read_numbers
+from archfem.cases.report.demands import find_largest_demand, name_spectrum
+from archfem.cases.report.doubts import list_checks, object_to_motions, peak_of_ground
+from archfem.cases.report.outcomes import find_worst, sentence
+from archfem.cases.report.report_data import ReportData
+from archfem.cases.report.scales import describe_scales
+from archfem.cases.report.study_findings import OVER_SITE, find_least
+from archfem.cases.result_text import PushFactors, peak_of_spectrum, site_acceleration
+from archfem.dynamics.collapse_state import COLLAPSE_STATES, FALLEN_STATES
+from archfem.dynamics.rigid_body.rocking_body import describe_first_fall, say_scale
+from archfem.masonry.out_of_plane import (
+    UNCHECKED_ACROSS,
+    describe_transverse_push,
+    find_transverse_push,
+)
+from archfem.units import Ends, format_ratio
+from archfem.view.pages.document import TextBlock
+
+# What is known below the least push that a search has found, if nothing is
+NO_PROOF = "may begin at any less, as no lower bound is known"
+
+# What the ends of a range are of, where stones bear on fill
+OVER_FILL = "; its range is over what is assumed of the fill"
+
+# What is said of a push below which shaking moves a structure
+NO_MARGIN = "runs that are no stronger move it, so that this is no margin"
+
+
+def find_unchecked_push(data: ReportData) -> tuple[float, float] | None:
+    """Return which push may overturn it across its plane, and the demand; None if it was checked.
+
+    The push is NaN where it is unknown, as of a single stack [g].
+    """
+    if data.across[0] or not build_transverse(data):
+        return None
+    return find_transverse_push(data.case.structure)[0], find_largest_demand(data)
+
+
+def say_less(data: ReportData) -> Iterator[tuple[float, str, str]]:
+    """Yield the least margin and the least push of studies where they are below the result's.
+
+    They are a number, a sentence and the name of the study.
+    """
+    margins = [x.decisive for x in read_numbers(Ratios, data.statements.get("assessment"))]
+    pushes = [x.least for x in read_numbers(PushFactors, data.statements.get("limit")) if x.site]
+    site = "the least push{} is {} times the site's acceleration"
+    for name, words, own in (
+        ("least_margin", "the least margin{} is {}", margins),
+        (OVER_SITE, site, pushes),
+    ):
+        least, texts, place, study = find_least(data.own_studies, name)
+        fails = ", where the check fails" * (name == "least_margin" and least < 1.0)
+        if least < 0.999 * min(own, default=np.inf):
+            yield least, f"in {study} {words.format(*texts)}, at {place}{fails}", study
+
+
+def judge_check(data: ReportData, check: Ratios) -> tuple[str, str]:
+    """Return whether the structure withstands the spectrum by a check, and why its ratio fails."""
+    of = name_spectrum(data)
+    if check.needed:
+        words = f"; it is passed only with {check.needed}"
+        return f"it does not withstand under some assumptions on the fill {of}", words
+    if check.least < 1.0:
+        return f"it does not withstand {of}", ", which it fails"
+    differs = compare_checks(read_numbers(Ratios, data.statements.get("assessment")))
+    differs = f"on {of} it {differs}" * bool(differs)
+    if check.by_split:
+        words = ", which it fails with one weight a body"
+        return differs or f"it withstands or not, by the split of weights, {of}", words
+    if check.bounded:
+        least = min(each.decisive for each in list_checks(data) if each.bounded)
+        bound = f"its ratio, {format_ratio(least)}, is an upper bound"
+        words = f"it is not shown to withstand {of}, as {bound}. {_say_test(data)}"
+        return words, ", an upper bound"
+    if check.moved and _say_motion(data, check.least, peak_of_spectrum(data.case)):
+        return f"it withstands at rest alone, and moves in the runs, {of}", ""
+    return differs or f"it withstands {of}", ""
+
+
+def _say_test(data: ReportData) -> str:
+    """Say whether the runs decide what a ratio that is an upper bound does not."""
+    if not data.runs:
+        return "Time histories with large displacements under motions of this spectrum can test it"
+    if objection := object_to_motions(data):
+        return f"The runs do not decide, for {objection}"
+    count = len(data.runs)
+    motions = f"The {count} motions" if count > 1 else "The motion"
+    of = "matched to" if (data.case.suite or {}).get("matched") else "of"
+    decide = f"decide{'s' * (count == 1)}"
+    return f"{motions} {of} this spectrum, under which it {find_worst(data)[0]}, {decide}"
+
+
+def build_transverse(data: ReportData) -> list[TextBlock]:
+    """Build the paragraph on what is not checked across the plane, for results of earthquakes."""
+    if not data.runs and not data.statements.keys() - {"rating"}:
+        return []
+    if not (text := describe_transverse_push(data.case.structure)):
+        return []
+    push, demand = find_transverse_push(data.case.structure)[0], find_largest_demand(data)
+    if push < demand:
+        text += (
+            f"; the largest demand, {demand:.3g} g, exceeds it ({format_ratio(demand / push)} ×)"
+        )
+    # the head says that it was not checked
+    text = text.removeprefix(f"{UNCHECKED_ACROSS}: ") + data.across[1]
+    manner = "doubt" if push < demand else "plain"
+    return [TextBlock(sentence(text), manner, lead="Across its plane?")]
+
+
+def describe_margin(data: ReportData) -> Iterator[str]:
+    """Yield the factors on the demands of an earthquake, the least first, maybe as ranges.
+
+    Where the least is across the plane, the next stands in the same sentence. What the head states
+    is counted and not repeated.
+    """
+    margins = sorted(_list_margins(data), key=lambda each: each[0])
+    push, demand = find_unchecked_push(data) or (np.nan, 0.0)
+    if margins and push < demand * margins[0][0]:
+        across = f"{push / demand:.3g} across the plane of the drawing, which was not checked"
+        _, is_ranked, texts = margins[0]
+        first = "; ".join([across, *("in it " * is_ranked + x for x in texts[:1])])
+        margins[: bool(texts)] = [(push / demand, True, [first, *texts[1:]])]
+    for k, (_, is_ranked, texts) in enumerate(margins):
+        rank = ("the least margin is ", "the next is ", "then follows ")[min(k, 2)] * is_ranked
+        yield from [*(f"{rank}{x}" for x in texts[:1]), *texts[1:]]
+
+
+def _list_margins(data: ReportData) -> Iterator[tuple[float, bool, list[str]]]:
+    """Yield factors on demands with their sentences, and whether they lack a subject and verb.
+
+    A push that is no margin has an infinite one.
+    """
+    checks = read_numbers(Ratios, data.statements.get("assessment"))
+    for least, texts in sorted(_describe_check(data, each) for each in checks)[:1]:
+        yield least, True, texts
+    for least, texts in describe_scales(data):
+        yield least, True, texts
+    for least, at, _, body in sorted(say_across(data))[:1]:
+        text = f"below {at}: {body} across the plane as one rigid body, held by nothing else"
+        yield least, True, [text]
+    for name in (x for x in ("limit", "pushover") if x in data.statements):
+        for push in (x for x in read_numbers(PushFactors, data.statements[name]) if x.site):
+            texts = [*describe_push(data, name, push)]
+            least = np.inf if NO_MARGIN in texts[0] else push.least
+            yield least, False, texts[not data.runs or push.least < 1.0 :]
+    for least, words, _ in say_less(data):
+        yield least, False, [words] * (bool(data.runs) and least >= 1.0)
+
+
+def say_across(data: ReportData) -> Iterator[tuple[float, str, str, str]]:
+    """Yield the scale at which each body across the plane first falls, in words, and the body."""
+    for key, (first, name) in data.across[0].items():
+        if first.scale < np.inf:
+            given = data.motions[name].pga, f"'{name}'"
+            at, falls = say_scale(first.scale, *given), describe_first_fall(first, *given)
+            yield first.scale, at, falls, f"the {key}"
+
+
+def describe_push(data: ReportData, name: str, push: PushFactors) -> Iterator[str]:
+    """Yield at which multiple of the site's acceleration a push begins to move a structure."""
+    elastic = name == "pushover"
+    moves = _say_motion(data, push.least, site_acceleration(data.case))
+    bounded = push.proved is not None  # the least found, without proof that none is less
+    of = " with elastic joints" if elastic else " as rigid blocks" * bounded
+    over = OVER_FILL * (push.most > push.least)
+    size = f"{Ends((push.least, push.most)):ratio} times {push.site}{over}"
+    text = f"pushed sideways{of} it begins to move at {size}"
+    if bounded:
+        proved = push.proved and f"is proved to stand up to {format_ratio(push.proved)} times"
+        text += f"; it is the least that a search found, and {proved or NO_PROOF}"
+    if moves and push.least >= 1.0:  # shaken it moves before
+        yield f"{text}; {NO_MARGIN}"
+        return
+    yield f"{text}; to move is no collapse"
+    if then := moves if data.runs else "shaken it may begin to move at less":
+        yield then
+
+
+def _describe_check(data: ReportData, check: Ratios) -> tuple[float, list[str]]:
+    """Return the ratio of a check of an assessment, and its sentences."""
+    over = OVER_FILL * (check.most > check.least)
+    by = f"on {name_spectrum(data)}, by {check.name}"
+    moves = _say_motion(data, check.least, peak_of_spectrum(data.case))
+    if check.moved is not None and moves:  # what moves at less than the push that begins it is
+        begins = f"the check passes for what is at rest, and {moves}"  # judged by how far
+        return check.moved, [f"{check.moved:.3g} by displacements, {by}", begins]
+    _, fails = judge_check(data, check)
+    texts = [f"{check.ends:ratio}{check.beside}, {by}{fails}{over}"]
+    if check.moved is not None:
+        texts.append(f"{check.ends:ratio} times the spectrum begins to move it")
+        texts.append(f"if it moved, it could be displaced by {check.moved:.3g} times the demand")
+    return check.decisive, texts
+
+
+def _say_motion(data: ReportData, factor: float, site: float) -> str:
+    """Say that a structure moves in a run no stronger than a multiple of the site's acceleration.
+
+    It is empty if it moves in none. Without a spectrum the runs are the demand.
+    """
+    push = np.nan_to_num(factor * site, nan=np.inf)
+    runs = [run for run in data.runs.values() if peak_of_ground(run) <= push]
+    verdicts = [run.verdict for run in runs]
+    if not any(x.mechanisms.get("verified") or x.outcome in FALLEN_STATES for x in verdicts):
+        return ""
+    held = all(verdict.outcome in COLLAPSE_STATES[:2] for verdict in verdicts)
+    of = f" of up to {push:.2f} g" * (len(runs) < len(data.runs))
+    return f"in the runs{of} it moves{', and falls in none' * held}"
