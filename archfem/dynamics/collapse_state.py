@@ -41,9 +41,9 @@ FALLEN_STATES = COLLAPSE_STATES[2:]
 class CollapseState:
     """State of collapse at the end of a run.
 
-    A block is *lost* once its centroid sinks by more than half the root of its area, or the block
-    turns by more than 45°. Its place of rest does not matter. Fill does not count, and the bodies
-    that stand on the structure are not displaced with it. The structure
+    A loose block is *lost* once its centroid sinks by more than half the root of its area, or the
+    block turns by more than 45°. Its place of rest does not matter. Fill does not count, and the
+    bodies that stand on the structure are not displaced with it. The structure
 
     - *stands*: no block is lost, and none is displaced by more than a tenth of the median joint
       depth of the shallowest ring or pier;
@@ -109,7 +109,10 @@ def name_stones(names: Sequence[str], most: int = 3) -> str:
 
 @validate_arguments
 def classify_collapse(
-    structure: Structure, frames: Iterable[LooseBlocks], start: Array | None = None
+    structure: Structure,
+    frames: Iterable[LooseBlocks],
+    start: Array | None = None,
+    joined: bool = False,
 ) -> CollapseState:
     """Return the state of collapse from the positions of blocks over time.
 
@@ -119,6 +122,7 @@ def classify_collapse(
             one gives the residual displacement.
         start: poses of all blocks from which displacements count, such as those under dead load
             (n_blocks, 3) [m, m, rad]; by default those as built.
+        joined: whether joints hold all blocks to the end, so that none is lost.
 
     Raises:
         InvalidInput: there is no frame.
@@ -132,7 +136,7 @@ def classify_collapse(
     for last in frames:
         moved = np.linalg.norm(corners(last.poses) - origin, axis=1)
         farthest = max(farthest, float(moved.max()))
-        lost |= find_lost(last.poses)
+        lost |= find_lost(last.poses) & (not joined)
         if time is None and lost.any():
             time = last.time
     if last is None:

@@ -386,3 +386,12 @@ def test_a_ring_thrown_up_falls_from_there(ring, model):
 def test_a_model_of_small_displacements_is_refused(ring, state):
     with pytest.raises(af.errors.InvalidInput, match="large displacements"):
         release_blocks(af.build(ring, fidelity="rigid"), state)
+
+
+def test_blocks_that_joints_hold_to_the_end_are_not_lost():
+    """A block that has sunk into a soft joint by more than half of its size, at rest."""
+    slab = af.column(breadth=2.0, heights=[0.2], contact=af.Contact(11e3, 11e3, friction=0.6))
+    analysis = af.Analysis(slab, fidelity="rigid", displacements="large", damping=None)
+    run = analysis.run(af.Motion(np.full(5, 1e-3), 0.01))
+    assert (run.verdict.fall.kind, run.verdict.fall.time) == ("stands", None)
+    assert run.verdict.displacement < 1e-3  # from the dead load
