@@ -66,8 +66,7 @@ def matched(
     The wavelets have the width of Al Atik and Abrahamson. They are second
     differences of a displacement, a cosine under a Gauss bell that vanishes at the ends of the
     record: the final velocity and displacement are unchanged to round-off. Where the spectrum
-    starts at period zero, the peak acceleration is corrected as well, and the
-    motion scaled up to it where it is less. Horizontal components are
+    starts at period zero, the peak acceleration is corrected as well. Horizontal components are
     matched to the horizontal spectrum, the vertical one to the vertical. A permanent displacement
     of the ground is taken out as drift; a warning has its size, and PGV and PGD before and after.
 
@@ -206,11 +205,9 @@ def _fit_spectrum(samples: Array, dt: float, goal: _TargetAccelerations) -> Arra
         if iteration == 0:
             factor = np.exp(np.mean(np.log(goal.values / np.abs(peaks))))
             current, peaks = factor * current, factor * peaks
-        # norms allow a spectrum somewhat below its target, and no peak acceleration
-        lift = max(goal.values[0] / abs(peaks[0]), 1.0) if goal.periods[0] == 0.0 else 1.0
-        now = goal.distance(lift * current, dt, lift * peaks)
+        now = goal.distance(current, dt, peaks)
         if now < smallest:
-            best, smallest = lift * current, now
+            best, smallest = current, now
         if smallest < goal.tolerance:
             break
         current = current + _compute_correction(peaks, times, goal, dt=dt, count=len(current))
