@@ -129,8 +129,11 @@ def _list_properties(case: Case) -> Iterator[Default]:
 
 
 def _list_settings(case: Case) -> Iterator[Default]:
-    """List the default settings of motion, damping, criteria and model."""
+    """List the default settings of width, motion, damping, criteria and model."""
     analysis, criteria = case.analysis, case.analysis.failure_criteria
+    if "width" not in case.settings["structure"]:
+        reason = "across the plane; what overturns it there is in proportion to the width"
+        yield Default("", f"width {case.structure.width:g} m", "structure.width", reason)
     if case.has_motion:
         if _has_default_vertical(case):
             words = "vertical motion 2/3 of the horizontal"

@@ -30,6 +30,7 @@ def test_every_deciding_value_that_is_left_out_is_named():
     assert text.partition(": ")[2].split("; ") == [
         "'stone' E 30 GPa, weight 20 kN/m³, strength 56 MPa",
         "'stone to stone' k_n 1.48 MPa/mm, k_s 0.3 MPa/mm, μ 0.6",
+        "width 1 m",
         "vertical motion 2/3 of the horizontal",
         "no damping",
         "hinge at |e| 0.46",
@@ -77,7 +78,7 @@ def test_what_a_spectrum_leaves_open_is_named(given, words):
 def test_values_that_are_given_are_not():
     contact = {"normal_stiffness": 1.48e9, "friction": 0.6}  # also where they equal the default
     given = {
-        **BARE,
+        "structure": {**BARE["structure"], "width": 1.0},
         "contacts": {"stone to stone": contact},
         "motion": {"synthetic": {"seed": 1, "vertical_ratio": 0.5}},
         "criteria": {"hinge": 0.46, "failures": 4},

@@ -74,7 +74,7 @@ def test_a_short_stationary_part_is_a_note():
     assert states(data)["stationary part of artificial motions"] == "not met"
     (note,) = motion_rules.note_checks(data)
     assert note == (
-        "rule of EN 1998-1 that motions do not meet, from memory: stationary part of artificial "
+        "motions do not meet EN 1998-1 (from memory): stationary part of artificial "
         "motions, ≥ 10 s, is 3.5 s, 35% of 10 s"
     )
     level = af.motion.signal_processing.intensity_envelope(1001)
@@ -105,7 +105,7 @@ def test_rules_are_judged_by_what_is_printed(share, state):
     peak = matched_motion(10.0).pga / 9.80665
     checks = motion_rules.check_motions(data_of(factor=share * 0.24 / peak))
     (found,) = (check for check in checks if "period zero" in check.rule)
-    missed = "0.999, and meets it if scaled by 1.002"  # 0.999 × 1.001 is below 1
+    missed = "0.999: scale by 1.002"  # 0.999 × 1.001 is below 1
     assert (found.found, found.state) == ("1" if state == "met" else missed, state)
 
 

@@ -112,7 +112,7 @@ def _check_spectra(data: ReportData, rule: SelectionRule) -> Iterator[Check]:
         met = ratio >= rule.zero_period
         name = "mean PGA over the target at period zero"
         larger = np.ceil(1e3 * rule.zero_period / exact) / 1e3
-        found = f"{ratio:g}" if met else f"{ratio:g}, and meets it if scaled by {larger:g}"
+        found = f"{ratio:g}" if met else f"{ratio:g}: scale by {larger:g}"
         yield Check(name, f"≥ {rule.zero_period:g}", found, met)
 
 
@@ -188,4 +188,4 @@ def note_checks(data: ReportData) -> list[str]:
     """Return a note on each rule of the norm that the motions do not meet."""
     found = [f"{x.rule}, {x.required}, is {x.found}" for x in find_missed(data)]
     norm = data.case.report.get("norm", "")
-    return [f"rule of {norm} that motions do not meet, from memory: {each}" for each in found]
+    return [f"motions do not meet {norm} (from memory): {each}" for each in found]
