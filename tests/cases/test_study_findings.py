@@ -169,7 +169,7 @@ def test_a_study_states_each_doubt_of_its_runs_once_and_their_cases():
     drift = af.models.model.Doubt("the energy drifts")
     found = study(cases=3, doubts={1: steps[:1], 2: [drift], 4: steps[1:]})
     assert [*map(str, found.doubts)] == [
-        "'case 0' under 'second'; 'case 2' under 'first': steps of 2 to 5 ms are long; halve them",
+        "'case 0' under 'second', 'case 2' under 'first': steps of 2 to 5 ms are long; halve them",
         "'case 1' under 'first': the energy drifts",
     ]
 

@@ -143,7 +143,7 @@ class StudyFindings:
 
 def _merge_cases(doubts: Sequence[Doubt]) -> Doubt:
     """Return doubts of several cases as one: its numbers are their ends, or those of the first."""
-    places = list_first([*dict.fromkeys(doubt.place for doubt in doubts)], MAX_NAMES, "; ")
+    places = list_first([*dict.fromkeys(doubt.place for doubt in doubts)], MAX_NAMES)
     if len({doubt.kind for doubt in doubts}) > 1:
         return replace(doubts[0], place=f"{places}, of which the first")
     return merge_doubts(doubts, places)
