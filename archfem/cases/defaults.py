@@ -118,7 +118,7 @@ def list_defaults(case: Case) -> list[Default]:
 
 
 def _list_properties(case: Case) -> Iterator[Default]:
-    """List the default values of materials and contacts."""
+    """List the default values of materials, contacts and the width."""
     for item in list_materials_and_contacts(case):
         section = "materials" if isinstance(item, Material) else "contacts"
         for key in list_default_keys(case, item):
@@ -126,14 +126,14 @@ def _list_properties(case: Case) -> Iterator[Default]:
             words = f"{word} {value_text(section, key, getattr(item, key))}"
             path = f"{section}.{format_key(find_table(case.settings, item)[0])}.{key}"
             yield Default(item.name, words, path, reason)
-
-
-def _list_settings(case: Case) -> Iterator[Default]:
-    """List the default settings of width, motion, damping, criteria and model."""
-    analysis, criteria = case.analysis, case.analysis.failure_criteria
     if "width" not in case.settings["structure"]:
         reason = "across the plane; what overturns it there is in proportion to the width"
         yield Default("", f"width {case.structure.width:g} m", "structure.width", reason)
+
+
+def _list_settings(case: Case) -> Iterator[Default]:
+    """List the default settings of motion, damping, criteria and model."""
+    analysis, criteria = case.analysis, case.analysis.failure_criteria
     if case.has_motion:
         if _has_default_vertical(case):
             words = "vertical motion 2/3 of the horizontal"
