@@ -20,7 +20,7 @@ from functools import cached_property
 
 import numpy as np
 import xarray as xr
-from scipy.optimize import linprog
+from scipy.optimize import brentq, linprog
 
 from archfem._display import ExplainedWord
 from archfem._typing import Array, Flags
@@ -524,30 +524,41 @@ class PathFollower:
                     continue
             if trial is None or forces is None:
                 raise _Stop(PathEnd.LOCKS)
-            if self._event(*trial, step, forces):
-                return self._finish(state, velocity, step)
+            if (self._margins(*trial, step, forces) <= 0.0).any():
+                return self._finish(state, velocity, step, trial)
             (state, velocity), factor = trial, forces[0]
             self.travel += step
             self._record(state.blocks, factor)
             step = min(1.5 * step, 0.01 * size)
         raise _Stop(PathEnd.ENDURES)
 
-    def _finish(self, state: LinkageState, velocity: Array, step: float) -> PlacedBlocks:
+    def _finish(
+        self, state: LinkageState, velocity: Array, step: float, last: tuple[LinkageState, Array]
+    ) -> PlacedBlocks:
         """Record the place of the first event within a step, and return the blocks there."""
-        shortest, event = 0.0, None
-        while step - shortest > 1e-9 * self.blocks.structure.size:
-            middle = 0.5 * (shortest + step)
-            trial = state.advanced(velocity, middle)
-            if trial is not None and not self._event(*trial, middle):
-                shortest = middle
-            else:
-                step = middle
-        trial = state.advanced(velocity, step)
-        if trial is None or not (event := self._event(*trial, step)):
+        tried: dict[float, tuple[LinkageState, Array] | None] = {0.0: (state, velocity), step: last}
+        shares, margins_at_end = dict[float, float](), self._margins(*last, step)
+        happened = margins_at_end <= 0.0
+
+        def least_share(way: float) -> float:
+            """Return the least margin of these events, over its size at the end of the step."""
+            trial = tried[way] = tried.get(way) or state.advanced(velocity, way)
+            margins = -np.ones_like(margins_at_end) if trial is None else self._margins(*trial, way)
+            share = np.min(margins[happened] / -margins_at_end[happened], initial=1e6)
+            if (margins[~happened] <= 0.0).any():
+                share = -1.0  # another event, and an earlier one
+            # nothing happens at the start; a share of zero would end the search without a bracket
+            shares[way] = share = (share or -1e-300) if way else abs(share)
+            return float(share)
+
+        brentq(least_share, 0.0, step, xtol=1e-9 * self.blocks.structure.size)
+        step = min(way for way, share in shares.items() if share < 0.0)
+        if (trial := tried[step]) is None:
             raise _Stop(PathEnd.LOCKS)
+        event = self._name_event(trial[0], self._margins(*trial, step) <= 0.0)
         self.travel += step
         if event.endswith("closes"):  # just before, where the corner is within the tolerance
-            trial = state.advanced(velocity, shortest) or trial
+            trial = tried[max(way for way in shares if way < step)] or trial
         blocks = trial[0].blocks
         self._record(blocks, max(trial[0].balance(trial[1], self.friction)[0], 0.0))
         self.events.append(PathEvent(len(self.factors) - 1, event))
@@ -555,42 +566,52 @@ class PathFollower:
             raise _Stop(event)
         return blocks
 
-    def _event(
+    def _margins(
         self,
         state: LinkageState,
         velocity: Array,
         step: float,
         balance: tuple[float, Array] | None = None,
-    ) -> str:
-        """Return the event that has happened at a state, or an empty text."""
+    ) -> Array:
+        """Return how far a state is from each event; one without a positive margin has happened."""
         factor, normal_forces = balance or state.balance(velocity, self.friction)
-        if factor <= 0.0:
-            return PathEnd.FALLS
-        blocks, near = state.blocks, TOUCHING * self.blocks.structure.size
-        names = [joint.name for joint in blocks.structure.joints]
-        body, pairs = state.bodies.body, blocks.structure.pairs
+        blocks, size = state.blocks, self.blocks.structure.size
+        body, pairs, near = state.bodies.body, blocks.structure.pairs, TOUCHING * size
+        apart = (body[pairs[:, 0]] != body[pairs[:, 1]])[:, None]
         # deeper than a step reaches, a corner is behind the face and not in it
-        closed = (blocks.gaps < -0.5 * near) & (blocks.gaps > -4.0 * step - near)
-        closes = closed.any(axis=(0, 2)) & (body[pairs[:, 0]] != body[pairs[:, 1]])
-        if closes.any():
-            return f"{join_joint_names([names[k] for k in np.flatnonzero(closes)])} closes"
-        for contact, force in zip(state.contacts, normal_forces, strict=True):
-            # well above the tolerance of the programme that follows
-            if force < -1e-5 * self._force_unit:
-                return f"a contact of {names[contact.joint]} opens"
-            if contact.slip and self._is_off(blocks, contact, near):
-                return f"a corner slides off its face at {names[contact.joint]}"
-        depth = largest_overlap(blocks.outlines, body)
-        return PathEnd.COLLIDES if depth > 1e-5 * blocks.structure.size else ""
+        gaps = np.where(apart & (blocks.gaps > -4.0 * step - near), blocks.gaps, np.inf)
+        # well above the tolerance of the programme that follows; undetermined forces are NaN
+        forces = np.nan_to_num(normal_forces + 1e-5 * self._force_unit, nan=np.inf)
+        ways = [self._way_to_end(blocks, each) if each.slip else np.inf for each in state.contacts]
+        room = 1e-5 * size - largest_overlap(blocks.outlines, body)
+        edges = np.array(ways) + 2.0 * near
+        return np.concatenate([[factor], gaps.ravel() + 0.5 * near, forces, edges, [room]])
 
     @staticmethod
-    def _is_off(blocks: PlacedBlocks, contact: Contact, near: float) -> bool:
-        """Return whether a corner has left the face on which it slides."""
+    def _way_to_end(blocks: PlacedBlocks, contact: Contact) -> float:
+        """Return the way of a corner to the nearer end of the face on which it slides [m]."""
         side = int(contact.face == blocks.structure.pairs[contact.joint, 1])
         face = blocks.faces[side, contact.joint]
         length = np.linalg.norm(face[1] - face[0])
         share = (contact.point - face[0]) @ (face[1] - face[0]) / length
-        return not -2.0 * near <= share <= length + 2.0 * near
+        return float(min(share, length - share))
+
+    @staticmethod
+    def _name_event(state: LinkageState, happened: Flags) -> str:
+        """Return the first of the events that have happened at a state."""
+        names = [joint.name for joint in state.blocks.structure.joints]
+        if happened[0]:
+            return PathEnd.FALLS
+        closes = happened[1 : 4 * len(names) + 1].reshape(2, -1, 2).any(axis=(0, 2))
+        if closes.any():
+            return f"{join_joint_names([names[k] for k in np.flatnonzero(closes)])} closes"
+        changes = happened[4 * len(names) + 1 : -1].reshape(2, -1)
+        for contact, opens, is_off in zip(state.contacts, *changes, strict=True):
+            if opens:
+                return f"a contact of {names[contact.joint]} opens"
+            if is_off:
+                return f"a corner slides off its face at {names[contact.joint]}"
+        return PathEnd.COLLIDES
 
     def last_equilibrium(self, path: MechanismPath, samples: int = 9) -> int:
         """Return the last place up to which no mechanism has a lower factor than the path."""

@@ -609,11 +609,10 @@ def rigid_motion_matrix(points: Array, centroid: Array) -> Array:
 
 def largest_displacement(outlines: Sequence[Array], centroids: Array, motion: Array) -> float:
     """Return the largest displacement of a corner by small motions of blocks (n_blocks, 3) [m]."""
-    moved = [
-        rigid_motion_matrix(points, centroid) @ of_block
-        for points, centroid, of_block in zip(outlines, centroids, motion, strict=True)
-    ]
-    return max(float(np.linalg.norm(each, axis=1).max()) for each in moved)
+    counts = [len(points) for points in outlines]
+    own, velocity = (np.repeat(each, counts, axis=0) for each in (centroids, motion))
+    moved = rigid_motion_matrix(np.concatenate(outlines), own) @ velocity[:, :, None]
+    return float(np.linalg.norm(moved, axis=1).max())
 
 
 def find_clear_spans(structure: Structure) -> dict[str, tuple[float, float]]:

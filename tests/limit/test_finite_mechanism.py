@@ -10,7 +10,7 @@ from granite import granite_wall
 
 import archfem as af
 from archfem.limit.displaced_blocks import PlacedBlocks, find_corners, find_mechanism
-from archfem.limit.finite_mechanism import PathEnd, PathFollower
+from archfem.limit.finite_mechanism import LinkageState, PathEnd, PathFollower
 
 RING = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17)
 
@@ -69,6 +69,21 @@ def test_a_rocking_block_follows_its_circle():
     )
     assert path.end is PathEnd.FALLS
     assert turn[-1] == pytest.approx(beta, abs=1e-7)
+
+
+def test_an_event_is_found_to_a_billionth_of_the_size_in_a_dozen_states(monkeypatch):
+    """The fall of a rocking block, at θ = β; halving a step of 0.01 of the size takes 24 states."""
+    block, advanced, starts = af.column(breadth=0.6, heights=[2.4]), LinkageState.advanced, []
+
+    def counted(state, velocity, step):
+        starts.append(state)
+        return advanced(state, velocity, step)
+
+    monkeypatch.setattr(LinkageState, "advanced", counted)
+    path = follow(block, friction=False)
+    way = (atan2(0.3, 1.2) + path.displacements[-1, 1, 2]) * hypot(0.6, 2.4)
+    assert way == pytest.approx(0.0, abs=1e-9 * block.size)
+    assert sum(state is starts[-1] for state in starts) <= 12
 
 
 def test_a_sliding_block_tips_over_the_edge_that_it_slides_to():
