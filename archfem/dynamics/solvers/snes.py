@@ -25,8 +25,8 @@ from archfem.statics.newton import (
     load_magnitude,
 )
 
-# Function that solves a step from a state and a time step
-Attempt = Callable[[State, float], Step]
+# Function that solves a step from a state and a time step; a third argument limits the searches
+Attempt = Callable[..., Step]
 
 
 class SnesSolver:
@@ -82,24 +82,26 @@ class SnesSolver:
         for step in self.steps(start, dt, end):
             yield step.batch
 
-    def whole(self, state: State, dt: float) -> Step:
+    def whole(self, state: State, dt: float, searches: int = 2) -> Step:
         """Return a step that is not halved.
 
         Args:
             state: before the step.
             dt: its length [s].
+            searches: number of line searches that are tried, of which the first is none.
 
         Raises:
             DidNotConverge: SNES finds no equilibrium.
         """
-        return self._attempts(state, dt)
+        return self._attempts(state, dt, searches)
 
-    def attempt(self, state: State, dt: float) -> Step:
+    def attempt(self, state: State, dt: float, searches: int = 2) -> Step:
         """Return a step of Newmark's method or HHT that is not halved.
 
         Args:
             state: before the step.
             dt: its length [s].
+            searches: number of line searches that are tried, of which the first is none.
 
         Returns:
             The step, with the resultants at its end.
@@ -129,7 +131,8 @@ class SnesSolver:
             return self._tangent(contact(q - state.q), linear, numbers.gain)
 
         guess = state.q + dt * state.velocity + 0.5 * dt**2 * state.acceleration
-        solved = self._solver.solve(residual, tangent, guess, self._scale)
+        tried = CONVEX_SEARCHES[:searches]
+        solved = self._solver.solve(residual, tangent, guess, self._scale, tried)
         moved = solved.q - state.q
         velocity = rate * moved + rates @ before
         acceleration = numbers.acceleration[1] * moved + fading
@@ -140,12 +143,13 @@ class SnesSolver:
         resultants = model.resultants(equation.contact(new))
         return Step(new, resultants, solved.iterations, dt, energy)
 
-    def averaged(self, state: State, dt: float) -> Step:
+    def averaged(self, state: State, dt: float, searches: int = 2) -> Step:
         """Return a step of the conserving scheme that is not halved.
 
         Args:
             state: before the step.
             dt: its length [s].
+            searches: number of line searches that are tried, of which the first is none.
 
         Returns:
             The step, with the resultants on its mean.
@@ -170,10 +174,12 @@ class SnesSolver:
                 return matrix
 
             # without an energy where joints slide: down the residual
-            searches = ("basic", "bt") if equation.memory_size else CONVEX_SEARCHES
+            tried = (("basic", "bt") if equation.memory_size else CONVEX_SEARCHES)[:searches]
             try:
-                return self._solver.solve(residual, tangent, guess, self._scale, searches)
+                return self._solver.solve(residual, tangent, guess, self._scale, tried)
             except DidNotConverge:  # an impact of stiff joints: the velocity leads too far
+                if searches == 1:
+                    raise
                 return self._solver.solve(residual, tangent, state.q, self._scale, ("cp",))
 
         passage = model.begin_step(state.q, equation.lag / dt)
