@@ -245,6 +245,7 @@ def _say_conditions(data: ReportData) -> Iterator[str]:
         motion = found.dataset.attrs.get("motion")
         under = f", under '{motion}'" * (len(data.runs) > 1 and bool(motion))
         yield f"with other plausible properties it {found.count}{under}"
+        yield from _say_wider([found], data)
     # the section of a study names its cases
     every = [text for each in data.own_studies for text in say_what_changes(each)]
     # the verdict has these
@@ -252,8 +253,14 @@ def _say_conditions(data: ReportData) -> Iterator[str]:
     studied = [text.partition(": ")[0] for text in every]
     studied = [text for text in studied if not any(f"in {x} " in text for x in below)]
     if ranges or not every:
-        yield _say_what_decides(data.verdict_ranges)
+        yield _say_what_decides(ranges[::-1])
     yield from studied
+
+
+def _say_wider(ranges: Sequence[VerdictRange], data: ReportData) -> list[str]:
+    """Say which properties have a wider range by the finish of their faces than was varied."""
+    rows = dict.fromkeys(row for found in ranges for row in list_ranges(data, found))
+    return [f"by its finish {name} is {wider}" for name, *_, wider in rows if wider]
 
 
 def _say_why_undecided(data: ReportData) -> str:
@@ -368,8 +375,7 @@ def _build_paragraphs(data: ReportData, doubtful: Sequence[str]) -> dict[str, li
     changes += ["the checks of the numbers raise no doubt"] * (bool(data.runs) and not doubtful)
     if doubtful:
         changes.append(f"the doubts below, on {join_names(doubtful)}, may change this")
-    ranges = dict.fromkeys(row for x in data.verdict_ranges for row in list_ranges(data, x))
-    changes += [f"by its finish {name} is {wider}" for name, *_, wider in ranges if wider]
+    changes += [] if data.runs else _say_wider(data.verdict_ranges, data)
     if single := list_unvaried(data):
         none = "; displacements have no range" * (bool(data.runs) and not data.verdict_ranges)
         verb = "were" if len(single) > 1 or single[0].partition(" (")[0].endswith("s") else "was"

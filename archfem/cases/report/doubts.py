@@ -204,7 +204,7 @@ def list_ranges(data: ReportData, found: VerdictRange) -> list[tuple[str, str, s
             given = found.dataset.attrs[name] / 1e9
             ends, unit = Ends(given * end for end in ends), " MPa/mm"
             low, *_, high = sorted(end / 1e9 for end in stated.get(name, (1e9 * x for x in ends)))
-            if low < 0.99 * ends[0] or high > 1.01 * ends[1]:
+            if low < 0.95 * ends[0] or high > 1.05 * ends[1]:  # as it prints two digits
                 wider = f"{low:.2g} to {high:.2g} MPa/mm, wider than was varied"
         unit = " added to that of the case" if name == "friction" else unit
         rows.append((property_text(name), f"{ends:.3g}{unit}", mark, wider))
