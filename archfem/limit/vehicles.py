@@ -23,7 +23,7 @@ from archfem.limit.linear_programme import Optimum, Programme
 from archfem.limit.nonassociated import find_weakest, starting_forces
 from archfem.limit.self_weight import is_balanced, refuse_bonds, self_weight_programme
 from archfem.masonry.loads import Action, PointLoad
-from archfem.masonry.standing import find_bodies, parse_axles
+from archfem.masonry.standing import find_bodies, is_light, parse_axles
 from archfem.masonry.structure import (
     CONTACT_TOLERANCE,
     HasStructure,
@@ -107,9 +107,8 @@ class Vehicle:
         for key in ("area_load", "wheels", "lane"):
             check_number(getattr(self, key), f"{key} of {self.name}", minimum=0.0)
         longest = max([*self.spacings, self.wheels])
-        light = min(self.axles) < 1e3 and max(self.axles) != 1.0  # the factor of 1 N is a load
         weak = 0.0 < self.area_load < MIN_AREA_LOAD
-        if light or weak or longest > MAX_LENGTH:
+        if is_light(self.axles) or weak or longest > MAX_LENGTH:
             raise InvalidInput(
                 f"vehicle '{self.name}' has axles of {self.axles} N, spacings of {self.spacings} "
                 f"m, wheels over {self.wheels:g} m and {self.area_load} Pa: that can only be a "

@@ -21,7 +21,7 @@ from archfem.masonry.assembly import name_joints, touching
 from archfem.masonry.block import Block, as_point
 from archfem.masonry.materials import COURSE_LENGTH, SOIL_TO_STONE, Contact, Material
 from archfem.masonry.stiffness_ratio import list_stones
-from archfem.masonry.structure import CONTACT_TOLERANCE, Joint, Structure, join_names
+from archfem.masonry.structure import CONTACT_TOLERANCE, Joint, Structure, join_names, join_words
 from archfem.units import GPa, kN
 
 
@@ -41,6 +41,11 @@ def parse_axles(axles: float | Sequence[float], spacings: Sequence[float]) -> Ar
         )
     behind = np.concatenate([[0.0], np.cumsum(gaps)])
     return np.stack([weights, behind[-1] / 2.0 - behind], axis=1)
+
+
+def is_light(axles: Sequence[float]) -> bool:
+    """Return whether loads [N] are so small that they can only be in a wrong unit."""
+    return min(axles) < 1e3 and max(axles) != 1.0  # the factor of 1 N is a load
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,6 +89,11 @@ class StandingBody:
         for key in ("axles", "spacings"):
             object.__setattr__(self, key, tuple(getattr(self, key)))  # lists of a case
         check_between(self.total, f"'{self.name}': weight [N]", 0.0, 1e9, remedy="give newtons")
+        if is_light(loads := self.axles or (self.total,)):
+            raise InvalidInput(
+                f"'{self.name}' presses with {join_words([f'{load:g} N' for load in loads])}: that "
+                "can only be a wrong unit; so small a body is a weight of `loads`"
+            )
         for key in ("length", "centre_of_gravity", "width"):
             if (value := getattr(self, key)) is not None:
                 check_between(value, f"'{self.name}': {key} [m]", 0.0, 100.0, remedy="give metres")

@@ -190,6 +190,8 @@ def test_a_body_stands_on_all_that_is_level_below_it_and_on_other_bodies():
         ({"width": 3.0}, "the structure has 1 m"),
         ({"length": 1.5}, "stands on 0.95 m of its 1.5 m, as the structure ends at x = 0 m"),
         ({"weight": 1e12}, "give newtons"),
+        ({"weight": 50.0}, "'lorry' presses with 50 N: that can only be a wrong unit"),  # kN
+        ({"weight": None, "axles": [50.0, 9e4], "spacings": [3.4]}, "50 N and 90000 N: that can"),
         ({"length": 0.0}, "length"),
         ({"axles": [1e4]}, "either its weight, or axles"),
         ({"weight": None}, "either its weight, or axles"),
