@@ -422,7 +422,10 @@ def format_table(table: xr.Dataset, max_rows: int = 50) -> str:
     head = [f"{name} [{units[name]}]" if units[name] else str(name) for name in names]
     rows = zip(*(cells[name][:max_rows] for name in names), strict=True)
     text = [_files.align_columns(head, [*rows])]
-    text += [f"… {len(frame) - max_rows} more points"] if len(frame) > max_rows else []
+    if len(frame) > max_rows:
+        least = frame[max_rows:].get("least_push", pd.Series(dtype=float)).min()
+        pushed = f", with a least push of {least:.5g}" * bool(least == least)
+        text += [f"… {len(frame) - max_rows} more points{pushed}"]
     shared = "; ".join(f"{name} = {text}" for name, text in same.items() if text)
     return "\n".join([*text, *([f"the same at all points: {shared}"] if shared else [])])
 

@@ -93,6 +93,19 @@ def test_of_many_cases_those_with_doubts_stand_before_others():
     assert [row[0] for row in rows[:3]] == ["case 29", "case 0", "case 1"]
 
 
+def test_of_many_pushes_the_least_stand_before_those_with_doubts():
+    push = np.r_[np.linspace(0.9, 0.3, 30), np.nan]
+    names = {"least_push": ("x", push), "doubts": ("x", np.r_[3, [0] * 30])}
+    errors = ("x", [""] * 30 + ["DidNotConverge"])
+    names |= {"push": ("x", 2.0 * push)}
+    table = xr.Dataset(names, {"x": range(31)})
+    found = study_findings.collect_findings("t", "", table.assign(error=errors))
+    grid = study_findings.tabulate_study(found)
+    assert [row[0] for row in grid.rows] == [str(k) for k in range(29, 5, -1)]
+    said = "7 of 31 cases are left out, with no less least push or no outcome"
+    assert grid.caption.endswith(said)
+
+
 def test_two_studies_of_the_same_cases_have_one_order():
     """Whichever of them fall or have doubts, as the tables of a report stand beside one another."""
     plain, other = study(cases=3), study(cases=3, falls=[2])

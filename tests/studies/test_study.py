@@ -389,6 +389,10 @@ def test_a_long_table_is_cut_and_equal_findings_are_stated_once(small_ring):
     assert lines[0].split() == ["structure.thickness", "[m]", "b", "c"]
     assert [line.split()[::2] for line in lines[1:3]] == [["0.5", "0"], ["0.6", "1"]]
     assert lines[3:] == ["… 1 more points", "the same at all points: a = 1.5"]
+    pushed = table.rename(b="least_push")
+    lines = result_store.format_table(pushed, max_rows=1).splitlines()
+    least = f"{float(table['b'][1:].min()):.5g}"
+    assert lines[2] == f"… 2 more points, with a least push of {least}"
 
 
 def test_a_table_that_no_sheet_can_hold_is_not_written_for_excel(tmp_path, monkeypatch):

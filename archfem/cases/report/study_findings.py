@@ -204,12 +204,13 @@ def _find_worst(frame: Any, keys: list[str], names: list[str]) -> Any:
 def tabulate_study(found: StudyFindings) -> Grid:
     """Tabulate the worst point of each case in the order of the study.
 
-    Of many cases those that fall come first, then those with doubts.
+    Of many cases those that fall come first, then those with doubts; of factors the least.
     """
     order = found.worst
     if len(order) > MAX_CASES:
-        ranks = ["rank", *(["doubts"] if "doubts" in order else [])]
-        order = order.sort_values(ranks, ascending=[True, False][: len(ranks)], kind="stable")
+        rises = {"size": True} if found.is_static else {"rank": True, "doubts": False}
+        ranks = [name for name in rises if name in order]
+        order = order.sort_values(ranks, ascending=[rises[x] for x in ranks], kind="stable")
     pair = next((name for name in _MOTIONS if name in order), "")
     several = pair not in ("", *found.keys) and order["runs"].max() > 1
     state = "fall" in order and any(order["fall"])
@@ -226,8 +227,11 @@ def tabulate_study(found: StudyFindings) -> Grid:
     caption += "; of each case the worst of each column over its motions" if several else ""
     caption += f"; {join_words(found.idle)} changed nothing" * bool(found.idle)
     if left := order.iloc[MAX_CASES:].to_dict("records"):
-        falls = sum(row["falls"] > 0 for row in left)
-        caption += f"; {len(left)} of {len(order)} cases are left out, of which {falls} fall"
+        falls = f"of which {sum(row['falls'] > 0 for row in left)} fall"
+        if found.is_static:
+            failed = " or no outcome" * any(row["failed"] for row in left)
+            falls = f"with no less {found.decides.replace('_', ' ')}{failed}"
+        caption += f"; {len(left)} of {len(order)} cases are left out, {falls}"
     return Grid(head, rows, caption)
 
 
