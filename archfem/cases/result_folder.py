@@ -212,7 +212,8 @@ def pushover_files(case: Case, push: Pushover, notes: Sequence[str]) -> Files:
     """Return text, curve and picture of a pushover."""
     curve = push.curve.to_dataframe().to_csv().rstrip()
     peak = push.factor * abs(find_push(case.pushover.live if case.pushover else []))
-    site = compare_push(case, peak, peak) if peak else None
+    dead = case.pushover.dead if case.pushover else ()
+    site = compare_push(case, peak, peak, dead) if peak else None
     stated = state_outcome("pushover", push.sentence, notes, "-", site)
     return {
         "pushover.txt": describe_pushover(case.structure, push, notes),

@@ -34,7 +34,7 @@ from archfem.limit.fill_range import FillRange
 from archfem.limit.fill_strength import Fill, PlasticFill, as_pressure, has_backing
 from archfem.limit.mechanism_count import Mechanism, duration_text
 from archfem.limit.rating import Rating
-from archfem.masonry.loads import Action, Settlement, describe_massless
+from archfem.masonry.loads import Action, BodyForce, Settlement, describe_massless
 from archfem.masonry.out_of_plane import UNCHECKED_ACROSS, describe_transverse_push
 from archfem.masonry.standing import describe_carried, describe_widths, find_bodies
 from archfem.masonry.structure import (
@@ -538,7 +538,7 @@ def compare_with_site(case: Case, *senses: Collapse | None) -> PushFactors | Non
         return None
     over = [x.over_fill for x in ends if x.over_fill]
     low, high = FillRange.least_of(over).ends if over else np.min([x.range for x in ends], axis=0)
-    factors = compare_push(case, low, high, abs(ends[0].push))
+    factors = compare_push(case, low, high, case.limit.dead, abs(ends[0].push))
     searched = [x.solutions for x in ends if x.solutions and x.solutions.may_be_less and not over]
     if factors and searched:  # the search may have missed a weaker solution
         proved = min(each.bracket[0] for each in searched) * factors.least / low
@@ -546,8 +546,13 @@ def compare_with_site(case: Case, *senses: Collapse | None) -> PushFactors | Non
     return factors
 
 
-def compare_push(case: Case, low: float, high: float, unit: float = 1.0) -> PushFactors | None:
-    """Return how many times the site's ground acceleration two pushes are, in a unit [g]."""
+def compare_push(
+    case: Case, low: float, high: float, dead: Iterable[Action], unit: float = 1.0
+) -> PushFactors | None:
+    """Return how many times the site's ground acceleration two pushes are, in a unit [g].
+
+    With loads that stay, which may have the vertical part of the demand.
+    """
     spectrum, ground = case.assessment.spectrum or case.target, site_acceleration(case)
     if np.isnan(ground):
         return None
@@ -560,6 +565,14 @@ def compare_push(case: Case, low: float, high: float, unit: float = 1.0) -> Push
         soil = f" × S {ground / rock:.3g}"
         size = f"the site's {rock:.3g} g{soil * (soil != ' × S 1')}"
         size += f" ({open_values} by default)" * bool(open_values)
+    motions = [case.motion] if case.motion else [*(case.suite or {"pairs": {}})["pairs"].values()]
+    # a table of a spectrum alone may have no vertical
+    rises = getattr(spectrum, "vertical_values", spectrum) is not None or any(
+        "vertical" in x or x.get("synthetic", {"vertical_ratio": 0.0}).get("vertical_ratio", 1.0)
+        for x in motions
+    )
+    if rises and not any(isinstance(load, BodyForce) and load.vertical for load in dead):
+        size += ", without vertical acceleration"
     return PushFactors(low * unit / ground, high * unit / ground, size)
 
 

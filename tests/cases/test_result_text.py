@@ -200,6 +200,7 @@ def test_limit_analysis_in_words(ring):
     given = {"limit": {"fill": {"friction_angle": 35, "mobilisation": 1.0 / 3.0}}}
     case = SimpleNamespace(structure=ring, limit=limit, target=None, settings=given, parapets=0.0)
     case.assessment = SimpleNamespace(spectrum=None, options={})
+    case.motion = case.suite = None
     for factor, rank in ((0.9, "higher"), (1.1, "higher"), (0.99999, "the same")):
         other = replace(mirrored, factor=factor * pushed.factor, upper=factor * pushed.factor)
         least, words, _ = describe_limit(case, pushed, other)
@@ -232,7 +233,7 @@ def test_limit_analysis_in_words(ring):
     assert describe_limit(case, endless, lost)[0] is lost
     # 1.15 a_g at the surface
     for case.target, named in (
-        (site, "0.1 g × S 1.15 (type 1 by default)"),
+        (site, "0.1 g × S 1.15 (type 1 by default), without vertical acceleration"),
         (af.motion.TableSpectrum([0.0, 1.0], [0.1, 0.2]), "0.1 g"),
     ):
         ratio = pushed.factor / float(case.target.horizontal(0.0))
@@ -282,6 +283,7 @@ def test_a_push_is_compared_with_the_site_by_the_lesser_sense_of_each_state(
     case = SimpleNamespace(structure=ring, limit=parse_limit({}), target=None, settings={})
     case.limit = replace(case.limit, demand=0.23 * 9.80665)
     case.assessment, case.parapets = SimpleNamespace(spectrum=None, options={}), 0.0
+    case.motion = case.suite = None
     for first, other in (senses, senses[::-1]):
         found, words, site = describe_limit(case, first, other)
         assert (site.least, site.most) == pytest.approx((low / 0.23, high / 0.23))
@@ -289,6 +291,19 @@ def test_a_push_is_compared_with_the_site_by_the_lesser_sense_of_each_state(
         assert found.push == (-1.0 if low == 0.0 else 1.0)
         files = limit_files(case, found, words, site, [])
         assert json.loads(files["limit.json"])["rows"][0][4]["most"] == site.most
+    # a motion without a vertical, and one with it
+    end = ", without vertical acceleration"
+    for table, lacks in (
+        ({"file": "m.csv"}, False),
+        ({"file": "m.csv", "vertical": "v.csv"}, True),
+        ({"synthetic": {"seed": 1}}, True),
+        ({"synthetic": {"seed": 1, "vertical_ratio": 0.0}}, False),
+    ):
+        for case.motion, case.suite in ((table, None), (None, {"pairs": {"m": table}})):
+            case.limit = replace(case.limit, dead=())
+            assert describe_limit(case, *senses)[1].endswith(end) == lacks
+            case.limit = replace(case.limit, dead=(af.BodyForce(0.0, 0.18),))
+            assert not describe_limit(case, *senses)[1].endswith(end)
 
 
 def test_point_loads_without_a_strength_are_stated_by_an_assumed_one_too(ring):
