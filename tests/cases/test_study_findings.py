@@ -281,7 +281,9 @@ def test_what_changes_nothing_is_said_once():
 @pytest.mark.parametrize(
     ("values", "said"),
     [
-        ([0.6, 0.4, 0.5], "at x = 2"),
+        ([0.6, 0.4, 0.5], "at x = 2; neighbours differ by up to 50%: take smaller steps there"),
+        ([0.5, 0.4, 0.45], "at x = 2; neighbours differ by up to 25%: take smaller steps there"),
+        ([0.41, 0.4, 0.411], "at x = 2"),
         ([0.4, 0.6, 0.5], "at x = 1, where the sweep ends: less may lie beyond"),
         ([0.6, 0.5, 0.4], "at x = 4, where the sweep ends: less may lie beyond"),
     ],

@@ -31,6 +31,7 @@ _FACTORS = (
 _SIZES = ("largest_displacement", "residual_displacement")
 MAX_CASES = 24
 MIN_CHANGE = 0.1  # of a finding that is worth a sentence [-]
+MIN_STEP = 0.03  # from the extreme of a sweep to its neighbours, likewise
 MAX_NAMES = 4  # of cases in a sentence
 
 # What cases are counted by, those that fail first, as verbs of one case and of several
@@ -311,11 +312,24 @@ def find_least(
     return min((row for row in rows if row[0] == row[0]), default=(np.inf, ("", ""), "", ""))
 
 
-def _find_reached_ends(found: StudyFindings, row: Any) -> list[str]:
-    """Return the keys swept over three numbers or more of which a case has the first or last."""
+def _look_beside(found: StudyFindings, rows: list[Any], row: Any) -> tuple[list[str], float]:
+    """Return the swept keys of which a case has the first or last number, and the largest step.
+
+    Keys are swept over three numbers or more; the step is to a neighbour between ends, over the
+    case's finding.
+    """
     swept = {key: found.table[key].values for key in found.keys if key in found.table.dims}
-    numbers = {k: v for k, v in swept.items() if v.dtype.kind in "if" and len(v) > 2}
-    return [key for key, values in numbers.items() if row[key] in (min(values), max(values))]
+    numbers = {k: sorted(v) for k, v in swept.items() if v.dtype.kind in "if" and len(v) > 2}
+    ends, step = [k for k, v in numbers.items() if row[k] in (v[0], v[-1])], 0.0
+    for key in numbers.keys() - {*ends}:
+        at = numbers[key].index(row[key])
+        beside = numbers[key][at - 1], numbers[key][at + 1]
+        line = (x for x in rows if all(x[k] == row[k] for k in found.keys if k != key))
+        sizes = [x[found.decides] for x in line if x[key] in beside]
+        step = max(
+            [step, *(abs(x / row[found.decides] - 1.0) for x in sizes if row[found.decides])]
+        )
+    return ends, step
 
 
 def _compare_cases(found: StudyFindings, rows: list[Any], given: Any) -> str:
@@ -331,10 +345,12 @@ def _compare_cases(found: StudyFindings, rows: list[Any], given: Any) -> str:
 
     if found.keys != ("case",) or first is not given:  # none of them is the given one
         end, beyond = ("least", "less") if least else ("largest", "more")
-        ends = _find_reached_ends(found, extreme)
+        ends, step = _look_beside(found, rows, extreme)
         of = f" of {join_words(ends)}" * (len(found.keys) > 1)
         place = found.label(extreme)
         place += f", where the sweep{of} ends: {beyond} may lie beyond" * bool(ends)
+        if least and step > MIN_STEP:
+            place += f"; neighbours differ by up to {step:.0%}: take smaller steps there"
         return f"the {words} is {end}, {show(extreme)}, at {place}"
     verb = "lowers" if least else "raises"
     if extreme is first:
