@@ -183,7 +183,7 @@ def find_lowest_modes(
             f"ARPACK found {len(error.eigenvalues)} of {count} modes in {max_restarts} restarts: "
             "ask for fewer, or check units"
         ) from error
-    _check_lowest(float(squares[0]), np.inf if _count_negative_pivots(factors) else zero)
+    _check_lowest(float(squares[0]), zero, _count_negative_pivots(factors))
     # Count modes below the highest one; those within 1e-6 of it count as equal and are left out.
     edge = float(squares[-1]) * (1.0 - 1e-6)
     below, expected = int(np.sum(squares < edge)), count_modes_below(stiffness, mass, edge)
@@ -225,12 +225,18 @@ def zero_threshold(stiffness: sparse.csr_matrix, mass: sparse.csr_matrix) -> flo
     return 1e-13 * float(np.max(stiffness.diagonal() / mass.diagonal()))
 
 
-def _check_lowest(square: float, zero: float) -> None:
-    """Refuse a structure with a motion of no stiffness, by its lowest ω² [1/s²]."""
-    if square <= zero:
+def _check_lowest(square: float, zero: float, negative: int = 0) -> None:
+    """Refuse a structure with a motion of no stiffness.
+
+    By its lowest ω² [1/s²], or by the number of those below zero, which a search may have missed.
+    """
+    if square <= zero or negative:
+        size = f"with ω² = {square:.1e} 1/s² where rounding makes up to {zero:.0e}: a mechanism"
+        if negative:
+            size = f"with {negative} ω² below 0: a mechanism, or pieces on facets of millimetres"
         raise DidNotConverge(
-            f"the stiffness is singular or negative, with ω² = {square:.1e} 1/s² where rounding "
-            f"makes up to {zero:.0e}: a mechanism; check supports and joints, or take another state"
+            f"the stiffness is singular or negative, {size}; check supports and joints, give "
+            "another piece_size of a fill, or take another state"
         )
 
 

@@ -83,5 +83,5 @@ def test_rounding_is_that_of_the_highest_square_of_one_coordinate():
 def test_a_negative_stiffness_far_from_all_modes_that_are_sought_is_no_frequency_either():
     """The search finds the nearest modes alone, and the factor shows the others."""
     stiffness = sparse.diags([-1e6, *np.linspace(1.0, 1e3, 500)]).tocsr()
-    with pytest.raises(af.DidNotConverge, match=r"singular or negative, with ω² = 1\.0e"):
+    with pytest.raises(af.DidNotConverge, match="singular or negative, with 1 ω² below 0: "):
         find_lowest_modes(stiffness, sparse.identity(501, format="csr"), 2)
