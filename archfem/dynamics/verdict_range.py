@@ -189,12 +189,16 @@ class VerdictRange(ResultDisplay):
 
     @property
     def _held_displacements(self) -> tuple[Array, NDArray[np.bool_], bool]:
-        """Displacements of runs that do not fall, which hardly move, and if these are all rigid."""
+        """Displacements of runs that do not fall, which hardly move, and if these are all rigid.
+
+        Where they are, all runs with rigid joints count as such.
+        """
         held = self.answers.isel(run=np.flatnonzero(~self.falls[self.answered]))
         sizes = held["displacement"].values
         hardly = sizes < sizes.max(initial=0.0) / 100
-        rules = held["joint_rule"].values[hardly] if "joint_rule" in held else np.array([])
-        return sizes, hardly, len(rules) > 0 and bool((rules == "rigid").all())
+        rigid = held["joint_rule"].values == "rigid" if "joint_rule" in held else ~hardly
+        alike = bool(hardly.any() and rigid[hardly].all() and not rigid.all())
+        return sizes, rigid if alike else hardly, alike
 
     @property
     def displacements(self) -> str:

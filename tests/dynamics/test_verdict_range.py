@@ -166,6 +166,19 @@ def test_displacements_of_the_runs_that_hold_are_a_range():
         "largest displacements 8 mm to 100 mm, in 95 % of 93 runs 96 mm or less; with "
         "rigid joints 0.001 mm to 0.01 mm"
     )
+    # one of them moves by 1.1 % of the largest, and counts among the rigid ones all the same
+    sizes[6] = 0.0011
+    found = made_up(falls, residual=sizes, error=error, joint_rule=rules)
+    assert found.displacements == (
+        "largest displacements 8 mm to 100 mm, in 95 % of 93 runs 96 mm or less; with "
+        "rigid joints 0.001 mm to 1.1 mm"
+    )
+    # without others there are no two groups
+    found = made_up(falls, residual=sizes, error=error, joint_rule=["rigid"] * 102)
+    assert found.displacements == (
+        "largest displacements 0.001 mm to 100 mm, in 95 % of 100 runs 95 mm or less; 6 of them "
+        "moved by less than 1 % of the largest"
+    )
     assert found.sentence.endswith("; 1 of 102 have no answer, the first: broken")
     assert made_up([True], sign=["a"]).displacements == ""
 
