@@ -530,7 +530,7 @@ def _merge_vertices(outlines: Sequence[Array], snap: float) -> tuple[Array, Any]
     if near > 100.0:
         raise InvalidStructure(
             f"snap = {snap:.3g} m would merge {near:.0f} vertices at each place on average: lower "
-            "snap below the shortest side of a block"
+            "snap below the shortest side of a block; without a unit it is in metres"
         )
     pairs = [tree.query_pairs(snap, output_type="ndarray")]
     starts = np.cumsum([0, *map(len, outlines)])
