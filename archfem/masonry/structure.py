@@ -434,7 +434,8 @@ class Structure(ResultDisplay):
             remedy = "join each, through others, to"
             if not held:
                 remedy = "no block is fixed; add the ground, a closed outline and no line, as"
-                after = f"; or give a drawing its level, as ground = '0 m' in [structure]{after}"
+                level = "as ground = '0 m' in [structure], or as the argument ground"
+                after = f"; or give a drawing its level, {level}{after}"
             raise InvalidStructure(
                 f"{before}blocks {names} rest on nothing: {remedy} a fixed block, which has fixed "
                 "= true, in a drawing by its layer; "

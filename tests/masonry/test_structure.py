@@ -54,6 +54,8 @@ def test_where_nothing_is_fixed_the_ground_must_be_drawn(stack, fixed):
         replace(stack, blocks=tuple(blocks), joints=stack.joints[:1])
     drawn = "no block is fixed; add the ground, a closed outline and no line, as a fixed block, "
     assert (f"rest on nothing: {drawn}which has fixed = true" in str(refused.value)) != fixed
+    level = "its level, as ground = '0 m' in [structure], or as the argument ground"
+    assert (level in str(refused.value)) != fixed
 
 
 def test_millimetres_are_refused():
