@@ -18,13 +18,14 @@ from archfem.limit.thickness import minimum_thickness
 from archfem.masonry.ring_thickness import Ring
 from archfem.masonry.standing import find_bodies
 from archfem.masonry.structure import Structure, describe_spans, join_names, list_first
-from archfem.units import format_mm, mm
+from archfem.units import format_mm, kN, mm
 
 
 def describe_supports(structure: Structure, max_names: int = 4) -> str:
-    """Describe which blocks move and which are fixed; many by their parts, in one line."""
+    """Describe which blocks move, with their weight, and which are fixed; many by their parts."""
     groups = []
-    for word, fixed in (("move", False), ("fixed", True)):
+    weight = f"move, {structure.weight / kN:.4g} kN in all"
+    for word, fixed in ((weight, False), ("fixed", True)):
         own = [block for block in structure.blocks if block.fixed is fixed]
         names = [f"'{block.name}'" for block in own]
         if fixed:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import shapely
 from drawn import assert_same, draw_portal, dxf, geojson, square
 
 import archfem as af
@@ -171,7 +172,10 @@ def test_stacks_of_one_pier_that_stand_apart_are_counted(tmp_path):
     both = ((PIERS, "3 of 'west pier', 11 of"), (wide, "6 of 'west pier' in 2 stacks apart, "))
     for number, (piers, said) in enumerate(both):
         case = af.Case.read(one_layer(tmp_path / str(number), piers))
-        assert said in describe_supports(case.structure)
+        assert said in (text := describe_supports(case.structure))
+    free = [block for block in case.structure.blocks if not block.fixed]
+    loads = [shapely.Polygon(block.drawn()).area * block.material.unit_weight for block in free]
+    assert text.startswith(f"blocks that move, {case.structure.width * sum(loads) / 1e3:.4g} kN in")
 
 
 def test_outlines_by_place_can_be_left_out(tmp_path):

@@ -610,7 +610,8 @@ def test_commands_name_fixed_blocks_and_doubt_those_within_a_ring(tmp_path, caps
     said = capsys.readouterr().out
     sizes = {number: 1e3 * np.ptp(ring.blocks[number].points[:, 0]) for number in (0, 5, 10)}
     fixed = ", ".join(f"'{ring.blocks[k].name}' ({mm:.3g} mm broad)" for k, mm in sizes.items())
-    assert f"blocks that move: 8 of 'arch'; fixed: {fixed}\n" in said
+    weight = f"{ring.weight / 1e3:.4g} kN in all"
+    assert f"blocks that move, {weight}: 8 of 'arch'; fixed: {fixed}\n" in said
     assert "in doubt: 'voussoir 5' at (0.00, " in said
     commands = (
         ["rate", "--vehicle", "CS454-single"],
