@@ -18,7 +18,8 @@ from archfem.errors import InvalidInput
 from archfem.limit.fill_range import FillRange
 from archfem.limit.rating import Rating
 from archfem.masonry.loads import name_side
-from archfem.masonry.structure import join_words
+from archfem.masonry.out_of_plane import describe_transverse_push, find_transverse_push
+from archfem.masonry.structure import Structure, join_words
 from archfem.models.model import Doubt, read_doubts, write_doubts
 from archfem.motion.hazard import DESIGN_PERIOD, MEASURES
 from archfem.motion.matching import DEFAULT_BAND
@@ -357,6 +358,13 @@ def compare_crushing(case: Case, found: Iterable[KinematicAssessment]) -> list[R
         f"by as much: the least one to {margin:.3g}"
     )
     return [f"{NOTE_MARK}{text}" if share > 0.98 else Doubt(text)]
+
+
+def note_across(structure: Structure, found: Iterable[KinematicAssessment]) -> list[str]:
+    """Return a note on the push across the plane that overturns it before alpha_0 moves it."""
+    weaker = find_transverse_push(structure)[0] < min(each.alpha_0 for each in found)
+    text = describe_transverse_push(structure)  # of a column of a wall none
+    return [f"{NOTE_MARK}{text}"] * (weaker and bool(text))
 
 
 def note_ties(case: Case) -> list[str]:

@@ -245,6 +245,7 @@ def assess(options: argparse.Namespace) -> int:
         remarks = [*doubts, *answers.compare_crushing(case, found.values())]
         remarks += [] if options.parts else answers.note_ties(case)
     remarks += answers.note_band(case, found.values())
+    remarks += answers.note_across(case.structure, found.values())
     remarks += result_text.note_masses(case.structure, parapets=case.parapets)
     every = [*remarks, *(doubt for result in found.values() for doubt in result.doubts)]
     texts = [answers.describe_margin(found.values())]

@@ -34,7 +34,7 @@ from archfem.dynamics.walls_across import (
     find_falls_across,
 )
 from archfem.errors import InvalidInput
-from archfem.masonry.out_of_plane import find_transverse_push
+from archfem.masonry.out_of_plane import UNCHECKED_ACROSS, find_transverse_push
 from archfem.models.model import Doubt, read_doubts, write_doubts
 from archfem.statics.assessment_checks import UPPER_BOUND
 from archfem.studies import variations
@@ -806,6 +806,19 @@ def test_motions_matched_to_shorter_periods_than_that_of_a_check_are_noted(perio
         for note in notes
     )
     assert answers.note_band(SimpleNamespace(suite=None), [found]) == []
+
+
+@pytest.mark.parametrize(("width", "noted"), [(0.2, True), (5.0, False)])
+def test_an_assessment_in_the_plane_names_a_weaker_plane_across(width, noted):
+    """Half of the width over the height of the centre of weight of 2 m; alpha_0 is 0.3 g."""
+    blocks = [af.Block(((0, -1), (9, -1), (9, 0), (0, 0)), af.STONE, "ground", fixed=True)]
+    for x in (0.0, 2.0):
+        outline = ((x, 0), (x + 0.6, 0), (x + 0.6, 2), (x, 2))
+        blocks.append(af.Block(outline, af.STONE, f"pier at {x}", role="pier"))
+    piers = af.masonry.assembled(blocks, af.Contact(1e9, 4e8), width=width)
+    notes = answers.note_across(piers, [SimpleNamespace(alpha_0=0.3), SimpleNamespace(alpha_0=0.4)])
+    words = f"note: {UNCHECKED_ACROSS}: held by nothing else, all of it begins to overturn at 0.1 g"
+    assert [note.startswith(words) for note in notes] == [True] * noted
 
 
 def test_the_head_of_a_push_says_when_it_begins_to_move(case):

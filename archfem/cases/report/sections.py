@@ -145,7 +145,7 @@ def build_input_section(data: ReportData) -> Section:
         ("joints", _describe_joints(data)),
         ("displacements", moved),
         ("ground", f"rigid, moves as one; fixed to it: {join_names([*fixed])}"),
-        ("units", "SI: m, kg, s, N, Pa, where no other unit stands beside a number"),
+        ("units", "SI: m, kg, s, N, Pa, where no other unit stands; accelerations of spectra in g"),
         ("signs", SIGN_CONVENTION),
         *[("extrados", f"outer face of a ring; {join_names([*piers])}")] * bool(piers),
         ("e", "eccentricity M / (N h), h the depth of the joint: ±0.5 at its edges"),
