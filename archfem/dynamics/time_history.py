@@ -325,20 +325,23 @@ def _run_steps(
             # first steps, whose length is sought, are no pace
             if not is_announced and spent > 5.0 and done > 0.01 * duration:
                 is_announced = True
-                _announce_long_run(spent, done, duration)
+                _announce_long_run(spent, done, duration, recorder.dt)
     return Ending.FINISHED, "reached the end of the motion"
 
 
-def _announce_long_run(spent: float, done: float, duration: float, long: float = 60.0) -> None:
+def _announce_long_run(
+    spent: float, done: float, duration: float, dt: float | None, long: float = 60.0
+) -> None:
     """Warn of a run that takes long, estimated from its pace [s]."""
     if (whole := spent * duration / done) > long:
         logger.warning(
             "the run takes about %.3g minutes at its pace (%.3g of %g s in %.3g s): Ctrl-C ends it "
-            "with what was computed, and a given dt skips the comparison of steps",
+            "with what was computed%s",
             whole / 60.0,
             done,
             duration,
             spent,
+            "" if dt else ", and a given dt skips the comparison of steps",
             extra={"of_run": True},  # of the machine: no doubt about the answer
         )
 

@@ -1138,10 +1138,14 @@ assessment = { spectrum = { code = "EC8", ag = 0.22, ground = "C" }, direction =
     assert "proved to stand up to" not in words
 
 
-def test_warnings_of_runs_are_no_lines_of_an_answer():
+def test_warnings_of_runs_are_no_lines_of_an_answer(caplog):
     """Runs keep their doubts, and the pace is that of the machine."""
     with record_doubts(af.column(breadth=1.0, heights=[1.0])) as doubts:
         logger.warning("%s", Doubt("energy drifts by {:.2g}", "", (0.1,)))
-        time_history._announce_long_run(6.0, 0.01, 5.0)
+        for dt in (None, 0.005):
+            time_history._announce_long_run(6.0, 0.01, 5.0, dt)
         logger.warning("joints slide")
     assert doubts == [Doubt("joints slide")]
+    said = [each.message.rpartition(": ")[2] for each in caplog.records if each.args][1:]
+    kept = "Ctrl-C ends it with what was computed"
+    assert said == [f"{kept}, and a given dt skips the comparison of steps", kept]
