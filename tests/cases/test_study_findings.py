@@ -57,6 +57,16 @@ def test_each_case_has_a_row_and_those_that_fall_are_the_first():
     assert "left out" not in study_findings.tabulate_study(study(cases=24)).caption
 
 
+def test_a_case_without_an_outcome_has_no_number():
+    found = study(failed=[1], cases=2)
+    alone = study_findings.collect_findings("", "", found.table.isel(point=[0, 3]))
+    grid = study_findings.tabulate_study(alone)
+    assert [row[-2:] for row in grid.rows] == [["1 mm", "stands"], ["-", "no outcome"]]
+    pushed = xr.Dataset({"push": ("x", [0.3, np.nan])}, {"x": [1.0, 2.0]})
+    grid = study_findings.tabulate_study(study_findings.collect_findings("", "", pushed))
+    assert grid.rows == [["1", "0.3"], ["2", "-"]]
+
+
 def test_findings_are_drawn_in_words_and_mm_and_a_fall_has_none():
     found = study(falls=[1], cases=2)
     drawn = found.numbers["residual displacement"]

@@ -223,7 +223,7 @@ def tabulate_study(found: StudyFindings) -> Grid:
         cells += [_format_finding(row, name) for name in found.names]
         failed = row["falls"] or row["dislocated"]
         count = f", in {failed} of {row['runs']}" if several and failed else ""
-        rows.append([*cells, f"{row['fall']}{count}"] if state else cells)
+        rows.append([*cells, f"{row['fall'] or 'no outcome'}{count}"] if state else cells)
     caption = f"Study: {found.title}{found.under}"
     caption += "; of each case the worst of each column over its motions" if several else ""
     caption += f"; {join_words(found.idle)} changed nothing" * bool(found.idle)
@@ -244,13 +244,15 @@ def _label_finding(table: xr.Dataset, name: str) -> str:
 
 def _format_finding(row: Any, name: str) -> str:
     """Return a finding of a row; a fall has no displacement but that to the ground."""
-    if name not in _SIZES:
+    if name not in _SIZES or row[name] != row[name]:
         return mark_bound(row, name, _format(row[name]))
     return "-" if row["fall"] in FALLEN_STATES else format_mm(row[name])
 
 
 def _format(value: Any) -> str:
-    """Return a number with four digits, or a word."""
+    """Return a number with four digits, "-" without one, or a word."""
+    if value != value:
+        return "-"
     return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
