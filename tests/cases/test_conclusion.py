@@ -248,7 +248,7 @@ def test_the_margin_of_scales_ends_where_it_is_dislocated(case):
     ]
     small = scales("a", 0.5, mechanism=0.55)
     assert say_margin(data, scale=state("scale", small))[:2] == [
-        "the least margin is 0.500 on 'a', at a PGA of 0.1 g, which it fails",
+        "the least margin is 0.500 on 'a', at a PGA of 0.1 g, which it fails, under one motion",
         "of the scales that were run it first forms a mechanism at 0.550 ×",
     ]
     assert say_margin(data, scale=state("scale", scales("a", 1.5)))[1] == (
@@ -262,7 +262,8 @@ def test_the_margin_of_scales_ends_where_it_is_dislocated(case):
     for least, fails in ((1.3, ""), (0.9, ", which it fails")):
         begun = scales("a", 0.7, unfinished=True, moves=0.5, falls=least)
         assert say_margin(data, scale=state("scale", begun))[0] == (
-            f"the least margin is 0.700 (search unfinished) on 'a', at a PGA of 0.14 g{fails}"
+            f"the least margin is 0.700 (search unfinished) on 'a', at a PGA of 0.14 g{fails}, "
+            "under one motion"
         )
 
 
@@ -327,7 +328,7 @@ def test_what_fails_under_a_motion_that_was_not_scaled_has_a_margin_below_one(ca
     assert say_margin(data, scale=state("scale", scales("a", 1.4, dislocated=2.0, falls=4.0))) == [
         "the least margin is below 1 on 'b', PGA 0.20 g, under which it is dislocated, and which "
         "was not scaled",
-        "the next is 1.40 on 'a', at a PGA of 0.28 g",
+        "the next is 1.40 on 'a', at a PGA of 0.28 g, under one motion",
         "of the scales that were run it first is dislocated at 2.00 × and falls at 4.00 ×",
         "'c' was not scaled",
     ]

@@ -109,7 +109,7 @@ def describe_scales(data: ReportData) -> Iterator[tuple[float, list[str]]]:
         words = f"below {_bound(first):#.3g} as one rigid body ({words} in courses)"
     words += f" on '{first.motion}', at a PGA of {_bound(first) * first.pga:.3g} g"
     words += ", which it fails" * (met <= 1.0)
-    words += f", of {len(made)} motions" * (len(made) > 1)
+    words += f", of {len(made)} motions" if made[1:] else ", under one motion"
     states = join_words([*_say_first_states(searches, first.motion)])
     first_at = f"of the scales that were run it first {states}"
     falls = [x for x in searches if {"falls", "mechanism"} & x.states.keys()]
