@@ -13,15 +13,9 @@ import xarray as xr
 
 from archfem._display import DOUBT_MARK, NOTE_MARK
 from archfem._files import align_columns
+from archfem.cases import defaults
 from archfem.cases.analysis_keys import LimitAnalysis
 from archfem.cases.case import Case
-from archfem.cases.defaults import (
-    describe_defaults,
-    describe_fill_defaults,
-    describe_margins_at_rest,
-    describe_spectrum_defaults,
-    explain_defaults,
-)
 from archfem.cases.run import DeadLoadResult
 from archfem.dynamics.accuracy import Accuracy
 from archfem.dynamics.collapse_state import FALLEN_STATES
@@ -267,7 +261,7 @@ def describe_dead_load(result: DeadLoadResult, *, explain: bool = False) -> str:
     Defaults are named in one line, or explained in a line each.
     """
     model, structure = result.dead.model, result.case.structure
-    defaults = explain_defaults if explain else describe_defaults
+    say_defaults = defaults.explain_defaults if explain else defaults.describe_defaults
     joints = assessed_joints(result.dead.joints)
     lines = [
         f"model: {model.fidelity}, {len(structure.free)} blocks, "
@@ -294,7 +288,7 @@ def describe_dead_load(result: DeadLoadResult, *, explain: bool = False) -> str:
         heads = result.dead.joints.isel(joint=structure.heads)
         lines[-1] += f"; of head joints, which do not count, {_describe_largest(heads)}"
     lines += [
-        *describe_margins_at_rest(result.case, structure),
+        *defaults.describe_margins_at_rest(result.case, structure),
         *note_masses(structure, parapets=result.case.parapets),
     ]
     if has_backing(result.case.limit.fill):
@@ -303,7 +297,7 @@ def describe_dead_load(result: DeadLoadResult, *, explain: bool = False) -> str:
     if result.case.has_motion and structure.heads.any():
         across = across.replace(UNCHECKED_ACROSS, CHECKED_ACROSS)
     lines += filter(None, [structure.assessment, across])
-    lines += filter(None, [defaults(result.case)])
+    lines += filter(None, [say_defaults(result.case)])
     if result.strength_use is not None:
         lines.append(f"dead load: {strength_use_text(result.strength_use)}")
     return "\n".join([*lines, *mark_remarks(result.doubts)])
@@ -407,7 +401,7 @@ def describe_ratings(
         common = [line for line in lines[0] if all(line in other for other in lines)]
         lines = [[line for line in own if line not in common] for own in lines]
         lines.append(["of all vehicles:", *common])
-    texts = [*tables, *("\n".join(each) for each in lines), describe_fill_defaults(case)]
+    texts = [*tables, *("\n".join(each) for each in lines), defaults.describe_fill_defaults(case)]
     files["rating.txt"] = "\n\n".join(filter(None, texts))
     if varied is None:
         return files["rating.txt"], files
@@ -471,7 +465,7 @@ def describe_limit(
             found, opposite = opposite, found
         rank = _compare_senses(found, opposite)
         others.append(f"in the other sense: {opposite.sentence} ({rank})")
-    others += filter(None, [describe_fill_defaults(case)])
+    others += filter(None, [defaults.describe_fill_defaults(case)])
     others += [f"it begins to move at {site} times {site.site}"] if site else []
     text = describe_collapse(case.structure, found, case.limit, case.parapets)
     return found, "\n".join([text, *others]), site
@@ -561,7 +555,7 @@ def compare_push(
     if case.limit.demand is not None:
         size = f"the demand of {ground:.3g} g"
     elif rock is not None:
-        open_values = describe_spectrum_defaults(case)
+        open_values = defaults.describe_spectrum_defaults(case)
         soil = f" × S {ground / rock:.3g}"
         size = f"the site's {rock:.3g} g{soil * (soil != ' × S 1')}"
         size += f" ({open_values} by default)" * bool(open_values)
