@@ -401,9 +401,9 @@ class CollapseScale:
                 f"{fall.residual:.3g} m" if fall and run.whole else "-",
             ]
             for dt, search in self._every.items()
-            for run in search.runs
+            for run, x in ((run, run.fall) for run in search.runs)
             # a fall that was not followed may be of more parts
-            for fall in [run.fall if run.whole or not run.fall else replace(run.fall, kind="falls")]
+            for fall in [x and (x if run.whole else replace(x, kind="loses a block"))]
         ]
         return ["step", "scale", "properties", "the structure", "at", "residual"], rows
 

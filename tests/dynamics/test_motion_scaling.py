@@ -477,7 +477,7 @@ def test_the_smallest_fall_alone_is_followed_to_its_end(monkeypatch, threshold):
         assert all(x.whole == (not x.fails("collapse") or x is fall.run) for x in each.runs)
     # of the others it is unknown whether they fall partly, and where blocks come to rest
     ends = {(row[3], row[5]) for row in found.rows()[1] if float(row[1]) > threshold}
-    assert ends == {("fallen", "0.1 m"), ("falls", "-")}
+    assert ends == {("fallen", "0.1 m"), ("loses a block", "-")}
     # whole are what stands though blocks are loose, the smallest fall, and falls that were none
     for dt, scale in {(dt, scale) for dt, scale, _ in runs}:
         modes = [whole for *key, whole in runs if key == [dt, scale]]
