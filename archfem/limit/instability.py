@@ -165,7 +165,7 @@ def describe_geometric_factor(structure: Structure, strength: float | None) -> s
     more = " or more" if factor >= 1.0 / _LITTLE_DEPTH else ""
     return (
         f"geometric factor of safety at rest: {factor:.3g}{more}, as it stands with all joints "
-        f"{1.0 / factor:.3g} times as deep"
+        f"{1.0 / factor:.3g} times as deep under the same weight"
     )
 
 

@@ -87,6 +87,7 @@ _FACTORS = {
     "assessment": "a check is just passed",
     **dict.fromkeys(("limit", "pushover", "rating"), "a load makes a mechanism"),
     "scale": "up to it no fall or dislocation",
+    "thickness": "of a thickness, the given over the least",
     "risk": "half a probability of a fall",
 }
 
