@@ -461,13 +461,13 @@ def test_results_need_no_drawing_beside_them(name, unplotted, undoubted, tmp_pat
     drawing, place = tmp_path / "drawn" / "pier.geojson", tmp_path / "elsewhere"
     drawing.parent.mkdir()
     rubble = replace(af.STONE, name=name, unit_weight=17e3)
-    pier = af.column(breadth=0.8, heights=[0.7, 0.9], material=rubble, width=1.0)
+    pier = af.column(breadth=0.8, heights=[0.7, 0.9], material=rubble, width=1.1)
     af.masonry.write_outlines(pier, drawing)
     # a material under the name of its table, and one that its table gives another name
     material = {"young": 30e9, "poisson": 0.2, "unit_weight": "17 kN/m**3"}
     tables = {
         "title": "a pier",
-        "structure": {"shape": "outlines", "file": drawing.name, "width": 1.0},
+        "structure": {"shape": "outlines", "file": drawing.name, "width": 1.1},
         "materials": {name: material},
         "model": {"fidelity": "rigid"},
         "motion": {"synthetic": {"duration": 0.3, "pga": 1.0, "vertical_ratio": 0.0}},
@@ -1241,7 +1241,7 @@ def test_studies_have_names_and_their_doubts_stand_in_a_report(kept, unplotted, 
     studies = {name: ["study", f"{place}.toml", "--out", place] for name, place in folders.items()}
     assert af.commands.main([*studies["Slides"], "--workers", "1"]) == 3
     doubts = [x for x in capsys.readouterr().out.splitlines() if x.startswith("in doubt: ")]
-    words = "'as given' under 'first'; 'as given' under 'second': steps of 10 ms are long for"
+    words = "'as given' under 'first', 'as given' under 'second': steps of 10 ms are long for"
     assert all("'rough'" not in doubt for doubt in doubts)
     assert any(doubt.startswith(f"in doubt: {words} sliding") for doubt in doubts)
     assert af.commands.main([*studies["Pushes"], "--workers", "1"]) == 3

@@ -921,7 +921,10 @@ def test_vehicles_are_rated_together(tmp_path, unplotted, capsys, monkeypatch):
         factors |= {f"{name} {code}": each.factor for code, each in found.by_codes.items()}
         if name == "LM1":
             outcome, *others = found.clauses
-            stated += [f"rating for {name}: factor {found.factor:.4g}, {outcome}", *others]
+            stated += [
+                f"rating for {name}: factor {found.factor:.4g} without crushing, {outcome}",
+                *others,
+            ]
             stated += [f"worst {found.place}", "of 4 vehicles it has the least factor"]
             stated += found.describe_codes()
             assert (out / "rating.csv").read_text().strip() == found.table()

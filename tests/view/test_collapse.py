@@ -273,9 +273,8 @@ def test_several_vehicles_are_drawn_each_at_its_worst_place(coarse_ring, few_pla
     expected = [(found.moving.position, found.factor) for found in 2 * ratings]
     np.testing.assert_allclose(points, expected)
     for found, axes in zip(ratings, panels[:3], strict=True):
-        assert (
-            axes.get_title() == f"{found.vehicle.name}, without partial factors: {found.factor:.3g}"
-        )
+        title = f"{found.vehicle.name}, without partial factors: {found.factor:.3g}"
+        assert axes.get_title().replace("\n", " ") == title
         tips = [text.xy for text in axes.texts if text.arrow_patch is not None]
         count = int(
             found.moving.factors["axles"].sel(
