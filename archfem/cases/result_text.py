@@ -532,7 +532,8 @@ def compare_with_site(case: Case, *senses: Collapse | None) -> PushFactors | Non
         return None
     over = [x.over_fill for x in ends if x.over_fill]
     low, high = FillRange.least_of(over).ends if over else np.min([x.range for x in ends], axis=0)
-    factors = compare_push(case, low, high, case.limit.dead, abs(ends[0].push))
+    unit = abs(ends[0].push)
+    factors = compare_push(case, low * unit, high * unit, case.limit.dead)
     searched = [x.solutions for x in ends if x.solutions and x.solutions.may_be_less and not over]
     if factors and searched:  # the search may have missed a weaker solution
         proved = min(each.bracket[0] for each in searched) * factors.least / low
@@ -540,10 +541,8 @@ def compare_with_site(case: Case, *senses: Collapse | None) -> PushFactors | Non
     return factors
 
 
-def compare_push(
-    case: Case, low: float, high: float, dead: Iterable[Action], unit: float = 1.0
-) -> PushFactors | None:
-    """Return how many times the site's ground acceleration two pushes are, in a unit [g].
+def compare_push(case: Case, low: float, high: float, dead: Iterable[Action]) -> PushFactors | None:
+    """Return how many times the site's ground acceleration two pushes are [g].
 
     With loads that stay, which may have the vertical part of the demand.
     """
@@ -567,7 +566,7 @@ def compare_push(
     )
     if rises and not any(isinstance(load, BodyForce) and load.vertical for load in dead):
         size += ", without vertical acceleration"
-    return PushFactors(low * unit / ground, high * unit / ground, size)
+    return PushFactors(low / ground, high / ground, size)
 
 
 def describe_pushover(structure: Structure, push: Pushover, notes: Sequence[str]) -> str:
