@@ -565,7 +565,7 @@ def compare_push(case: Case, low: float, high: float, dead: Iterable[Action]) ->
         for x in motions
     )
     if rises and not any(isinstance(load, BodyForce) and load.vertical for load in dead):
-        size += ", without vertical acceleration"
+        size += "; vertical acceleration is left out"
     return PushFactors(low / ground, high / ground, size)
 
 

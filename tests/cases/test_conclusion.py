@@ -1332,7 +1332,8 @@ def test_sentences_are_short_of_a_ring_that_stands_is_scaled_and_has_a_study():
             again=[3.74],
         ),
     )
-    push = PushFactors(0.8, 1.3, "the site's 0.25 g × S 1.2 (topography 1.0 by default)", 0.0)
+    site = "the site's 0.25 g × S 1.2 (topography 1.0 by default)"
+    push = PushFactors(0.8, 1.3, f"{site}; vertical acceleration is left out", 0.0)
     checks = answers.Ratios("significant damage", ["right", "left"], 1.5, 1.5, bounded=True)
     vars(data)["statements"] = {
         "limit": state("limit", push),

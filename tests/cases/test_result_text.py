@@ -233,7 +233,7 @@ def test_limit_analysis_in_words(ring):
     assert describe_limit(case, endless, lost)[0] is lost
     # 1.15 a_g at the surface
     for case.target, named in (
-        (site, "0.1 g × S 1.15 (type 1 by default), without vertical acceleration"),
+        (site, "0.1 g × S 1.15 (type 1 by default); vertical acceleration is left out"),
         (af.motion.TableSpectrum([0.0, 1.0], [0.1, 0.2]), "0.1 g"),
     ):
         ratio = pushed.factor / float(case.target.horizontal(0.0))
@@ -292,7 +292,7 @@ def test_a_push_is_compared_with_the_site_by_the_lesser_sense_of_each_state(
         files = limit_files(case, found, words, site, [])
         assert json.loads(files["limit.json"])["rows"][0][4]["most"] == site.most
     # a motion without a vertical, and one with it
-    end = ", without vertical acceleration"
+    end = "; vertical acceleration is left out"
     for table, lacks in (
         ({"file": "m.csv"}, False),
         ({"file": "m.csv", "vertical": "v.csv"}, True),
