@@ -24,6 +24,9 @@ from archfem.masonry.stiffness_ratio import list_stones
 from archfem.masonry.structure import CONTACT_TOLERANCE, Joint, Structure, join_names, join_words
 from archfem.units import GPa, kN
 
+# Least weight of a body [N]
+MIN_WEIGHT = 100.0
+
 
 def parse_axles(axles: float | Sequence[float], spacings: Sequence[float]) -> Array:
     """Return the weight of each axle, and its place before the middle (n_axles, 2) [N, m]."""
@@ -89,10 +92,12 @@ class StandingBody:
         for key in ("axles", "spacings"):
             object.__setattr__(self, key, tuple(getattr(self, key)))  # lists of a case
         check_between(self.total, f"'{self.name}': weight [N]", 0.0, 1e9, remedy="give newtons")
-        if is_light(loads := self.axles or (self.total,)):
+        # a small statue weighs less than any axle
+        if is_light(self.axles) if self.axles else self.total < MIN_WEIGHT:
+            loads = join_words([f"{load:g} N" for load in self.axles or (self.total,)])
             raise InvalidInput(
-                f"'{self.name}' presses with {join_words([f'{load:g} N' for load in loads])}: that "
-                "can only be a wrong unit; so small a body is a weight of `loads`"
+                f"'{self.name}' presses with {loads}: that can only be a wrong unit; so small a "
+                "body is a weight of `loads`"
             )
         for key in ("length", "centre_of_gravity", "width"):
             if (value := getattr(self, key)) is not None:
