@@ -234,6 +234,7 @@ def test_the_pace_of_a_run_is_that_of_a_hundredth_of_it(stack, monkeypatch, capl
     model = af.build(stack, fidelity="rigid")
     af.time_history(model, af.Motion(np.zeros(4001), 0.5), dt=0.02)
     (words,) = (r for r in caplog.records if "the run takes about" in r.getMessage())
-    _, done, duration, _ = words.args
+    _, done, duration, _, advice = words.args
+    assert advice == ""  # a dt is given
     assert duration == 2000.0
     assert 20.0 < done < 40.0
