@@ -98,7 +98,7 @@ def test_a_wall_in_bond_loses_a_wedge_at_its_toe(friction):
     found = af.collapse_factor(bonded_wall(courses=12), live=PUSH, friction=friction)
     assert found.factor == pytest.approx(0.5, rel=0.06)  # length / (4 course) of a high wall
     # its stones turn about the toe, and slide on each other
-    assert len(found.sliding) > 40
+    assert len(found.sliding) > 30
     assert re.fullmatch(r"toe wedge of 4\d stones, turning and sliding", found.mechanism_name)
 
 

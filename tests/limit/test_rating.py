@@ -818,7 +818,7 @@ def test_factors_of_codes_are_stated_with_outcome_and_range(monkeypatch):
     assert [*by_cs454.by_codes] == [code]  # for Eurocodes another axle may be the worst
     rows, sentences = state_ratings([(given, [])])[1::-1]
     outcome, *others = given.clauses
-    first = f"rating for lorry: factor {given.factor:.4g}, {outcome}"
+    first = f"rating for lorry: factor {given.factor:.4g} without crushing, {outcome}"
     expected = [first, *others, f"worst {given.place}", factors, *lines]
     assert sentences[: len(expected)] == expected
     # the worst first, each with its range over fill and stones
