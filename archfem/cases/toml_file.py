@@ -213,7 +213,8 @@ def _format_value(value: Any, rows: bool = False) -> str:
         if rows and any(isinstance(each, Mapping) for each in value):
             return "".join(["[\n", *(f"    {item},\n" for item in items), "]"])
         return f"[{', '.join(items)}]"
-    return repr(value) if isinstance(value, int | float) else str(value)
+    # NumPy from 2 on prints the type of its numbers
+    return float.__repr__(value) if isinstance(value, float) else str(value)
 
 
 def refuse_unknown(table: Table, keys: Iterable[str], section: str = "") -> None:

@@ -2,12 +2,15 @@
 
 import os
 import time
+import tomllib
 
+import numpy as np
 import pytest
 
 import archfem as af
 from archfem._validation import check_choice
 from archfem.cases.toml_file import (
+    format_tables,
     merge_tables,
     parse_change,
     refuse_unknown,
@@ -229,3 +232,14 @@ def test_a_density_is_no_key_where_weights_are():
         refuse_unknown({"density": 2300}, ["unit_weight", "young"], "materials.stone")
     with pytest.raises(af.InvalidInput, match="the keys are"):
         refuse_unknown({"density": 2300}, ["young"], "materials.stone")
+
+
+def test_numbers_are_written_without_their_type():
+    """As NumPy prints its own from version 2 on."""
+
+    class Number(float):
+        def __repr__(self):
+            return f"np.float64({float(self)})"
+
+    text = format_tables({"a": Number(0.1), "b": [np.int64(3), np.float64(1e-30)]})
+    assert tomllib.loads(text) == {"a": 0.1, "b": [3, 1e-30]}
