@@ -4,6 +4,7 @@ import json
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from functools import cache
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -323,8 +324,9 @@ def describe_margin(found: Iterable[KinematicAssessment]) -> str:
     """Describe the least ratio of all checks, and its range over what is assumed of a fill."""
     listed, checks = [], []
     for number, result in enumerate(found):
-        listed += [(*each, result.direction) for each in list_ratios(result)]
-        checks += [x._replace(directions=[str(number)]) for _, x in list_ratios(result)]
+        own = list_ratios(result)
+        listed += [(*each, result.direction) for each in own]
+        checks += [x._replace(directions=[str(number)]) for _, x in own]
     check, ratios, sense = min(listed, key=lambda each: each[1].decisive)
     alike = [(x, way) for x, _, way in listed if x.name == check.name]
     same = [x.over_fill for x, _ in alike if x.over_fill is not None]
@@ -373,6 +375,7 @@ def note_ties(case: Case) -> list[str]:
     loads = settings.options.get("loads", ())
     ties = [load for load in loads if load.passive]
 
+    @cache  # ends of the search are tried before it
     def exceed(scale: float, sense: float) -> float:
         """Return the linear ratio above 1 with a multiple of the forces of all ties [-]."""
         tied = [replace(x, force=(scale * x.force[0], scale * x.force[1])) for x in ties if scale]

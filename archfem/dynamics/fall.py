@@ -132,7 +132,7 @@ def follow_fall(
         frame = LooseBlocks(state.time, *model.rigid_motions(state.q, state.velocity))
         resting = is_resting(model, state, shaken=ending is not Ending.FINISHED)
         resting = resting or swings_little(history)
-        fall = replace(classify_collapse(structure, [frame], origin, True), resting=resting)
+        fall = replace(classify_collapse(structure, [frame], origin, joined=True), resting=resting)
     # frames begin where blocks became loose, and a rocking block may have come back before
     fall = replace(fall, displacement=max(fall.displacement, history.dataset.attrs["displacement"]))
     # throughout the last fifth, in which a record changes its sign

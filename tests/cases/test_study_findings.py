@@ -337,16 +337,22 @@ def test_words_and_states_of_the_users_own_function_are_no_findings():
     assert text.endswith("'b' lowers the factor most, from 0.6 of 'a' to 0.5")
 
 
-def test_the_table_of_a_study_names_what_it_varies(tmp_path):
-    """Also what named cases change; a value that all cases share is not varied."""
-    (tmp_path / "column.toml").write_text(
+def push_columns(folder, cases):
+    """Table of a study of named cases of a column of 0.5 × 2 m that is pushed."""
+    (folder / "column.toml").write_text(
         '[structure]\nshape = "column"\nheights = [2.0]\nbreadth = 0.5\n[limit]\nhorizontal = 1.0\n'
     )
-    (tmp_path / "study.toml").write_text(
-        'case = "column.toml"\ncompute = "limit"\nset = ["structure.width=2"]\n[cases]\n"a" = {}\n'
-        '"b" = { set = ["structure.breadth=1", \'contacts."stone to stone".friction=0.4\'] }\n'
+    (folder / "study.toml").write_text(f'case = "column.toml"\ncompute = "limit"\n{cases}')
+    return af.Study.read(folder / "study.toml").run(workers=1)
+
+
+def test_the_table_of_a_study_names_what_it_varies(tmp_path):
+    """Also what named cases change; a value that all cases share is not varied."""
+    table = push_columns(
+        tmp_path,
+        'set = ["structure.width=2"]\n[cases]\n"a" = {}\n'
+        '"b" = { set = ["structure.breadth=1", \'contacts."stone to stone".friction=0.4\'] }\n',
     )
-    table = af.Study.read(tmp_path / "study.toml").run(workers=1)
     assert table.attrs["varied"] == "contacts.stone to stone.friction; structure.breadth"
     found = study_findings.collect_findings("", "", table)
     assert study_findings.list_studied(found) == {"lengths", "friction"}
@@ -354,15 +360,11 @@ def test_the_table_of_a_study_names_what_it_varies(tmp_path):
 
 def test_a_case_of_several_changes_is_compared_with_the_one_that_differs_least(tmp_path):
     """The push of a column is its breadth over its height."""
-    (tmp_path / "column.toml").write_text(
-        '[structure]\nshape = "column"\nheights = [2.0]\nbreadth = 0.5\n[limit]\nhorizontal = 1.0\n'
+    table = push_columns(
+        tmp_path,
+        '[cases]\n"a" = {}\n"b" = { set = ["structure.breadth=0.4"] }\n'
+        '"c" = { set = ["structure.breadth=0.4", "structure.heights=[2.5]"] }\n',
     )
-    (tmp_path / "study.toml").write_text(
-        'case = "column.toml"\ncompute = "limit"\n[cases]\n"a" = {}\n'
-        '"b" = { set = ["structure.breadth=0.4"] }\n'
-        '"c" = { set = ["structure.breadth=0.4", "structure.heights=[2.5]"] }\n'
-    )
-    table = af.Study.read(tmp_path / "study.toml").run(workers=1)
     found = study_findings.collect_findings("", "", table)
     assert [*study_findings.say_what_changes(found)] == [
         "in the study 'c' lowers the push most, from 0.25 g of 'a' to 0.16 g; 'b', which differs "

@@ -247,15 +247,13 @@ def _say_conditions(data: ReportData) -> Iterator[str]:
         under = f", under '{motion}'" * (len(data.runs) > 1 and bool(motion))
         yield f"with other plausible properties it {found.count}{under}"
         yield from _say_wider([found], data)
-    # the section of a study names its cases
-    every = [text for each in data.own_studies for text in say_what_changes(each)]
-    # the verdict has these
-    below = [study for least, _, study in margins.say_less(data) if least < 1.0]
-    studied = [text.partition(": ")[0] for text in every]
-    studied = [text for text in studied if not any(f"in {x} " in text for x in below)]
+    every = [(each.name, text) for each in data.own_studies for text in say_what_changes(each)]
     if ranges or not every:
         yield _say_what_decides(ranges[::-1])
-    yield from studied
+    # the verdict has these
+    below = {study for least, _, study in margins.say_less(data) if least < 1.0}
+    # the section of a study names its cases
+    yield from (text.partition(": ")[0] for study, text in every if study not in below)
 
 
 def _say_wider(ranges: Sequence[VerdictRange], data: ReportData) -> list[str]:

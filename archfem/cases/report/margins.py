@@ -14,11 +14,7 @@ from archfem.cases.report.study_findings import OVER_SITE, find_least
 from archfem.cases.result_text import PushFactors, peak_of_spectrum, site_acceleration
 from archfem.dynamics.collapse_state import COLLAPSE_STATES, FALLEN_STATES
 from archfem.dynamics.rigid_body.rocking_body import describe_first_fall, say_scale
-from archfem.masonry.out_of_plane import (
-    UNCHECKED_ACROSS,
-    describe_transverse_push,
-    find_transverse_push,
-)
+from archfem.masonry.out_of_plane import UNCHECKED_ACROSS, describe_transverse_push
 from archfem.units import Ends, format_ratio
 from archfem.view.pages.document import TextBlock
 
@@ -37,9 +33,15 @@ def find_unchecked_push(data: ReportData) -> tuple[float, float] | None:
 
     The push is NaN where it is unknown, as of a single stack [g].
     """
-    if data.across[0] or not build_transverse(data):
+    if data.across[0] or not _leaves_plane_across(data):
         return None
-    return find_transverse_push(data.case.structure)[0], find_largest_demand(data)
+    return data.transverse_push, find_largest_demand(data)
+
+
+def _leaves_plane_across(data: ReportData) -> bool:
+    """Return whether results of earthquakes are in the plane alone, and not of a wall across it."""
+    shaken = data.runs or data.statements.keys() - {"rating"}
+    return bool(shaken) and data.case.structure.above is None
 
 
 def say_less(data: ReportData) -> Iterator[tuple[float, str, str]]:
@@ -98,11 +100,10 @@ def _say_test(data: ReportData) -> str:
 
 def build_transverse(data: ReportData) -> list[TextBlock]:
     """Build the paragraph on what is not checked across the plane, for results of earthquakes."""
-    if not data.runs and not data.statements.keys() - {"rating"}:
+    if not _leaves_plane_across(data):
         return []
-    if not (text := describe_transverse_push(data.case.structure)):
-        return []
-    push, demand = find_transverse_push(data.case.structure)[0], find_largest_demand(data)
+    text = describe_transverse_push(data.case.structure)
+    push, demand = data.transverse_push, find_largest_demand(data)
     if push < demand:
         text += (
             f"; the largest demand, {demand:.3g} g, exceeds it ({format_ratio(demand / push)} ×)"

@@ -29,6 +29,7 @@ from archfem.dynamics.rigid_body.rocking_body import FirstFall
 from archfem.dynamics.verdict_range import VerdictRange
 from archfem.dynamics.walls_across import find_falls_across
 from archfem.errors import ArchfemError
+from archfem.masonry.out_of_plane import find_transverse_push
 from archfem.models.builder import build
 from archfem.models.discretisation import Discretisation
 from archfem.models.model import Model
@@ -91,6 +92,11 @@ class ReportData:
             return find_falls_across(structure, self.motions) if structure.heads.any() else {}, ""
         except ArchfemError as error:  # one paragraph fails, and no report
             return {}, f"; not checked against the motions across: {error}"
+
+    @cached_property
+    def transverse_push(self) -> float:
+        """Push across the plane that begins to overturn a body; NaN for a single stack [g]."""
+        return find_transverse_push(self.case.structure)[0]
 
     @cached_property
     def fidelity(self) -> str:

@@ -88,7 +88,7 @@ class SnesSolver:
         Args:
             state: before the step.
             dt: its length [s].
-            searches: number of line searches that are tried, of which the first is none.
+            searches: number of line searches that are tried; the first takes whole corrections.
 
         Raises:
             DidNotConverge: SNES finds no equilibrium.
@@ -101,7 +101,7 @@ class SnesSolver:
         Args:
             state: before the step.
             dt: its length [s].
-            searches: number of line searches that are tried, of which the first is none.
+            searches: number of line searches that are tried; the first takes whole corrections.
 
         Returns:
             The step, with the resultants at its end.
@@ -149,7 +149,7 @@ class SnesSolver:
         Args:
             state: before the step.
             dt: its length [s].
-            searches: number of line searches that are tried, of which the first is none.
+            searches: number of line searches that are tried; the first takes whole corrections.
 
         Returns:
             The step, with the resultants on its mean.
