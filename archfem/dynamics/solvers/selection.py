@@ -12,6 +12,9 @@ from archfem.dynamics.solvers.snes import SnesSolver
 from archfem.errors import InvalidInput, logger
 from archfem.statics.newton import Newton
 
+# by the name of their `method`
+SOLVERS: dict[str, type[StepSolver]] = {"newton": NewtonSolver, "compliance": ComplianceSolver}
+
 
 @single_threaded
 def stepper_for(
@@ -20,7 +23,7 @@ def stepper_for(
     """Return the stepper of a run."""
     if isinstance(method, Stepper):
         return method
-    methods = ("auto", "newton", "compliance", "snes")
+    methods = ("auto", *SOLVERS, "snes")
     if not isinstance(method, str) or method not in methods:
         raise InvalidInput(f"method {short_repr(method)} does not exist: use one of {methods}")
     stored, key = equation.model.derived, (method, equation.damping, equation.scheme)
@@ -36,8 +39,7 @@ def _make_solver(method: str, equation: Equation) -> StepSolver | None:
         return None
     if method == "auto":
         return select_solver(equation)
-    solvers: dict[str, type[StepSolver]] = {"newton": NewtonSolver, "compliance": ComplianceSolver}
-    if (solver := solvers[method].of(equation)) is None:
+    if (solver := SOLVERS[method].of(equation)) is None:
         raise InvalidInput(
             f"method '{method}' does not apply to this model of fidelity "
             f"'{equation.model.fidelity}': compliance needs small displacements, and joints that "
