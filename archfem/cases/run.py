@@ -515,7 +515,7 @@ def _compare_start(
     end = min(float(history.time[-1]), float(run.time[-1]))
     sizes = []
     # as in the control of the steps: |e| of a joint that carries next to nothing decides nothing
-    least = least_compression(assessed_joints(history.joints)["N"].values[0])
+    least = least_compression(assessed_joints(history.joints)["N"].values[0], dead.model.structure)
     for each in (history, run):
         joints = assessed_joints(each.joints.sel(time=slice(None, end)))
         pressed = np.maximum(joints["N"].values, least) * joints["depth"].values

@@ -22,9 +22,11 @@ from archfem.masonry.structure import Structure
 from archfem.motion.motion import Motion
 
 
-def least_compression(rest: Array) -> Array:
+def least_compression(rest: Array, structure: Structure) -> Array:
     """Return the least compression to which moments and shears refer: half that at rest [N]."""
-    least: Array = 0.5 * np.maximum(rest, 0.5 * np.mean(np.abs(rest)))
+    # where all joints start open: a tenth of the mean weight of a block
+    floor = 0.1 * structure.weight / len(structure.free)
+    least: Array = 0.5 * np.maximum(rest, max(0.5 * np.mean(np.abs(rest)), floor))
     return least
 
 
@@ -46,7 +48,7 @@ class SlipError:
         slides = np.isfinite(structure.friction)
         self.joints = np.flatnonzero(judged & slides)  # numbers of the joints that can slide (j,)
         self.total = np.zeros(len(self.joints))  # sum over the steps added (j,) [m]
-        least = least_compression(first.resultants[0, judged, 0])[slides[judged]]
+        least = least_compression(first.resultants[0, judged, 0], structure)[slides[judged]]
         # cohesion of bonds is lost as they break
         cohesion = np.where(structure.tension > 0.0, 0.0, structure.cohesion)
         self._law = structure.friction[self.joints], cohesion[self.joints], least

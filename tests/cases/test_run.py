@@ -202,8 +202,10 @@ def test_a_run_is_compared_with_a_finer_one_over_its_first_half_second(stack, mo
             return {"faces": finer, "soft": softened}[analysis]
 
         monkeypatch.setattr(run_module, "time_history", run)
+        light = SimpleNamespace(weight=1.0, free=(1,))
         rigid, faces = (
-            SimpleNamespace(model=SimpleNamespace(fidelity=name)) for name in ("rigid", "faces")
+            SimpleNamespace(model=SimpleNamespace(fidelity=name, structure=light))
+            for name in ("rigid", "faces")
         )
         soft = softened and ("soft", rigid)
         rest = SimpleNamespace(

@@ -24,7 +24,7 @@ class Known:
     solver = "some"
 
     def __init__(self, e, sample=0.01, longest=1.0):
-        structure = SimpleNamespace(judged=JUDGED, depths=DEPTHS)
+        structure = SimpleNamespace(judged=JUDGED, depths=DEPTHS, weight=1e3, free=(1, 2))
         model, motion = SimpleNamespace(structure=structure), SimpleNamespace(dt=sample)
         self.equation = SimpleNamespace(model=model, motion=motion)
         self.e, self.longest, self.exact = e, longest, SimpleNamespace(batches=self.one_by_one)

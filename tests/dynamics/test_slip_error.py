@@ -147,3 +147,15 @@ def test_a_stack_below_its_limit_has_the_steps_of_its_eccentricity():
         runs.append(af.time_history(model, motion, damping="effective"))
         assert runs[-1].dataset.attrs["slip_error"] == 0.0
     assert len(runs[0].time) == len(runs[1].time)
+
+
+def test_a_block_falls_freely_before_it_rests_on_a_joint(verified):
+    """Its only joint is open at the start: no joint has a compression to which shears refer."""
+    model, _ = block(0.4)
+    height, time = 0.05, 0.08
+    lifted = af.dynamics.State(0.0, np.array([0.0, height, 0.0]), np.zeros(3), np.zeros(3))
+    run = af.time_history(model, af.Motion(np.zeros(81), time / 80), dt=time / 80, start=lifted)
+    fallen = height - af.dynamics.last_state(run).q[1]
+    expected = 0.5 * af.units.G * time**2
+    assert fallen == pytest.approx(expected, rel=1e-9)
+    verified("block falls freely, height [m]", expected, "g t² / 2", fallen)

@@ -41,7 +41,7 @@ class AdaptiveStepper:
         structure = self.stepper.equation.model.structure
         judged = structure.judged if structure.judged.any() else np.ones_like(structure.judged)
         self._judged, self._depths = np.flatnonzero(judged), structure.depths[judged]
-        self._least = least_compression(self.first.resultants[0, self._judged, 0])
+        self._least = least_compression(self.first.resultants[0, self._judged, 0], structure)
         self._slip_limits = SLIP_TOLERANCE * structure.depths[self.slip_error.joints]
 
     @property
