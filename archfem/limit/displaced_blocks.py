@@ -64,6 +64,17 @@ class FillPressure(NamedTuple):
     shared: csr_matrix  # whether a piece has the passive pressure of an unknown (n, n)
 
 
+class Tie(NamedTuple):
+    """A tie at its present place."""
+
+    name: str  # of the blocks at its ends
+    block: int
+    anchor: int | None  # block at the other end, None for the ground
+    place: Array  # (2,) [m]
+    force: Array  # largest, towards the other end (2,) [N]
+    length: float  # between two blocks, 0 to the ground [m]
+
+
 @dataclass(frozen=True, eq=False)
 class PlacedBlocks:
     """Rigid blocks after displacements of any size, with the loads that they carry."""
@@ -141,9 +152,21 @@ class PlacedBlocks:
         return self._resultants(forces)
 
     @cached_property
-    def ties(self) -> list[tuple[int, Array, tuple[float, float]]]:
-        """Block, present place and largest force of each tie [m, N]."""
-        return [(k, place, x.force) for k, place, x in self.attached if x.passive and any(x.force)]
+    def ties(self) -> list[Tie]:
+        """Ties; those between two blocks pull along their present chord."""
+        found = []
+        for block, place, load in self.attached:
+            if not (load.passive and any(load.force)):
+                continue
+            force, anchor, length = np.array(load.force), None, 0.0
+            if load.anchor is not None:
+                anchor = self.structure.block_number(load.anchor)
+                chord = self.places(np.array(load.anchor_point), anchor) - place
+                length = float(np.hypot(*chord))
+                force = np.hypot(*force) * chord / length
+            ends = [self.structure.blocks[k].name for k in (block, anchor) if k is not None]
+            found.append(Tie(" and ".join(ends), block, anchor, place, force, length))
+        return found
 
     @cached_property
     def live(self) -> Array:
@@ -322,9 +345,19 @@ class Bodies:
     def tie_forces(self) -> csr_matrix:
         """Generalised largest forces of the ties (n_ties, 3 n_bodies)."""
         ties = self.blocks.ties
-        pairs = np.array([(-1, self.body[k]) for k, *_ in ties], dtype=np.intp).reshape(-1, 2)
-        forces, places = (np.array([tie[i] for tie in ties]).reshape(-1, 2) for i in (2, 1))
-        return jump_rates(forces, places, pairs, self.references)
+        # a force along the bar has the same moment about both its ends
+        forces = np.array([tie.force for tie in ties]).reshape(-1, 2)
+        places = np.array([tie.place for tie in ties]).reshape(-1, 2)
+        return jump_rates(forces, places, self.tied_bodies, self.references)
+
+    @cached_property
+    def tied_bodies(self) -> Numbers:
+        """Bodies at the far and the near end of each tie, -1 at rest (n_ties, 2)."""
+        ends = [
+            (-1 if tie.anchor is None else self.body[tie.anchor], self.body[tie.block])
+            for tie in self.blocks.ties
+        ]
+        return np.array(ends, dtype=np.intp).reshape(-1, 2)
 
     @cached_property
     def bounded_forces(self) -> tuple[csr_matrix, csr_matrix]:

@@ -161,12 +161,11 @@ class LinkageState:
         return velocity / speed
 
     def is_tied(self, velocity: Array) -> bool:
-        """Return whether a tie holds a point of a body that moves, neither stretched nor slack."""
-        rates = self.bodies.tie_forces @ velocity
-        return any(
-            self.bodies.body[block] >= 0 and abs(rate) <= STILL * np.hypot(*force)
-            for rate, (block, _, force) in zip(rates, self.blocks.ties, strict=True)
-        )
+        """Return whether a tie joins bodies that move apart, and is neither stretched nor slack."""
+        far, near = self.bodies.tied_bodies.T
+        sizes = np.array([np.hypot(*tie.force) for tie in self.blocks.ties])
+        held = np.abs(self.bodies.tie_forces @ velocity) <= STILL * sizes
+        return bool((held & (far != near)).any())
 
     def corrected(self, iterations: int = 12) -> "LinkageState | None":
         """Return the nearest state that fulfils the constraints, by Newton's method."""

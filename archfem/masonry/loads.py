@@ -191,9 +191,13 @@ class AttachedLoad:
         force: constant force without mass, up positive (2,) [N].
         passive: whether it is that of a tie: any part of `force` acts that equilibrium needs, and
             along a motion all of it where the tie is stretched, and else none.
+        anchor: number or name of the block at the other end of a tie, which it pulls back; without
+            one the ground holds the tie.
+        anchor_point: where this end is, at rest (x, y) [m]; `force` points to it.
 
     Raises:
-        InvalidInput: a value is no number, above 1e9 N, or the weight is negative.
+        InvalidInput: a value is no number, above 1e9 N, or the weight is negative; an anchor has no
+            point, or is not that of a tie along its force.
     """
 
     block: int | str
@@ -201,6 +205,8 @@ class AttachedLoad:
     weight: Newtons = 0.0
     force: tuple[Newtons, Newtons] = (0.0, 0.0)
     passive: bool = False
+    anchor: int | str | None = None
+    anchor_point: tuple[Metres, Metres] | None = None
 
     def __post_init__(self) -> None:
         """Check that the values are metres and newtons."""
@@ -214,6 +220,26 @@ class AttachedLoad:
             raise InvalidInput(
                 f"an attached load of {self.weight} N and {self.force} N is above 1e+09 N: give "
                 "newtons"
+            )
+        if self.anchor is not None or self.anchor_point is not None:
+            self._check_anchor()
+
+    def _check_anchor(self) -> None:
+        """Check that a tie between two blocks pulls along itself."""
+        if self.anchor is None or self.anchor_point is None or not self.passive:
+            raise InvalidInput(
+                f"a tie at {self.block} has anchor = {self.anchor!r}, anchor_point = "
+                f"{self.anchor_point} and passive = {self.passive}: a bar between two blocks needs "
+                "both, and passive = true"
+            )
+        point = check_numbers(self.anchor_point, "attached load, anchor_point (x, y) [m]", 2)
+        object.__setattr__(self, "anchor_point", point)
+        along = point[0] - self.point[0], point[1] - self.point[1]
+        pull = along[0] * self.force[0] + along[1] * self.force[1]
+        if not any(along) or pull < 0.999 * hypot(*along) * hypot(*self.force):  # 2.6°
+            raise InvalidInput(
+                f"the tie from {self.block} to {self.anchor} pulls by {self.force} N, and its "
+                f"other end lies at {along} m: give a force that points there"
             )
 
 

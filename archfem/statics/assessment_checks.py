@@ -268,7 +268,10 @@ def check_assessable(
                 f"a load is attached to '{block.name}', which is fill and no stone: stand it on "
                 "the fill, [structure.standing] of a case, or name the stone below"
             )
-        _check_place(load, block, structure)
+        _check_place(load, load.point, block, structure)
+        if load.anchor is not None and load.anchor_point is not None:
+            anchor = structure.blocks[structure.block_number(load.anchor)]
+            _check_place(load, load.anchor_point, anchor, structure)
     if (structure.tension > 0.0).any():
         raise InvalidInput(
             "joints have tensile strength, which breaks before a mechanism forms: give contacts "
@@ -283,7 +286,9 @@ def check_assessable(
         )
 
 
-def _check_place(load: AttachedLoad, block: Block, structure: Structure) -> None:
+def _check_place(
+    load: AttachedLoad, point: tuple[float, float], block: Block, structure: Structure
+) -> None:
     """Refuse a load that acts away from its block, as at a mistyped height.
 
     Masses may have their centre off the block that carries them, but a structure carries none that
@@ -293,10 +298,10 @@ def _check_place(load: AttachedLoad, block: Block, structure: Structure) -> None
     if not any(load.force):
         stones = [structure.blocks[number] for number in structure.free]
         kind, near, of = "mass", measure_blocks(*stones), "all stones together"
-    if (away := block.distance_to(load.point)) > near:
+    if (away := block.distance_to(point)) > near:
         (left, low), (right, high) = block.points.min(axis=0), block.points.max(axis=0)
         raise InvalidInput(
-            f"an attached {kind} acts at {load.point} m, {away:.3g} m from '{block.name}' (x from "
+            f"an attached {kind} acts at {point} m, {away:.3g} m from '{block.name}' (x from "
             f"{left:.4g} to {right:.4g} m, y from {low:.4g} to {high:.4g} m), above the "
             f"{near:.3g} m of {of}: correct its point, or name the block there"
         )

@@ -5,6 +5,7 @@ A fill becomes weights that are attached to the stones below, and pressures on t
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 
@@ -125,10 +126,10 @@ def describe_ties(
     if not placed.ties:
         return ""
     shares, needs = find_tie_shares(placed, joints, coefficient, factor), []
-    for share, (block, _, force) in zip(shares, placed.ties, strict=True):
-        size, name = np.hypot(*force) / kN, placed.structure.blocks[block].name
+    for share, tie in zip(shares, placed.ties, strict=True):
+        size = np.hypot(*tie.force) / kN
         need = f"{share * size:.4g}" if share > 1e-4 else "none"
-        needs.append(f"{need} of the {size:.4g} kN of the tie at {name}")
+        needs.append(f"{need} of the {size:.4g} kN of the tie at {tie.name}")
     return f"pushed to the {name_side(placed.direction)}, alpha_0 needs {join_names(needs)}"
 
 
@@ -139,11 +140,14 @@ def find_stretches(
     if path is None or len(moved) == 1:
         return []
     found, ties = [], [placed.moved(each).ties for each in path.displacements]
-    for k, (block, start, force) in enumerate(placed.ties):
-        away = (start - np.array([each[k][1] for each in ties])) @ force / np.hypot(*force)
+    for k, tie in enumerate(placed.ties):
+        away = np.array([each[k].length - tie.length for each in ties])
+        if tie.anchor is None:
+            places = np.array([each[k].place for each in ties])
+            away = (tie.place - places) @ tie.force / np.hypot(*tie.force)
         size = float(np.interp(share * moved[-1], np.maximum.accumulate(moved), away))
         # a hundredth of a millimetre is round-off
-        found.append((placed.structure.blocks[block].name, max(round(size, 5), 0.0)))
+        found.append((tie.name, max(round(size, 5), 0.0)))
     return found
 
 
@@ -159,6 +163,24 @@ def doubt_stretches(stretches: Sequence[tuple[str, float]]) -> list[Doubt]:
         for name, size in stretches
         if size > MAX_STRETCH
     ]
+
+
+def doubt_opposed_ties(placed: PlacedBlocks) -> list[Doubt]:
+    """Return doubts about ties to the ground that pull two blocks towards each other."""
+    words = (
+        "the ties at {} and {} pull towards each other, and each counts as held by the ground: a "
+        "bar between both blocks holds neither to the ground"
+    )
+    found = []
+    for one, other in combinations(placed.ties, 2):
+        chord = other.place - one.place
+        pulls = np.array([one.force @ chord, -(other.force @ chord)]) / np.hypot(*chord)
+        sizes = [np.hypot(*tie.force) for tie in (one, other)]
+        held = one.anchor is other.anchor is None and one.block != other.block
+        if held and (pulls > 0.99 * np.array(sizes)).all():  # within 8° of the chord
+            remedy = "give one tie with `anchor` and `anchor_point`"
+            found.append(Doubt(words, remedy, (one.name, other.name)))
+    return found
 
 
 def describe_loads(

@@ -21,6 +21,7 @@ from archfem.cases.answers import (
 )
 from archfem.cases.report.conclusion import list_facts
 from archfem.cases.report.report_data import ReportData
+from archfem.cases.toml_file import read_object
 from archfem.statics import LIMIT_STATES, AssessmentCheck, LimitState, mechanism_assessment
 from archfem.statics.assessment_checks import (
     BY_MECHANISM,
@@ -201,6 +202,68 @@ def test_a_tie_bears_what_equilibrium_needs(force, factor, pull):
     )
     assert ", pushed to the left: " in describe_margin([found, free])
     assert ", pushed to" not in describe_margin([free, replace(free, direction=1.0)])
+
+
+def two_tied_blocks(force):
+    """Blocks of 1 × 3 and 0.5 × 3 m, 20 kN/m³, side by side, and a bar between their tops."""
+    contact = af.Contact(1e9, 4e8, friction=None)
+    blocks, joints = [], []
+    for name, x, breadth in (("left", 0.0, 1.0), ("right", 4.0, 0.5)):
+        for kind, low, high in (("base", -0.5, 0.0), ("", 0.0, 3.0)):
+            corners = ((x, low), (x + breadth, low), (x + breadth, high), (x, high))
+            of = f"{name} {kind}".strip()
+            blocks.append(af.Block(corners, af.STONE, of, fixed=bool(kind), role="pier"))
+        pair = (len(blocks) - 2, len(blocks) - 1)
+        joints.append(af.Joint(pair, (x, 0.0), (x + breadth, 0.0), contact, of, role="pier"))
+    bar = {"block": "left", "point": ["1 m", "3 m"], "force": [f"{force} N", 0], "passive": True}
+    bar |= {"anchor": "right", "anchor_point": ["4 m", "3 m"]}
+    load = read_object(af.masonry.AttachedLoad, bar, "assessment.loads")
+    return af.Structure(tuple(blocks), tuple(joints)), [load]
+
+
+def test_a_bar_between_two_blocks_pulls_both(verified):
+    """Both rock by one angle: α (W₁ + W₂) h / 2 = W₁ b₁ / 2 + W₂ b₂ / 2; T from the right one."""
+    light, height = 30e3, 3.0  # the right block, 0.5 m broad
+    both = (1.0 + 0.25) / (1.5 * height)
+    pull = light * (both * height / 2.0 - 0.25) / height
+    for force, factor in ((2.0 * pull, both), (0.5 * pull, 0.5 / height + pull / light)):
+        structure, loads = two_tied_blocks(force)
+        found = af.kinematic_assessment(structure, SPECTRUM, loads=loads)
+        assert found.alpha_0 == pytest.approx(factor, rel=1e-4)
+        verified(f"two blocks and a bar of {force:.0f} N, α", factor, "moments", found.alpha_0)
+        share = f"needs {min(force, pull) / 1e3:.4g} of the {force / 1e3:.4g} kN of the tie at left"
+        assert f"{share} and right" in found.notes[0]
+    # the weak bar yields: the right block turns alone about (4.5, 0), as d* of its centroid says
+    capacity = found.displacement.capacity
+    turn = brentq(lambda angle: 0.25 * (1 - cos(angle)) + 1.5 * sin(angle) - capacity, 0.0, 0.5)
+    corner = 4.5 - 0.5 * cos(turn) + 3.0 * sin(turn), 0.5 * sin(turn) + 3.0 * cos(turn)
+    stretch = np.hypot(corner[0] - 1.0, corner[1] - 3.0) - 3.0
+    assert f"at the capacity by {1e3 * stretch:.3g} mm at left and right" in found.notes[0]
+    slack = af.kinematic_assessment(structure, SPECTRUM, loads=loads, direction=-1.0)
+    assert slack.alpha_0 == pytest.approx(0.5 / height, rel=1e-4)
+
+
+def test_two_ties_to_the_ground_are_no_bar():
+    structure, (bar,) = two_tied_blocks(4e3)
+    free = {"anchor": None, "anchor_point": None}
+    ends = [
+        replace(bar, **free),
+        replace(bar, block="right", point=(4.0, 3.0), force=(-4e3, 0.0), **free),
+    ]
+    found = af.kinematic_assessment(structure, SPECTRUM, loads=ends)
+    (doubt,) = (x for x in found.doubts if "towards each other" in x.cause)
+    assert doubt.cause.startswith("the ties at left and right pull")
+    for wrong, says in (
+        ({"anchor_point": None}, "a bar between two blocks needs both"),
+        ({"passive": False}, "and passive = true"),
+        ({"force": (0.0, 4e3)}, r"pulls by \(0\.0, 4000\.0\) N, and its other end lies at \(3\.0"),
+        ({"anchor_point": bar.point}, "give a force that points there"),
+    ):
+        with pytest.raises(af.InvalidInput, match=says):
+            replace(bar, **wrong)
+    away = replace(bar, anchor_point=(3.0, 3.0))
+    with pytest.raises(af.InvalidInput, match="1 m from 'right'"):
+        af.kinematic_assessment(structure, SPECTRUM, loads=[away])
 
 
 def test_a_check_that_alone_fails_is_in_every_headline_with_the_force_of_a_tie():
