@@ -341,7 +341,7 @@ class Programme:
         for _ in range(max_rounds):
             try:
                 optimum = reduced.solve(programme, limits)
-            except NoEquilibrium:
+            except DidNotConverge:
                 if found is None:
                     raise
                 found, programme, before = None, self, np.inf  # the optimum was not yet known

@@ -559,7 +559,7 @@ class _RoadMechanisms:
         scale, motions = self._dead.blocks.dimensionless, self._motions.T
         sinks = scale(self.road) @ motions
         power = scale(loads) @ motions + np.maximum(sinks, 0.0).sum(axis=0)
-        bounds = self._resistances / np.maximum(power, 1e-300)
+        bounds = self._resistances / np.maximum(power, 1e-100)
         if not bounds.shape[1]:
             return np.full(len(loads), np.inf), np.zeros((len(loads), len(self.road)), dtype=bool)
         best = bounds.argmin(axis=1)
@@ -625,7 +625,7 @@ def find_worst_rows(
         factors[k], sets[k] = known.lay(loads[k], known.solve(loads[k]), sets[k])
         solved[k] = True
         if np.isfinite(guide[k]):  # what falls at no factor there says nothing of the share
-            share = min(share, factors[k] / max(guide[k], 1e-300))
+            share = min(share, factors[k] / max(guide[k], 1e-100))
     # and back with the mechanisms of all places
     while (above := known.bound(loads)[0]).min() < (1.0 - 1e-5) * factors.min():
         k = int(above.argmin())

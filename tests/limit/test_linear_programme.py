@@ -181,3 +181,21 @@ def test_stones_of_a_wall_crush_though_its_forces_are_not_unique(verified):
     assert np.all(normal >= -1e-6)
     case = "granite wall whose stones of 20 MPa crush: force [kN]"
     verified(case, 37.5046599152, "cutting planes", found.factor)
+
+
+def test_an_optimum_that_stands_still_between_rounds_of_cuts_is_not_taken_for_converged():
+    """Pieces of 30° on a lattice of 30°: held there, HiGHS ends in an error, not "infeasible".
+
+    By 401 tangents to each joint's crushing limit at once, unreduced, 17.06594.
+    """
+    bridge = af.bridge(
+        arches=[af.shapes.Arch(span=3.0, rise=1.0, thickness=0.4, voussoirs=5)],
+        backfill=af.shapes.Backfill(cover=0.3),
+        sidewalls=[af.shapes.Sidewall(length=1.5, height=1.0, state="fixed", name=n) for n in "ab"],
+        material=replace(af.STONE, unit_weight=22e3),
+        width=3.0,
+    )
+    fill = af.masonry.jointed_fill(bridge, 1.5, friction_angle=30.0, cohesion=20e3)
+    axles = [af.PointLoad(x, (0.0, f)) for x, f in ((2.4255979314, -135e3), (3.6255979314, -90e3))]
+    found = af.collapse_factor(fill, live=axles, strength=4e6)
+    assert found.factor == pytest.approx(17.06594, rel=3e-6)

@@ -242,6 +242,11 @@ def test_a_search_for_the_worst_place_solves_each_once(strength, rounds, monkeyp
     assert 20 < len(reached) < len(rows)
     own = [expected[rows[k]] for k in reached]
     assert factors[reached].tolist() == pytest.approx(own, rel=1e-5)  # of the cuts
+    row = next(iter(worst))
+    small = {row: 1e-9 * axles[row], rows[0]: 0.0 * axles[row]}
+    _, factors = find_worst_rows(dead, small, (), [], np.zeros(2))
+    assert factors[0] == pytest.approx(1e9 * expected[row], rel=1e-5)
+    assert factors[1] > 1e12 * factors[0]
 
 
 @pytest.mark.slow
