@@ -6,7 +6,7 @@ from typing import Any
 from archfem._validation import check_number
 from archfem.cases.toml_file import check_table
 from archfem.errors import InvalidInput
-from archfem.masonry.joint_closing import FINISHES
+from archfem.masonry.joint_closing import FINISHES, find_finish, finish_range
 from archfem.masonry.structure import Structure
 from archfem.motion.motion import Motion
 
@@ -40,6 +40,20 @@ NEUTRAL: dict[str, Any] = {
     "sign": "as given",
     "dt": "as given",
 }
+
+
+def default_ranges(*structures: Structure) -> dict[str, tuple[Any, ...]]:
+    """Return what is varied by default, the stiffness of a finish over its own range."""
+    own = list[list[tuple[float, ...]]]()
+    for structure in structures:
+        for joint in structure.joints:
+            factors = [DEFAULT_RANGES["k_n"], DEFAULT_RANGES["k_s"]]
+            if finish := find_finish(structure, joint):
+                law = finish_range(structure, joint, finish)
+                factors = [tuple(x / k[1] for x in k) for k in (law.initial, law.shear)]
+            own.append(factors)
+    joined = [(min(map(min, each)), max(map(max, each))) for each in zip(*own, strict=True)]
+    return {**DEFAULT_RANGES, "k_n": joined[0], "k_s": joined[1]}
 
 
 def parse_verdict(table: Any) -> dict[str, Any]:

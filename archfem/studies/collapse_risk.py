@@ -38,7 +38,7 @@ from archfem._validation import (
     validate_arguments,
     validate_methods,
 )
-from archfem.cases.verdict_keys import DEFAULT_RANGES, check_ranges
+from archfem.cases.verdict_keys import check_ranges, default_ranges
 from archfem.dynamics.analysis import Analysis
 from archfem.dynamics.collapse_state import FALLEN_STATES, CollapseState, doubt_soft_blocks
 from archfem.dynamics.recorder import Record
@@ -214,7 +214,7 @@ def collapse_risk(  # noqa: PLR0913  (one call, one argument for each thing that
     if len(records) < 2:
         raise InvalidInput(f"{len(records)} motion: give several records, seven or more at best")
     tree = _resolve_alternatives(analysis, alternatives)
-    ranges = _check_varied(vary or {})
+    ranges = _check_varied(vary or {}, [each.structure for _, each, _ in tree.values()])
     weights = {label: weight for label, (weight, *_) in tree.items()}
     blocks = _size_blocks(out, samples)
     parts = [draw_samples(ranges, weights, len(records), *block, seed) for block in blocks]
@@ -296,9 +296,10 @@ def _doubt_hazard(hazard: Hazard, target: DesignSpectrum) -> list[Doubt]:
     return [Doubt(cause, "give the hazard on the ground of the target: that of rock, times S")]
 
 
-def _check_varied(vary: Mapping[str, Any]) -> dict[str, Any]:
+def _check_varied(vary: Mapping[str, Any], structures: Sequence[Structure]) -> dict[str, Any]:
     """Return the ranges of properties, or refuse those that the structure does not have."""
-    ranges = check_ranges({name: DEFAULT_RANGES[name] for name in VARIED} | dict(vary))
+    defaults = default_ranges(*structures)
+    ranges = check_ranges({name: defaults[name] for name in VARIED} | dict(vary))
     for name, values in ranges.items():
         if name in ("scale", "sign") or isinstance(values, Mapping):
             raise InvalidInput(

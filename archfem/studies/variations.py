@@ -23,7 +23,7 @@ from archfem.cases.defaults import list_default_keys
 from archfem.cases.result_text import ResultTable
 from archfem.cases.structure_keys import PRESETS, find_table
 from archfem.cases.toml_file import Table, format_key
-from archfem.cases.verdict_keys import DEFAULT_RANGES, NEUTRAL, check_ranges
+from archfem.cases.verdict_keys import DEFAULT_RANGES, NEUTRAL, check_ranges, default_ranges
 from archfem.dynamics.analysis import Analysis, with_one_facet
 from archfem.dynamics.collapse_state import CollapseState, classify_collapse, doubt_soft_blocks
 from archfem.dynamics.damping import damping_kind, resolve_effective_damping, vary_damping
@@ -88,7 +88,8 @@ def verdict_range(  # noqa: PLR0913  (one call, one argument for each thing that
 
     - "joint_rule": "exact" integration over each joint, "three points" (springs at its ends and
       middle), and "rigid" blocks in contact, without elastic joints or damping;
-    - "k_n" and "k_s": factors from 1/3 to 3 on the stiffness of the joints, evenly in logarithm;
+    - "k_n" and "k_s": factors from 1/3 to 3 on the stiffness of the joints, or over the range of
+      their finish (`joint_stiffness`), evenly in logarithm;
     - "friction": -0.1 to 0.1, added to each coefficient that is given, at least to 0.05;
     - "damping_ratio": factors from 0.5 to 2; "damping_kind": "stiffness", or "mass and stiffness"
       (`Rayleigh`), which drags loose blocks;
@@ -126,7 +127,7 @@ def verdict_range(  # noqa: PLR0913  (one call, one argument for each thing that
     analysis = as_falling(structure, fidelity, damping, dt)
     rest = analysis.dead_load(motion)  # a structure that does not stand is refused before any run
     viscous, _ = resolve_effective_damping(analysis.damping, rest.model, rest)
-    defaults = DEFAULT_RANGES
+    defaults = default_ranges(analysis.structure)
     if viscous is None:
         defaults = {name: defaults[name] for name in defaults if not name.startswith("damping")}
     ranges = check_ranges({**defaults, **(vary or {})})

@@ -11,7 +11,7 @@ import archfem as af
 from archfem.cases.verdict_keys import DEFAULT_RANGES, NEUTRAL
 from archfem.dynamics import CollapseState, analysis
 from archfem.dynamics.damping import vary_damping
-from archfem.studies import evaluators, variations
+from archfem.studies import collapse_risk, evaluators, variations
 from archfem.studies.variations import Variation, evaluate_variation
 from archfem.units import format_mm
 
@@ -282,6 +282,24 @@ def test_the_run_as_given_comes_first_then_each_change_alone(column, motion, cal
     assert found.dataset.sizes["run"] == len(changed) + 3 == len(calls)
     contact = column.joints[0].contact
     assert found.dataset.attrs["k_n"] == pytest.approx(contact.normal_stiffness)
+
+
+def test_stiffness_varies_over_the_range_of_the_finish(column, motion, calls):
+    """From the softest to the stiffest joint that `joint_stiffness` states; by 3 without finish."""
+    hewn = af.masonry.with_finish(column, "hewn")
+    af.verdict_range(hewn, motion, samples=1)
+    stone = column.blocks[-1].material
+    law = af.joint_stiffness(stone.young, 0.4, "hewn", strength=stone.strength or 56e6)
+    used = [structure.joints[0].contact for structure, *_ in calls]
+    for name, stated in (("normal_stiffness", law.initial), ("shear_stiffness", law.shear)):
+        values = [getattr(contact, name) for contact in used]
+        assert [min(values), values[0], max(values)] == pytest.approx(stated)
+    low, usual, high = law.shear
+    ranges = collapse_risk._check_varied({}, [column, hewn])
+    assert usual / low > 3.0
+    assert high / usual > 3.0
+    assert ranges["k_s"] == pytest.approx((low / usual, high / usual))
+    assert collapse_risk._check_varied({}, [column])["k_s"] == (1.0 / 3.0, 3.0)
 
 
 @pytest.mark.slow

@@ -25,7 +25,6 @@ from archfem.cases.report.doubts import (
     list_doubts,
     list_elastic_fill,
     list_notes,
-    list_ranges,
     list_unvaried,
     spans_run,
 )
@@ -246,7 +245,6 @@ def _say_conditions(data: ReportData) -> Iterator[str]:
         motion = found.dataset.attrs.get("motion")
         under = f", under '{motion}'" * (len(data.runs) > 1 and bool(motion))
         yield f"with other plausible properties it {found.count}{under}"
-        yield from _say_wider([found], data)
     every = [(each.name, text) for each in data.own_studies for text in say_what_changes(each)]
     if ranges or not every:
         yield _say_what_decides(ranges[::-1])
@@ -254,12 +252,6 @@ def _say_conditions(data: ReportData) -> Iterator[str]:
     below = {study for least, _, study in margins.say_less(data) if least < 1.0}
     # the section of a study names its cases
     yield from (text.partition(": ")[0] for study, text in every if study not in below)
-
-
-def _say_wider(ranges: Sequence[VerdictRange], data: ReportData) -> list[str]:
-    """Say which properties have a wider range by the finish of their faces than was varied."""
-    rows = dict.fromkeys(row for found in ranges for row in list_ranges(data, found))
-    return [f"by its finish {name} is {wider}" for name, *_, wider in rows if wider]
 
 
 def _say_why_undecided(data: ReportData) -> str:
@@ -374,7 +366,6 @@ def _build_paragraphs(data: ReportData, doubtful: Sequence[str]) -> dict[str, li
     changes += ["the checks of the numbers raise no doubt"] * (bool(data.runs) and not doubtful)
     if doubtful:
         changes.append(f"the doubts below, on {join_names(doubtful)}, may change this")
-    changes += [] if data.runs else _say_wider(data.verdict_ranges, data)
     if single := list_unvaried(data):
         none = "; displacements have no range" * (bool(data.runs) and not data.verdict_ranges)
         verb = "were" if len(single) > 1 or single[0].partition(" (")[0].endswith("s") else "was"

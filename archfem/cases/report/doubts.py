@@ -14,7 +14,6 @@ from archfem.cases.result_text import OF_GIVEN_FILL
 from archfem.dynamics.collapse_state import COLLAPSE_STATES, FALLEN_STATES, RANGE_REMEDY
 from archfem.dynamics.history import History
 from archfem.dynamics.verdict_range import MAX_RATIO_OF_DISPLACEMENTS, VerdictRange, property_text
-from archfem.masonry.joint_closing import finish_range
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import join_words
 from archfem.models.model import Doubt, group_doubts, merge_doubts
@@ -184,30 +183,22 @@ def list_notes(data: ReportData) -> dict[str, list[str]]:
     return notes
 
 
-def list_ranges(data: ReportData, found: VerdictRange) -> list[tuple[str, str, str, str]]:
-    """Return each varied property, its range, the mark of this, and a stated one that is wider."""
-    rows, stated = list[tuple[str, str, str, str]](), dict[str, tuple[float, float, float]]()
-    structure, contacts = data.case.structure, data.case.settings.get("contacts", {})
-    for joint in structure.joints:
-        if finish := contacts.get(joint.contact.name, {}).get("finish"):
-            law = finish_range(structure, joint, finish)
-            stated = {"k_n": law.initial, "k_s": law.shear} | stated  # of the first, as inputs
+def list_ranges(data: ReportData, found: VerdictRange) -> list[tuple[str, str, str]]:
+    """Return each varied property, its range, and the mark of this."""
+    rows = list[tuple[str, str, str]]()
     for name in found.properties:
-        values, wider = found.dataset[name].values, ""
+        values = found.dataset[name].values
         mark = "given" if name in data.read_table("verdict").get("vary", ()) else "default"
         if values.dtype.kind != "f":
             words = ", ".join(dict.fromkeys(map(str, values)))
-            rows.append((property_text(name), words, mark, ""))
+            rows.append((property_text(name), words, mark))
             continue
         ends, unit = Ends.of(values), " × that of the case"
         if name in found.dataset.attrs:
             given = found.dataset.attrs[name] / 1e9
             ends, unit = Ends(given * end for end in ends), " MPa/mm"
-            low, *_, high = sorted(end / 1e9 for end in stated.get(name, (1e9 * x for x in ends)))
-            if low < 0.95 * ends[0] or high > 1.05 * ends[1]:  # as it prints two digits
-                wider = f"{low:.2g} to {high:.2g} MPa/mm, wider than was varied"
         unit = " added to that of the case" if name == "friction" else unit
-        rows.append((property_text(name), f"{ends:.3g}{unit}", mark, wider))
+        rows.append((property_text(name), f"{ends:.3g}{unit}", mark))
     return rows
 
 

@@ -457,7 +457,7 @@ def _build_range(data: ReportData) -> list[Any]:
         if found is not None:
             count = found.dataset["sampled"].values.sum()
             varied = f"Varied properties; {count} samples, and each alone"
-            head = ("property", "varied over", "mark", "range by the finish")
+            head = ("property", "varied over", "mark")
             blocks.insert(1, Grid(head, list_ranges(data, found), varied, "words"))
         built += [*blocks, *changes]
     return built
