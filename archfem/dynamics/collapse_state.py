@@ -26,6 +26,9 @@ COLLAPSE_STATES = ("stands", "dislocated", "partly fallen", "fallen")
 # Displacement above which a structure is dislocated, over the depth of the shallowest part [-]
 DISLOCATION = 0.1
 
+# Ratio of the residual displacement to that limit within which the kind is so by little [-]
+NEAR_LIMIT = 1.5
+
 # Share of the Arias intensity left when strong motion ends, after 95 % of it (Trifunac and Brady,
 # BSSA 65, 1975) [-]
 MAX_LOOSE_SHARE = 0.05
@@ -210,7 +213,7 @@ def doubt_collapse(
             RANGE_REMEDY,
             (fall.displacement, fall.displacement / depth),
         )
-    if limit / 1.5 < fall.residual < 1.5 * limit and fall.resting:
+    if limit / NEAR_LIMIT < fall.residual < NEAR_LIMIT * limit and fall.resting:
         yield Doubt(
             f"it {'stands' if fall.kind == COLLAPSE_STATES[0] else 'is dislocated'} by little: "
             f"residual displacement {{:mm}}, limit {format_mm(limit)}",

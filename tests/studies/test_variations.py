@@ -1,6 +1,7 @@
 """Runs over uncertain properties: the varied properties, and the case of each run."""
 
 from dataclasses import replace
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -72,6 +73,26 @@ def test_steps_that_do_not_follow_sliding_are_a_doubt(column, motion, calls, mon
     (doubt,) = af.verdict_range(column, motion, **options).doubts
     assert "of 3 runs the steps, 5 ms or half of it, are long for sliding" in doubt.cause
     assert "analysis.dt=0.002" in doubt.remedy
+
+
+def test_a_structure_that_nearly_is_dislocated_is_doubted(column, motion, calls, monkeypatch):
+    """Of joints 400 mm deep the limit is 40 mm of residual, and two thirds of it are near."""
+    options = {"vary": {**HELD, "dt": ("as given", "half")}, "samples": 1, "dt": 0.005}
+
+    def move(kind, residual, analysis, motion, **options):
+        fall = STANDS if analysis.dt == 0.005 else replace(STANDS, kind=kind, residual=residual)
+        return SimpleNamespace(fall=fall, ending=af.dynamics.Ending.MET)
+
+    words = "in 1 of 3 runs it stands by little: residual displacements of up to 27 mm, limit 40 mm"
+    for kind, residual, doubted in (
+        ("stands", 0.026, False),
+        ("stands", 0.027, True),
+        ("dislocated", 0.05, False),
+    ):
+        monkeypatch.setattr(evaluators, "time_history", partial(move, kind, residual))
+        found = af.verdict_range(column, motion, **options)
+        assert len(found.doubts) == doubted
+        assert (words in str(found).splitlines()[1]) == doubted
 
 
 def test_runs_without_joints_in_strong_motion_are_a_doubt(column, motion, calls, monkeypatch):
