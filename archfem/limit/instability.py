@@ -5,7 +5,7 @@ lets the structure stand is the cause, and the least change of it the remedy.
 """
 
 from bisect import bisect_left
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import combinations
@@ -167,6 +167,16 @@ def describe_geometric_factor(structure: Structure, strength: float | None) -> s
         f"geometric factor of safety at rest: {factor:.3g}{more}, as it stands with all joints "
         f"{1.0 / factor:.3g} times as deep under the same weight"
     )
+
+
+def list_margins_at_rest(
+    structure: Structure, strength: float | None
+) -> Iterator[tuple[float, str]]:
+    """Yield the factors of safety at rest that are known, and what they are of."""
+    if (depth := geometric_factor(structure, strength)) and depth < 1.0 / _LITTLE_DEPTH:
+        yield depth, "the depth of its joints"
+    if (least := least_friction(structure)) and least > _LITTLE_FRICTION:
+        yield float(structure.friction.max()) / least, "the friction of its joints"
 
 
 def _say_friction(least: float) -> str:

@@ -321,6 +321,22 @@ def test_the_margin_said_first_is_the_least_of_the_report(case):
     assert verdict.index("In the study") < verdict.index("it survives")
 
 
+def test_a_margin_at_rest_is_said_first_where_it_is_the_least():
+    """Semicircles stand from 0.1075 of their mean radius on (Heyman, 1982), of many stones."""
+    lengths = {"radius": 3.0, "thickness": 0.36, "embrace": 180.0, "voussoirs": 41}
+    structure = {"shape": "circular_arch", "width": 10.0, **lengths}
+    data = ReportData(ring(structure=structure, assessment=SPECTRUM), {})
+    (alone,) = say_margin(data)
+    factor, of = alone.split(" at rest, ")
+    assert of == "of the depth of its joints"
+    assert float(factor) == pytest.approx(0.36 / 3.0 / 0.1075, rel=0.02)
+    for ratio, least in ((1.3, True), (1.05, False)):
+        check = state("assessment", answers.Ratios("linear, q = 2", ["right"], ratio, ratio))
+        first, *others = say_margin(data, assessment=check)
+        assert (first == f"the least margin is {alone}") is least
+        assert [x.partition(",")[0] for x in others[:1]] == ["the next is 1.3"] * least
+
+
 def test_what_fails_under_a_motion_that_was_not_scaled_has_a_margin_below_one(case):
     """Of runs of 2 m/s²; a state that another motion reaches at a larger scale is no first one."""
     data = data_of(case, a=verdict_of(), b=verdict_of("dislocated"), c=verdict_of())

@@ -14,6 +14,7 @@ from archfem.cases.report.study_findings import OVER_SITE, find_least
 from archfem.cases.result_text import PushFactors, peak_of_spectrum, site_acceleration
 from archfem.dynamics.collapse_state import COLLAPSE_STATES, FALLEN_STATES
 from archfem.dynamics.rigid_body.rocking_body import describe_first_fall, say_scale
+from archfem.limit.instability import list_margins_at_rest
 from archfem.masonry.out_of_plane import UNCHECKED_ACROSS, describe_transverse_push
 from archfem.units import Ends, format_ratio
 from archfem.view.pages.document import TextBlock
@@ -117,10 +118,14 @@ def build_transverse(data: ReportData) -> list[TextBlock]:
 def describe_margin(data: ReportData) -> Iterator[str]:
     """Yield the factors on the demands of an earthquake, the least first, maybe as ranges.
 
-    Where the least is across the plane, the next stands in the same sentence. What the head states
-    is counted and not repeated.
+    That at rest is among them where it is less than all. Where the least is across the plane, the
+    next stands in the same sentence. What the head states is counted and not repeated.
     """
     margins = sorted(_list_margins(data), key=lambda each: each[0])
+    at_rest = list_margins_at_rest(data.case.structure, data.case.limit.strength)
+    for factor, of in sorted(at_rest)[:1]:
+        if factor < min((each[0] for each in margins), default=np.inf):
+            margins.insert(0, (factor, bool(margins), [f"{format_ratio(factor)} at rest, of {of}"]))
     push, demand = find_unchecked_push(data) or (np.nan, 0.0)
     if margins and push < demand * margins[0][0]:
         across = f"{push / demand:.3g} across the plane of the drawing, which was not checked"
