@@ -16,6 +16,7 @@ from archfem._display import DOUBT_MARK, NOTE_MARK, ProgressReport, write_progre
 from archfem._files import (
     DRAFT_PREFIX,
     create_result_folder,
+    group_of,
     intact_file_list,
     path_inside,
     replace_results,
@@ -32,6 +33,7 @@ from archfem.cases.defaults import (
     describe_spectrum_defaults,
 )
 from archfem.cases.run import (
+    CASE_FILE,
     RATING_FILE,
     DeadLoadResult,
     Result,
@@ -129,6 +131,10 @@ def write_results(
         print(text)
         return
     name, inputs, place = name_group(command, pair), case.hash_inputs(), PurePath(pair or "")
+    owner = group_of(intact_file_list(Path(out)), CASE_FILE)
+    if owner is not None and owner.inputs != inputs:
+        others = f"{NOTE_MARK}{out} has results of another case, drawing or version of archfem"
+        text += f"\n{others}: a report shows those of one alone; run all again, or name another"
     # a reader of the text, such as `head`, may leave before its end
     with _print_at_end(Path(out), name, text):
         folder = create_result_folder(out)

@@ -908,8 +908,8 @@ def test_a_result_without_a_time_history_has_a_report(
 
 
 @pytest.mark.parametrize(("changed", "author"), [("1.0", "B. Wright"), ("2.0", "A. Mason")])
-def test_a_command_renews_who_signs_the_case_of_a_run(changed, author, undrawn, tmp_path):
-    """That of the same case: another load makes it another case, which is not the run's."""
+def test_a_command_renews_who_signs_the_case_of_a_run(changed, author, undrawn, tmp_path, capsys):
+    """That of the same case: another load makes it another case, of which it warns."""
     path, folder = tmp_path / "case.toml", tmp_path / "out"
     limit = CASE + '[limit]\nhorizontal = 1.0\n[report]\nauthor = "A. Mason"\n'
     path.write_text(limit, encoding="utf-8")
@@ -921,6 +921,8 @@ def test_a_command_renews_who_signs_the_case_of_a_run(changed, author, undrawn, 
     assert "case.toml" in listed["run"].files
     assert "case.toml" not in listed["limit"].files
     assert af.cases.open_results(folder).case.report == {"author": author}
+    noted = f"note: {folder} has results of another case" in capsys.readouterr().out
+    assert noted == (changed == "2.0")
 
 
 def test_a_kinematic_assessment_alone_has_a_report(unplotted, tmp_path, capsys):
