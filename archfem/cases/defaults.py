@@ -177,6 +177,8 @@ def list_spectrum_defaults(case: Case) -> Iterator[Default]:
     for path, spectrum in spectra.items():
         section, name = path.split(".")
         given = case.settings.get(section, {}).get(name) or {}
+        spectrum = getattr(spectrum, "ground_spectrum", spectrum)
+        given = given.get("ground_spectrum", given)
         for key, reason in _OF_SPECTRUM.items():
             if key not in given and hasattr(spectrum, key):
                 words = f"{key} {getattr(spectrum, key)}"

@@ -15,6 +15,7 @@ from archfem.cases.toml_file import Table, check_table, format_tables, read_obje
 from archfem.errors import InvalidInput
 from archfem.motion.design_spectra import (
     DesignSpectrum,
+    FloorSpectrum,
     build_registered_spectrum,
     registered_spectra,
 )
@@ -143,6 +144,9 @@ def build_spectrum(table: Table, section: str) -> DesignSpectrum:
     code = check_choice(values.pop("code", None), f"{section}.code", registered_spectra)
     spectrum = registered_spectra[code]
     values = check_table(values, declared_keys(spectrum), section)
+    if "ground_spectrum" in values and spectrum is FloorSpectrum:
+        key = "ground_spectrum"
+        values[key] = build_spectrum(values[key], f"{section}.{key}")
     try:
         signature(spectrum).bind(**values)
     except TypeError as error:

@@ -219,7 +219,7 @@ def _motion() -> Schema:
 
 def _spectrum(code: str, spectrum: Any) -> Schema:
     """Return the schema of the design spectrum of a code."""
-    schema = _table(declared_keys(spectrum), spectrum)
+    schema = _table(declared_keys(spectrum), spectrum, ground_spectrum=_SPECTRUM)
     schema["properties"]["code"] = {"const": code}
     return {"title": code, **schema, "required": ["code"]}
 

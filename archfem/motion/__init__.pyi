@@ -2,6 +2,7 @@ from .design_spectra import Asce2022 as Asce2022
 from .design_spectra import DesignSpectrum as DesignSpectrum
 from .design_spectra import Eurocode8 as Eurocode8
 from .design_spectra import Eurocode2024 as Eurocode2024
+from .design_spectra import FloorSpectrum as FloorSpectrum
 from .design_spectra import Ntc2018 as Ntc2018
 from .design_spectra import TableSpectrum as TableSpectrum
 from .design_spectra import Tbec2018 as Tbec2018

@@ -530,10 +530,65 @@ class Eurocode2024(CodeSpectrum):
         return SpectrumBranches(level, 1.0 / 2.5, self.corners, longest=4.0, start=0.02), None
 
 
+@dataclass(frozen=True)
+class FloorSpectrum:
+    """Spectrum of what stands on a height of a building, by the first mode of the building.
+
+    With A = 1.1 / √ξ_1 and a_Z = S(T_1) · amplification · √(1 + 4 ξ_1²) it is a_Z at period zero,
+
+        a_Z A / (1 + (A - 1) (1 - T / (0.8 T_1))^1.6)  up to 0.8 T_1,  a_Z A  up to 1.1 T_1,
+        a_Z A / (1 + (A - 1) (T / (1.1 T_1) - 1)^1.2)  beyond,
+
+    and nowhere below S, the spectrum of the ground. It has no vertical.
+
+    Args:
+        ground_spectrum: spectrum of the ground, S.
+        period: T_1 of the building [s].
+        amplification: participation of the mode times its shape at the height [-]: of n equal
+            storeys 3 n / (2 n + 1) times the height over that of the building.
+        building_damping: ξ_1 [-].
+
+    References:
+        Circolare 7/2019, C7.2.3, and Degli Abbati, Cattari and Lagomarsino (2018), both from
+        memory: check them before you sign.
+    """
+
+    ground_spectrum: Annotated[DesignSpectrum, dict]
+    period: Seconds
+    amplification: float
+    building_damping: float = 0.05
+
+    def __post_init__(self) -> None:
+        check_between(self.period, "floor spectrum, period [s]", 0.0, 4.0, ends="()")
+        check_between(self.amplification, "floor spectrum, amplification [-]", 0.0, 3.0, ends="(]")
+        check_between(self.building_damping, "floor spectrum, building_damping", 0.005, 0.3)
+
+    def horizontal(self, periods: float | Array) -> Array:
+        """Return horizontal spectral accelerations in the shape of the periods [g].
+
+        Args:
+            periods: natural periods, of any shape [s].
+        """
+        ratio, resonance = np.asarray(periods) / self.period, 1.1 / np.sqrt(self.building_damping)
+        level = damping_correction(self.building_damping) * self.ground_spectrum.horizontal(
+            self.period
+        )
+        level = level * self.amplification * np.sqrt(1.0 + 4.0 * self.building_damping**2)
+        below, beyond = np.maximum(1.0 - ratio / 0.8, 0.0), np.maximum(ratio / 1.1 - 1.0, 0.0)
+        reduction = 1.0 + (resonance - 1.0) * (below**1.6 + beyond**1.2)
+        return np.asarray(
+            np.maximum(level * resonance / reduction, self.ground_spectrum.horizontal(periods))
+        )
+
+    def vertical(self, periods: float | Array) -> Array:
+        """Refuse the vertical, which the rule does not have."""
+        raise InvalidInput("a floor spectrum has no vertical: give a table with vertical_values")
+
+
 # Spectra that case files can name, with those of the user
 registered_spectra: dict[str, Callable[..., DesignSpectrum]] = {
     **{"TBEC-2018": Tbec2018, "EC8": Eurocode8, "NTC-2018": Ntc2018, "ASCE-7-22": Asce2022},
-    **{"EC8-2024": Eurocode2024, "table": TableSpectrum},
+    **{"EC8-2024": Eurocode2024, "table": TableSpectrum, "floor": FloorSpectrum},
 }
 
 

@@ -82,16 +82,18 @@ class LimitState:
             spectrum: spectrum of the demand; a table and a motion are of no code.
             above: height of the foot of what is checked above the ground, if it is a column [m].
         """
-        codes = [name for name, kind in registered_spectra.items() if kind is type(spectrum)]
+        kinds = {type(spectrum), type(getattr(spectrum, "ground_spectrum", None))}
+        codes = [name for name, kind in registered_spectra.items() if kind in kinds]
         found = []
-        if self.name.startswith("NTC") and not {*codes} <= {"NTC-2018", "table"}:
+        if self.name.startswith("NTC") and not {*codes} <= {"NTC-2018", "table", "floor"}:
             words = f"the check is one of NTC, which was not made for a spectrum of {codes[0]}"
             remedy = "give limit_state with the rules of its code, or a spectrum of NTC-2018"
             found.append(Doubt(words, remedy))
-        if above and not {*codes} <= {"table"}:
+        if above and codes and not {*codes} & {"table", "floor"}:
             words = "the spectrum is that of the ground, and {:.3g} m above it, at the foot of this"
             words += " column, it is larger: each ratio is {}"
-            found.append(Doubt(words, "give that as a table", (above, UPPER_BOUND)))
+            remedy = 'give that of the height, by code = "floor" or a table'
+            found.append(Doubt(words, remedy, (above, UPPER_BOUND)))
         return found
 
 
@@ -242,7 +244,8 @@ def spectral_acceleration(
     else:
         factor *= damping_correction(damping)
     # the spectral displacement is held beyond the longest period of European codes
-    longest = 4.0 if isinstance(spectrum, Eurocode8 | Ntc2018 | Eurocode2024) else np.inf
+    ground = getattr(spectrum, "ground_spectrum", spectrum)
+    longest = 4.0 if isinstance(ground, Eurocode8 | Ntc2018 | Eurocode2024) else np.inf
     held = np.minimum(periods, longest)
     beyond = np.where(periods > longest, longest / np.maximum(periods, 1e-9), 1.0)
     return np.asarray(factor * spectrum.horizontal(held) * beyond**2)

@@ -293,8 +293,8 @@ def kinematic_assessment(  # noqa: PLR0913  (the factors of the codes are argume
     A fill, bodies softer than their joints, counts by its weight and mass on the stones below,
     column by column; with its strength, `fill`, it presses on them as in `collapse_factor`. Along
     the motion pressures are those of the weights as built: active on faces that move away, and
-    passive on those that move into the fill. The mechanism must stand on the ground: spectra at a
-    height of a building are not built here; give one as a `TableSpectrum`, or a `Motion`.
+    passive on those that move into the fill. The mechanism must stand on the ground: at a height
+    of a building give `motion.FloorSpectrum`, a `TableSpectrum` or a `Motion` there.
 
     Args:
         structure: supports are its fixed blocks; or an `archfem.Analysis` of it.

@@ -6,9 +6,12 @@ two of those differed, nothing was taken from either: the user gives such a valu
 
 import numpy as np
 import pytest
+from scipy.signal import lsim
 
 import archfem as af
+from archfem.cases.motion_keys import build_spectrum
 from archfem.motion import Asce2022, Eurocode2024, Ntc2018
+from archfem.motion.response_spectra import response_spectrum
 
 ROUND_OFF = 1e-12
 
@@ -112,3 +115,42 @@ def test_eurocode_of_2024_at_its_corners():
 def test_spectra_that_codes_do_not_define_are_refused(build, message):
     with pytest.raises(af.InvalidInput, match=message):
         build()
+
+
+def test_a_floor_amplifies_the_ground_as_an_oscillator_does(verified):
+    """A storey at 1.2 times the first mode, T_1 = 0.25 s, under motions matched to the ground."""
+    ground = af.motion.Ntc2018(ag=0.17, f0=2.45, tc_star=0.32, site="B")
+    floor = af.motion.FloorSpectrum(ground, 0.25, 1.2)
+    periods, frequency = np.array([0.03, 0.25, 0.5, 1.0]), 2.0 * np.pi / 0.25
+    spectra = []
+    for seed in range(3):
+        motion = af.Motion.synthetic(duration=12.0, pga=2.0, seed=seed, vertical_ratio=0.0)
+        motion = af.motion.matched(motion, ground).motion
+        rows = motion.dt * np.arange(len(motion.horizontal)), [1.0, 0.1 * frequency, frequency**2]
+        _, mode, _ = lsim((rows[1][1:], rows[1]), motion.horizontal, rows[0])
+        shaken = af.Motion(motion.horizontal + 1.2 * (mode - motion.horizontal), motion.dt)
+        spectra.append(response_spectrum(shaken, periods, 0.05) / af.units.G)
+    computed, stated = np.mean(spectra, axis=0), floor.horizontal(periods)
+    verified("floor spectrum at resonance [g]", computed[1], "three histories, mean", stated[1])
+    # below the mode the rule is an envelope, up to twice the mean
+    assert stated[1] == pytest.approx(computed[1], rel=0.2)
+    assert stated[2:] == pytest.approx(computed[2:], rel=0.25)
+    assert computed[0] < stated[0] < 2.0 * computed[0]
+
+
+def test_a_floor_spectrum_at_its_corners():
+    """a_Z at period zero, a_Z 1.1 / √ξ from 0.8 to 1.1 T_1, and the ground's far beyond."""
+    ground = af.motion.Ntc2018(ag=0.17, f0=2.45, tc_star=0.32, site="B")
+    floor = af.motion.FloorSpectrum(ground, 0.25, 1.5, building_damping=0.03)
+    level = 1.5 * np.sqrt(10.0 / 8.0) * ground.horizontal(0.25) * np.sqrt(1.0 + 4.0 * 0.03**2)
+    expected = level * np.array([1.0, 1.1 / np.sqrt(0.03), 1.1 / np.sqrt(0.03)])
+    assert floor.horizontal([0.0, 0.2, 0.275]) == pytest.approx(expected)
+    assert af.motion.FloorSpectrum(ground, 0.25, 0.3).horizontal(4.0) == ground.horizontal(4.0)
+    case = {"code": "floor", "period": "0.25 s", "amplification": 1.5, "building_damping": 0.03}
+    case["ground_spectrum"] = {"code": "NTC-2018", "ag": 0.17, "f0": 2.45, "tc_star": 0.32}
+    case["ground_spectrum"]["site"] = "B"
+    assert build_spectrum(case, "assessment.spectrum") == floor
+    with pytest.raises(af.InvalidInput, match="a floor spectrum has no vertical"):
+        floor.vertical(0.1)
+    with pytest.raises(af.InvalidInput, match="ground_spectrum"):
+        build_spectrum({"code": "floor", "period": 0.2, "amplification": 1.0}, "x")
