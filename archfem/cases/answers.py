@@ -12,6 +12,7 @@ from scipy.optimize import brentq
 
 from archfem._display import NOTE_MARK
 from archfem.cases.case import Case
+from archfem.cases.motion_keys import find_matched_band
 from archfem.cases.result_text import PushFactors, Remark, ResultTable
 from archfem.dynamics.motion_scaling import CollapseScale
 from archfem.dynamics.scale_search import MechanismScales
@@ -23,7 +24,6 @@ from archfem.masonry.out_of_plane import describe_transverse_push, find_transver
 from archfem.masonry.structure import Structure, join_words
 from archfem.models.model import Doubt, read_doubts, write_doubts
 from archfem.motion.hazard import DESIGN_PERIOD, MEASURES
-from archfem.motion.matching import DEFAULT_BAND
 from archfem.motion.motion import Motion
 from archfem.statics.assessment_checks import AssessmentCheck, describe_difference
 from archfem.statics.mechanism_assessment import KinematicAssessment
@@ -401,14 +401,15 @@ def note_ties(case: Case) -> list[str]:
 
 def note_band(case: Case, found: Iterable[KinematicAssessment]) -> list[str]:
     """Return a note where motions are matched up to a shorter period than that of a check."""
-    low, high = DEFAULT_BAND
+    if (band := find_matched_band(case.suite)) is None:
+        return []
+    low, high = band
     longer = [each.checks[-1].period for each in found if each.checks[-1].period > high]
-    if not longer or not (case.suite or {}).get("matched", False):
+    if not longer:
         return []
     return [
-        f"{NOTE_MARK}{MATCHED} {low:g} to {high:g} s, and T = "
-        f"{max(longer):.2f} s is longer: there they may be weaker than the spectrum; judge their "
-        "displacements by the figure of spectra"
+        f"{NOTE_MARK}{MATCHED} {low:g} to {high:g} s, and T = {max(longer):.2f} s is longer: "
+        "there they may be weaker than the spectrum; give suite.band"
     ]
 
 

@@ -19,6 +19,7 @@ from archfem.motion.design_spectra import (
     build_registered_spectrum,
     registered_spectra,
 )
+from archfem.motion.matching import DEFAULT_BAND
 from archfem.motion.motion import Motion
 from archfem.motion.record_selection import RecordSelection
 from archfem.motion.suite import Suite
@@ -47,7 +48,7 @@ def motion_keys() -> dict[str, Any]:
 def suite_keys() -> dict[str, Any]:
     """Return the keys of [suite]."""
     keys = declared_keys(Suite) | {"pairs": dict, "folder": str, "target": dict}
-    keys |= {"matched": bool, "reversed": bool}
+    keys |= {"matched": bool, "band": ["s"], "reversed": bool}
     del keys["matches"]  # results of matching
     return keys
 
@@ -129,6 +130,8 @@ def parse_suite(table: Any) -> dict[str, Any]:
             "suite.matched = true needs a target, e.g. "
             'target = { code = "TBEC-2018", ss = 1.14, s1 = 0.315, site = "ZD" }'
         )
+    if len(band := settings.get("band", DEFAULT_BAND)) != 2:
+        raise InvalidInput(f"suite.band = {band}: give two periods, as in ['0.03 s', '2 s']")
     build_target_spectrum(settings)  # refuses parameters of the code that are out of range
     return settings
 
@@ -168,6 +171,14 @@ def build_pairs(settings: Table, folder: Path = Path()) -> tuple[Motion, ...]:
     )
 
 
+def find_matched_band(suite: Table | None) -> tuple[float, float] | None:
+    """Return the periods from which and up to which a suite is matched [s], or None."""
+    if not suite or not suite.get("matched", False):
+        return None
+    low, high = suite.get("band", DEFAULT_BAND)
+    return low, high
+
+
 def build_suite(settings: Table, folder: Path = Path()) -> Suite:
     """Return a suite of pairs, matched to its target spectrum if the case says so."""
     suite = Suite(
@@ -177,7 +188,8 @@ def build_suite(settings: Table, folder: Path = Path()) -> Suite:
         reduction=settings.get("reduction", 1.0),
     )
     target = build_target_spectrum(settings)
-    suite = suite.matched(target) if target and settings.get("matched", False) else suite
+    if target and (band := find_matched_band(settings)):
+        suite = suite.matched(target, band=band)
     # matching would shake the ground at rest
     rests = [pair.get("rest", 0.0) for pair in settings["pairs"].values()]
     rested = (pair.with_rest(rest) for pair, rest in zip(suite.pairs, rests, strict=True))

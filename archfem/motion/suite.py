@@ -9,7 +9,7 @@ from archfem._typing import Array
 from archfem._validation import check_fields, validate_methods
 from archfem.errors import InvalidInput
 from archfem.motion.design_spectra import DesignSpectrum
-from archfem.motion.matching import Match, matched
+from archfem.motion.matching import DEFAULT_BAND, Match, matched
 from archfem.motion.motion import Motion
 from archfem.motion.response_spectra import response_spectrum
 
@@ -110,17 +110,20 @@ class Suite:
         share = cls.paired(f"synthetic {seed}", made, made[:verticals], reduction=reduction)
         return share.matched(spectrum)
 
-    def matched(self, spectrum: DesignSpectrum) -> "Suite":
+    def matched(
+        self, spectrum: DesignSpectrum, *, band: tuple[float, float] = DEFAULT_BAND
+    ) -> "Suite":
         """Return the suite with every pair matched to a spectrum, see `matched`.
 
         Args:
             spectrum: target of horizontals and verticals.
+            band: shortest and longest period to match [s].
 
         Raises:
             InvalidInput: a pair is at rest or too short, or the spectrum lacks what it needs.
             DidNotConverge: a pair could not be matched within the tolerance.
         """
-        matches = tuple(matched(pair, spectrum) for pair in self.pairs)
+        matches = tuple(matched(pair, spectrum, band=band) for pair in self.pairs)
         return replace(self, pairs=tuple(match.motion for match in matches), matches=matches)
 
     def reversed(self) -> "Suite":

@@ -39,6 +39,9 @@ def test_a_suite_is_matched_on_request_of_the_case():
     # Bounds of the matched spectrum over its band.
     assert max(match.misfit.values()) < 0.05
     assert match.motion.name == "one"
+    (match,) = build_suite(parse_suite({**settings, "band": ["0.03 s", "1.5 s"]})).matches
+    assert match.band == (0.03, 1.5)
+    assert max(match.misfit.values()) < 0.05
 
 
 @pytest.mark.slow
@@ -111,6 +114,7 @@ def test_samples_may_stand_in_the_case():
         ("suite.pairs.first.vertical=3", "vertical = 3 is not a word or a table"),
         ("suite.pairs.first.vertical={}", "suite.pairs.first.vertical needs either a file"),
         ("suite.matched=true", "suite.matched = true needs a target"),
+        ("suite.band=[0.1]", r"suite.band = \[0.1\]: give two periods"),
         ("suite.target={code='UBC'}", "suite.target.code = 'UBC' is not known"),
         ("suite.target={code='EC8', ag=0.2}", "suite.target of EC8: .*'ground'"),
         ("suite.target={code='EC8', ag=0.2, ground='Z'}", "ground 'Z'"),

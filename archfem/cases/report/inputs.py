@@ -19,7 +19,7 @@ from archfem.cases.defaults import (
     list_spectrum_defaults,
     value_text,
 )
-from archfem.cases.motion_keys import MADE
+from archfem.cases.motion_keys import MADE, find_matched_band
 from archfem.cases.report.report_data import STATIC_RESULTS, ReportData
 from archfem.cases.structure_keys import (
     PARTS_BY_NAME,
@@ -35,7 +35,6 @@ from archfem.masonry.materials import Contact, Material
 from archfem.masonry.shapes.bridge_parts import Backfill
 from archfem.masonry.structure import Structure, describe_piers, find_clear_spans
 from archfem.motion.design_spectra import CodeSpectrum
-from archfem.motion.matching import DEFAULT_BAND
 from archfem.statics.mechanism_assessment import kinematic_assessment
 from archfem.statics.pushover import pushover
 from archfem.units import Ends, in_unit
@@ -361,8 +360,8 @@ def _motion_rows(data: ReportData) -> Iterator[Row]:
         yield from _target_rows(data)
         matched = "matched to the target" if suite.get("matched") else "as they are"
         yield "motions are", matched, _mark("matched" in suite)
-        if suite.get("matched"):
-            yield "motions are matched", "from {:g} to {:g} s".format(*DEFAULT_BAND), "default"
+        if band := find_matched_band(data.case.suite):
+            yield "motions are matched", "from {:g} to {:g} s".format(*band), _mark("band" in suite)
         for key, name in (("scale", "scale of the motions"), ("reduction", "reduction factor R")):
             yield name, str(suite.get(key, 1.0)), _mark(key in suite)
     elif motion is not None:

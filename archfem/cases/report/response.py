@@ -9,6 +9,7 @@ import xarray as xr
 
 from archfem.cases import result_text
 from archfem.cases.case import Case
+from archfem.cases.motion_keys import find_matched_band
 from archfem.cases.report.motion_rules import find_target, tabulate_checks
 from archfem.cases.report.outcomes import describe_lost, list_lost, sentence
 from archfem.cases.report.report_data import ReportData, build_player
@@ -17,7 +18,6 @@ from archfem.dynamics.history import History
 from archfem.masonry.joint_closing import describe_closing
 from archfem.masonry.structure import Structure, join_words
 from archfem.models.model import group_doubts, merge_doubts
-from archfem.motion.matching import DEFAULT_BAND
 from archfem.motion.motion import Motion
 from archfem.motion.suite import Suite
 from archfem.statics.stress import utilisation_text
@@ -74,15 +74,14 @@ def _build_spectra(data: ReportData, motions: list[Motion]) -> list[Any]:
     pairs = tuple(motion.scaled(reduction / scale) for motion in motions)
     name = own.get("name", "suite" if own else motions[0].name)
     suite = Suite(name, pairs, scale=scale, reduction=reduction)
-    matched = own.get("matched", False)
-    if matched:
-        caption += "; matched from {:g} to {:g} s".format(*DEFAULT_BAND)
+    if band := find_matched_band(own):
+        caption += "; matched from {:g} to {:g} s".format(*band)
     if reduction != 1.0:
         caption = (
             "Response spectra, 5 % damped, before they are divided by the reduction factor "
             f"R = {reduction:g}; motions were applied divided by it"
         )
-    if target is not None and not matched:
+    if target is not None and not find_matched_band(own):
         caption += "; they were not matched to the target"
         caption += ", which is the spectrum of [assessment]" * (data.case.target is None)
     return [FigureBlock.of(draw_suite(suite, target), caption)]
