@@ -270,7 +270,7 @@ class MechanismPath:
         start, moved = self._places_of_forces(self.blocks, loaded), np.zeros(len(self.factors))
         for number, displacement in enumerate(self.displacements):
             travel = self._places_of_forces(self.blocks.moved(displacement), loaded) - start
-            moved[number] = np.sum(forces * travel) / np.linalg.norm(forces)
+            moved[number] = np.sum(forces * travel) / np.hypot(*forces.T).sum()
         values = {"factor": (self.factors, "1"), "displacement": (moved, "m")}
         return xr.Dataset(
             {key: ("place", value, {"units": unit}) for key, (value, unit) in values.items()}

@@ -150,7 +150,8 @@ def pushover(
 
         f(q) = f_dead + λ f_live,   a d(q) / d_1 + b λ / λ_1 = s.
 
-    Here d = f_live·q / |f_live| is the displacement of the load along itself. Control is by force
+    Here d = f_live·q / F is the displacement of the load along itself, with F the sum of the sizes
+    of its forces: the mean of their points, weighted by them. Control is by force
     where a = 0, by displacement where b = 0. For arc length, (a, b) is the direction of the last
     step, in units of the first. Control then turns from one to the other as the curve bends (Riks).
     Steps grow by a tenth each. Where Newton's method fails and joints slide, as those of fill in

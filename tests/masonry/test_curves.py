@@ -118,6 +118,13 @@ def thinnest(rise, sections=400):
 
 
 @pytest.mark.slow
+def test_stones_of_a_pointed_arch_meet_at_the_crown_whatever_their_number():
+    for voussoirs in range(2, 62, 2):
+        ring = shapes.pointed_arch(span=2.0, rise=4.0, thickness=0.3, voussoirs=voussoirs)
+        crown = ring.joints[voussoirs // 2]
+        assert np.array([crown.intrados, crown.extrados])[:, 0] == pytest.approx(0.0, abs=1e-12)
+
+
 @pytest.mark.parametrize("rise", [sqrt(3.0), 1.3])
 def test_least_thickness_of_a_pointed_arch_by_lines_of_thrust(rise):
     """The more joints, the more of the sections bind: 40 stones lack half a per cent of it."""

@@ -119,15 +119,23 @@ class AdaptiveStepper:
         good = len(errors) if last else int(np.argmax(np.append(errors, np.inf) > self.tolerance))
         if good == 0:
             return None, np.inf
-        self.taken += good
-        self.unmet += int(np.sum(errors[:good] > self.tolerance))
-        middles = batch.times - 0.5 * dt
-        scaled = self._scale_moments(batch.resultants[max(good - 2, 0) : good])
-        self._last += list(zip(middles[max(good - 2, 0) : good], scaled, strict=True))
-        self._last = self._last[-2:]
         batch = batch.cut(good)
-        self.slip_error.add(batch)
+        self._add(batch, errors[:good])
         return batch, float(errors[:good].max())
+
+    def judge(self, batch: Batch) -> None:
+        """Add the errors of steps of a constant length."""
+        self.slip_error.estimate(batch)
+        self._add(batch, self._errors(batch))
+
+    def _add(self, batch: Batch, errors: Array) -> None:
+        """Add steps with their errors."""
+        self.taken += len(errors)
+        self.unmet += int(np.sum(errors > self.tolerance))
+        middles = batch.times[-2:] - 0.5 * batch.smallest_step[-2:]
+        scaled = self._scale_moments(batch.resultants[-2:])
+        self._last = [*self._last, *zip(middles, scaled, strict=True)][-2:]
+        self.slip_error.add(batch)
 
     def _take_steps(self, state: State, dt: float, ends: Array, last: bool) -> Batch | None:
         """Return steps by the solver, or a fall-back step; None where shorter ones may converge."""

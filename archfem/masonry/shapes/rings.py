@@ -386,7 +386,7 @@ def pointed_arch(  # noqa: PLR0913  (all are lengths and properties of one ring)
     # The extrados of both arcs meets above the apex, at a smaller angle than the intrados.
     top, outer_top = atan2(rise, centre), acos(centre / (radius + thickness))
     # Stones are equally long; an odd number leaves half a keystone at the top of each half.
-    turns = np.minimum(2.0 * top / voussoirs * np.arange(voussoirs // 2 + 2), top)
+    turns = top * np.minimum(2.0 * np.arange(voussoirs // 2 + 2) / voussoirs, 1.0)
 
     def arc(start: float, end: float, size: float) -> Array:
         angles = np.linspace(start, end, chords + 1)
