@@ -639,7 +639,8 @@ def _read_result(
     hinges, slides = _find_failing(blocks, regions, motion)
     joints = _read_joints(stones.whole, blocks, regions, optimum.forces - blocks.bond)
     moved, soil = regions.expand_motion(motion), stones.pressure_dataset(optimum.unknowns)
-    return Collapse(float(factor), outcome, hinges, slides, joints, moved, soil=soil)
+    # without the sign of a zero
+    return Collapse(float(factor) + 0.0, outcome, hinges, slides, joints, moved, soil=soil)
 
 
 def _find_failing(

@@ -199,6 +199,11 @@ class Tbec2018(CodeSpectrum):
         if self.site == "ZF":
             raise InvalidInput("ground class ZF has no code spectrum: it needs a site study")
         check_choice(self.site, "ground class", self._short_period_factors)
+        if (end := self.sd1 / self.sds) > 6.0:  # T_L
+            raise InvalidInput(
+                f"S_S {self.ss:g}, S_1 {self.s1:g} g: T_B = S_D1 / S_DS = {end:.3g} s is beyond "
+                "T_L = 6 s: check S_1"
+            )
 
     @property
     def sds(self) -> float:

@@ -146,6 +146,7 @@ def test_table_is_straight_between_its_points():
         (lambda: Tbec2018(ss=1.0, s1=0.3, site="ZF"), "needs a site study"),
         (lambda: Tbec2018(ss=1.0, s1=0.3, site="C"), "ground class = 'C' is not known"),
         (lambda: Tbec2018(ss=-1.0, s1=0.3, site="ZC"), "both are between 0 and 10 g"),
+        (lambda: Tbec2018(ss=0.1, s1=0.6, site="ZD"), "T_B = .* = 6.3. s is beyond T_L"),
         (lambda: Tbec2018(ss=1.0, s1=0.3, site="ZC").vertical(3.01), "defined up to 3 s"),
         (lambda: Tbec2018(ss=1.0, s1=0.3, site="ZC").horizontal(-0.1), "from 0 s upwards"),
         (lambda: Eurocode8(ag=0.2, ground="S1"), "expected type 1 or 2 on ground A"),
