@@ -66,16 +66,18 @@ class ResultFolder(CaseResult):
     missing: tuple[str, ...] = ()
     studies: tuple[Path, ...] = ()
 
-    def report(self, path: str | Path | None = None) -> Path:
+    def report(self, path: str | Path | None = None, others: Sequence[CaseResult] = ()) -> Path:
         """Write an HTML report of the folder in one file, for print.
 
         Args:
             path: the file, .html, or .docx for Word; by default report.html in the folder.
+            others: results of other cases, which the report compares with these.
 
         Returns:
             The file.
         """
-        return self._write("report", super().report, path)
+        report = super().report
+        return self._write("report", lambda target: report(target, others), path)
 
     def page(self, path: str | Path | None = None) -> Path:
         """Write a page on which a reader changes the arch and shakes it, in any browser.

@@ -7,7 +7,7 @@ an earlier call are reused if case, input files, program and ground motion are t
 import logging
 import os
 import shutil
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -75,16 +75,17 @@ RunMotion = Callable[[Case, Motion, Equilibrium, Viscous | None], History]
 class CaseResult:
     """Base class of results of a case: they have a report and a player."""
 
-    def report(self, path: str | Path) -> Path:
+    def report(self, path: str | Path, others: "Sequence[CaseResult]" = ()) -> Path:
         """Write an HTML report in one file, for print.
 
         Args:
             path: the file, .html, or .docx for Word; missing folders are created.
+            others: results of other cases, which the report compares with these.
 
         Returns:
             The file.
         """
-        return call_late_bound("CaseResult.report", self, path)
+        return call_late_bound("CaseResult.report", self, path, others)
 
     def page(self, path: str | Path) -> Path:
         """Write a page on which a reader changes the arch and shakes it, in any browser.

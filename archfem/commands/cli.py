@@ -246,7 +246,8 @@ def _add_result_commands(commands: Any) -> None:
     text = "Write one self-contained HTML page of a result folder, or of a history alone."
     about = "one HTML page of a result folder, to print"
     add = _add_command(commands, "report", about, "run", description=text)
-    add("folder", metavar="FOLDER", help="that `archfem run` has written, or a history.nc")
+    about = "that `archfem run` has written, several for one report; or a history.nc"
+    add("folders", nargs="+", metavar="FOLDER", help=about)
     add("--out", metavar="FILE.html", help="the page (FOLDER/report.html), or .docx for Word")
     about = "who signs what, as in report.author=NAME; repeatable"
     add(

@@ -415,22 +415,25 @@ def risk(options: argparse.Namespace) -> int:
 
 
 def report(options: argparse.Namespace) -> None:
-    """Write the report of a result folder, or of a history alone."""
+    """Write the report of result folders, or of a history alone."""
     if options.pdf and str(options.out).lower().endswith(".docx"):
         raise InvalidInput(f"--pdf prints the page, and {options.out} is none: give FILE.html")
     sign({}, options.changes)  # a wrong key is found before histories are read
     if options.pdf:
         write_progress_line("report", "drawing figures")
-    if (history := Path(options.folder)).is_file():
+    if options.studies and options.folders[1:]:
+        words = "--study is of one folder: add the study to that, `archfem study … --out FOLDER`"
+        raise InvalidInput(words)
+    if (history := Path(options.folders[0])).is_file() and not options.folders[1:]:
         folders = {"set": options.changes, "study": options.studies, "inputs": options.inputs}
         if ignored := join_words([f"--{name}" for name, value in folders.items() if value]):
             raise InvalidInput(f"{history} takes no {ignored}: give the folder of its results")
         path = History.read(history).report(options.out or history.with_suffix(".html"))
     else:
-        found = results.open_results(options.folder, inputs=options.inputs)
-        studies = tuple(map(Path, options.studies))
-        found = replace(found, case=found.case.signed(options.changes), studies=studies)
-        path = found.report(options.out)
+        opened = [results.open_results(each, inputs=options.inputs) for each in options.folders]
+        studies, by = tuple(map(Path, options.studies)), options.changes
+        found, *others = (replace(x, case=x.case.signed(by), studies=studies) for x in opened)
+        path = found.report(options.out, others)
     print(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
     if options.pdf:
         from archfem.view.pages.document import print_page

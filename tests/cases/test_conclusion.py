@@ -682,6 +682,28 @@ def test_what_is_stated_of_a_result_is_read_as_it_was_written():
     assert answers.read_numbers(answers.Scales, again)[0].states == {"falls": 2.0}
 
 
+def test_the_verdict_of_several_cases_is_the_worst_and_names_its_case(case):
+    """Falls, failed checks, unknown outcomes, damage, and then the least margin."""
+    outcomes = ("stands", "fallen", "dislocated", "mechanism", "stands", "stands", "stands")
+    ratios = (1.5, 2.0, 2.0, 2.0, 0.9, 1.4, None)
+    parts = {}
+    for ratio, outcome in zip(ratios, outcomes, strict=True):
+        data = parts[f"{outcome} {ratio}"] = data_of(case, a=verdict_of(outcome))
+        vars(data)["transverse_push"] = np.nan
+        check = answers.Ratios("linear", ["right"], ratio or 1.0, ratio or 1.0)
+        vars(data)["statements"] = {"assessment": state("assessment", check)} if ratio else {}
+    order = sorted(parts, key=lambda name: conclusion._rank_verdict(parts[name]))
+    assert order[:4] == ["fallen 2.0", "stands 0.9", "mechanism 2.0", "dislocated 2.0"]
+    assert order[4:] == ["stands 1.4", "stands 1.5", "stands None"]
+    facts = conclusion.list_joint_facts(parts)
+    assert facts[0][1].startswith("The worst of 7 cases is 'fallen 2.0': It does not survive: ")
+    assert [text for key, text in facts if key == "margin"] == [
+        "None is known of 'stands None'.",
+        "The least of all is 0.9, of 'stands 0.9'.",
+    ]
+    assert [key for key, _ in facts[3:]] == [name for name in parts if name != "fallen 2.0"]
+
+
 def test_of_unequal_outcomes_the_worst_is_the_first(case):
     every = {"a": verdict_of(), "b": verdict_of("dislocated", 0.2), "c": verdict_of("fallen")}
     data = data_of(case, range_of(0.1, 0.1), **every)

@@ -945,6 +945,37 @@ def test_a_kinematic_assessment_alone_has_a_report(unplotted, tmp_path, capsys):
     assert "player" not in words  # of a run that there is not
 
 
+def test_a_report_of_several_folders_has_the_worst_verdict_and_the_inputs_once(
+    undrawn, tmp_path, capsys
+):
+    """A column of 0.3 m fails a check that one of 0.9 m passes."""
+    folders, ratios = [str(tmp_path / name) for name in ("broad", "slender")], []
+    for folder, breadth in zip(folders, (0.9, 0.3), strict=True):
+        path = tmp_path / "column.toml"
+        spectrum = 'spectrum = { code = "EC8", ag = 0.3, ground = "A" }'
+        lengths = f'shape = "column"\nbreadth = {breadth}\nheights = [1.0, 1.0]'
+        text = f'title = "A stack"\n[structure]\n{lengths}\n[assessment]\n{spectrum}\n'
+        path.write_text(f'{text}[report]\nauthor = "A. Mason"\n', encoding="utf-8")
+        assert af.commands.main(["assess", str(path), "--out", folder]) in (0, 3)
+        ratios.append(re.search(r"least margin ([\d.]+)", capsys.readouterr().out)[1])
+    assert float(ratios[0]) > 1.0 > float(ratios[1])
+    page = tmp_path / "joint.html"
+    assert af.commands.main(["report", *folders, "--out", str(page)]) == 0
+    broad, slender = (f"A stack ({folder})" for folder in folders)
+    words = " ".join(words_of(page).split())
+    worst = f"verdict The worst of 2 cases is '{slender}': "
+    assert f"{worst}By the kinematic assessment it does not withstand" in words
+    assert f"margin The least of all is {ratios[1]}, of '{slender}'." in words
+    assert f"{broad} By the kinematic assessment it withstands" in words
+    assert f"breadth {broad}: 0.9 m (given); {slender}: 0.3 m (given) differs" in words
+    assert words.count("heights 1, 1 given") == words.count("place, date signature") == 1
+    figures = [int(number) for number in re.findall(r"Figure (\d+)\.", words)]
+    assert figures == [*range(1, len(figures) + 1)]
+    study = ["report", *folders, "--study", folders[0]]
+    assert af.commands.main(study) == 1
+    assert "--study is of one folder" in capsys.readouterr().err
+
+
 @pytest.mark.slow
 def test_an_assessment_takes_the_fill_of_the_limit_analysis(undrawn, tmp_path, capsys):
     path, folder = tmp_path / "case.toml", tmp_path / "out"

@@ -52,7 +52,7 @@ from archfem.dynamics.verdict_range import UNVARIED, VerdictRange
 from archfem.dynamics.walls_across import SCALES_ACROSS
 from archfem.masonry.structure import join_names, join_words
 from archfem.models.model import Doubt
-from archfem.units import Ends, format_mm
+from archfem.units import Ends, format_mm, format_ratio
 from archfem.view.pages.document import Grid, Section, TextBlock
 
 # Doubts of a result that the conclusion states; the others stand in the section of the result
@@ -112,6 +112,42 @@ def list_facts(data: ReportData) -> list[tuple[str, str]]:
     named = [f"{x.partition(',')[0]} of PGA {p:.2g} g" for x, p, _, of in list_demands(data) if of]
     question = [("question", f"Does it withstand {join_words(named)}?")] if named else []
     return [*signed, *question, *head, *doubts, *blocks]
+
+
+def list_joint_facts(parts: Mapping[str, ReportData]) -> list[tuple[str, str]]:
+    """List who signs what, the worst verdict and the least margin, and the answer of each case."""
+    heads = {name: list_facts(data) for name, data in parts.items()}
+    keys = {key.replace("_", " ") for key in REPORT_KEYS}
+    signed = [row for row in next(iter(heads.values())) if row[0] in keys]
+    answer, margin, _, left = HEAD
+    said = {
+        name: " ".join(text for key, text in head if key in (answer, margin, left))
+        + "".join(f" In doubt: {text}." for key, text in head if key == "in doubt")
+        for name, head in heads.items()
+    }
+    ranks = {name: _rank_verdict(data) for name, data in parts.items()}
+    worst, least = min(ranks, key=ranks.__getitem__), min(ranks, key=lambda name: ranks[name][1])
+    facts = [(answer, f"The worst of {len(parts)} cases is '{worst}': {said.pop(worst)}")]
+    if unknown := [f"'{name}'" for name, rank in ranks.items() if rank[1] == np.inf]:
+        facts.append((margin, f"None is known of {join_words(unknown)}."))
+    if len(unknown) < len(parts):
+        of_all = f"The least of all is {format_ratio(ranks[least][1])}, of '{least}'."
+        facts.append((margin, of_all))
+    return [*signed, *facts, *said.items()]
+
+
+def _rank_verdict(data: ReportData) -> tuple[int, float]:
+    """Return the place of a case among others, the worst first, and its least margin."""
+    ranked, outcome = margins.rank_margins(data), find_worst(data)[1] if data.runs else ""
+    rows = [row for each in data.statements.values() for row in each.rows]
+    loads = read_numbers(PushFactors, data.statements.get("limit"))
+    fails = [factor < 1.0 for factor, is_ranked, _ in ranked if is_ranked]
+    fails += [least < 1.0 for least, *_ in margins.say_less(data)]
+    fails += [load.least < 1.0 for load in loads if not load.site]
+    fails += [row.numbers.get("passes") is False for row in rows]
+    undecided = outcome.startswith("may") or (bool(data.runs) and bool(_say_why_undecided(data)))
+    places = outcome == "does not survive", any(fails), undecided, "damage" in outcome, True
+    return places.index(True), min((factor for factor, *_ in ranked), default=np.inf)
 
 
 def _say_plainly(data: ReportData, doubtful: Sequence[str]) -> Iterator[tuple[str, str]]:
@@ -322,7 +358,8 @@ def build_conclusion(data: ReportData) -> Section:
         factors = f". Factors are multiples of the demand: {'; '.join(named)}" * bool(named)
         blocks.append(Grid(head, rows, f"Demand and capacity{factors}", "words"))
     blocks += map(TextBlock, _list_outdated(data))
-    return Section("Conclusion", [*blocks, _build_signatures(data.case.report)])
+    blocks += [] if data.is_part else [build_signatures(data.case.report)]
+    return Section("Conclusion", blocks)
 
 
 def _list_outdated(data: ReportData) -> Iterator[str]:
@@ -404,7 +441,7 @@ def _say_causes(ranges: Sequence[VerdictRange]) -> Iterator[str]:
         yield f"under {join_words(motions)}: {text}" if len(ranges) > 1 else text
 
 
-def _build_signatures(report: Mapping[str, str]) -> Grid:
+def build_signatures(report: Mapping[str, str]) -> Grid:
     """Build the lines to be signed, with the names and the date that are given."""
     rows = [
         (who.replace("_", " "), report.get(who, ""), report.get("date", "") * (who == "author"), "")

@@ -103,6 +103,21 @@ def tabulate_inputs(data: ReportData) -> Grid:
     return Grid((), rows, _CAPTION)
 
 
+def compare_inputs(parts: Mapping[str, ReportData]) -> Grid:
+    """Tabulate the inputs of several cases, once where they are the same, with their marks."""
+    tables = {name: tabulate_inputs(data).rows for name, data in parts.items()}
+    joined = list[Sequence[str]]()
+    for quantity in dict.fromkeys(row[0] for rows in tables.values() for row in rows):
+        own = {name: tuple(x for x in rows if x[0] == quantity) for name, rows in tables.items()}
+        if len({*own.values()}) == 1:
+            joined += next(iter(own.values()))
+            continue
+        texts = {k: ", ".join(f"{x[1]} ({x[2]})" for x in found) for k, found in own.items()}
+        differing = "; ".join(f"{name}: {text or 'none'}" for name, text in texts.items())
+        joined.append((quantity, differing, "differs"))
+    return Grid((), joined, _CAPTION)
+
+
 def _mark(given: bool) -> str:
     """Return the mark of a value that is given, or a default."""
     return "given" if given else "default"

@@ -116,7 +116,14 @@ def build_transverse(data: ReportData) -> list[TextBlock]:
 
 
 def describe_margin(data: ReportData) -> Iterator[str]:
-    """Yield the factors on the demands of an earthquake, the least first, maybe as ranges.
+    """Yield the factors on the demands of an earthquake, the least first, maybe as ranges."""
+    for k, (_, is_ranked, texts) in enumerate(rank_margins(data)):
+        rank = ("the least margin is ", "the next is ", "then follows ")[min(k, 2)] * is_ranked
+        yield from [*(f"{rank}{x}" for x in texts[:1]), *texts[1:]]
+
+
+def rank_margins(data: ReportData) -> list[tuple[float, bool, list[str]]]:
+    """Return what `_list_margins` yields, the least first.
 
     That at rest is among them where it is less than all. Where the least is across the plane, the
     next stands in the same sentence. What the head states is counted and not repeated.
@@ -132,9 +139,7 @@ def describe_margin(data: ReportData) -> Iterator[str]:
         _, is_ranked, texts = margins[0]
         first = "; ".join([across, *("in it " * is_ranked + x for x in texts[:1])])
         margins[: bool(texts)] = [(push / demand, True, [first, *texts[1:]])]
-    for k, (_, is_ranked, texts) in enumerate(margins):
-        rank = ("the least margin is ", "the next is ", "then follows ")[min(k, 2)] * is_ranked
-        yield from [*(f"{rank}{x}" for x in texts[:1]), *texts[1:]]
+    return margins
 
 
 def _list_margins(data: ReportData) -> Iterator[tuple[float, bool, list[str]]]:

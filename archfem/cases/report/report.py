@@ -1,18 +1,21 @@
 """Reports of cases, result folders and single histories."""
 
+from collections.abc import Sequence
+from dataclasses import replace
 from hashlib import sha256
 from importlib import import_module
 from pathlib import Path
 
 from archfem.cases.case import Case
-from archfem.cases.report.conclusion import list_facts
+from archfem.cases.report.conclusion import list_facts, list_joint_facts
 from archfem.cases.report.report_data import ReportData, build_live_page, build_player
-from archfem.cases.report.sections import build_sections
+from archfem.cases.report.sections import build_joint_sections, build_sections
 from archfem.cases.result_folder import ResultFolder
 from archfem.cases.run import Run
 from archfem.cases.toml_file import parse_tables
 from archfem.dynamics.history import History
 from archfem.errors import InvalidInput
+from archfem.masonry.structure import join_words
 from archfem.view.pages.document import Document, write_page
 from archfem.view.pages.player import Player
 from archfem.view.pages.word import write_word
@@ -22,26 +25,31 @@ from archfem.view.style import limit_width
 FIGURE_WIDTH = 128.0
 
 
-def write_report(data: ReportData, path: str | Path) -> Path:
-    """Write a report atomically, as HTML or, by its suffix, for Word."""
-    case = data.case
+def write_report(data: ReportData, path: str | Path, *others: ReportData) -> Path:
+    """Write a report of one or several cases atomically, as HTML or, by its suffix, for Word."""
+    cases = data, *others
     footer = "Written by archfem from the results named above; figures and numbers are theirs."
-    if data.runs:
+    if any(each.runs for each in cases):
         footer += " On paper a player shows the instant and the joint that it showed on the screen."
-    digest = sha256(case.text().encode()).hexdigest()[:12]
+    digest = sha256("".join(each.case.text() for each in cases).encode()).hexdigest()[:12]
     origin = f"report of archfem {import_module('archfem').__version__} · case {digest}"
-    head = case.title, origin, list_facts(data)
+    # cases of one title differ in their folders
+    parts = {f"{x.case.title} ({x.folder})": replace(x, is_part=True) for x in cases}
     with limit_width(FIGURE_WIDTH):
-        sections = build_sections(data)
-    document = Document(*head, sections, footer)
+        facts = list_joint_facts(parts) if others else list_facts(data)
+        sections = build_joint_sections(parts) if others else build_sections(data)
+    title = join_words([*dict.fromkeys(each.case.title for each in cases)])
+    document = Document(title, origin, facts, sections, footer)
     if Path(path).suffix.lower() == ".docx":
         return write_word(path, document)
     return write_page(path, document.page)
 
 
-def write_report_of_case(result: Run | ResultFolder, path: str | Path) -> Path:
-    """Write the report of the results of a case."""
-    return write_report(_collect_data(result), path)
+def write_report_of_case(
+    result: Run | ResultFolder, path: str | Path, others: Sequence[Run | ResultFolder] = ()
+) -> Path:
+    """Write the report of the results of a case, or one of several."""
+    return write_report(_collect_data(result), path, *map(_collect_data, others))
 
 
 def write_page_of_case(result: Run | ResultFolder, path: str | Path) -> Path:

@@ -55,6 +55,7 @@ class ReportData:
     folder: Path | None = None
     missing: tuple[str, ...] = ()  # names of the pairs of the suite without a run
     study_folders: Sequence[Path] = ()  # without any, that of the results, which may have one
+    is_part: bool = False  # of a report of several cases, with inputs and signatures of all
 
     @cached_property
     def studies(self) -> list[StudyFindings]:

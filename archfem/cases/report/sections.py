@@ -1,7 +1,7 @@
 """Sections of a report: inputs, structure, capacity, further results, methods, sources."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import nullcontext, suppress
 from csv import reader
 from dataclasses import replace
@@ -15,9 +15,9 @@ from archfem._display import DOUBT_MARK, NOTE_MARK
 from archfem._files import read_listed
 from archfem.cases.answers import Ratios, read_numbers
 from archfem.cases.defaults import describe_margins_at_rest
-from archfem.cases.report.conclusion import build_conclusion
+from archfem.cases.report.conclusion import build_conclusion, build_signatures, list_facts
 from archfem.cases.report.doubts import list_elastic_fill, list_ranges, list_varied, spans_run
-from archfem.cases.report.inputs import describe_value, tabulate_inputs
+from archfem.cases.report.inputs import compare_inputs, describe_value, tabulate_inputs
 from archfem.cases.report.outcomes import sentence
 from archfem.cases.report.report_data import STATIC_RESULTS, ReportData
 from archfem.cases.report.response import (
@@ -79,8 +79,23 @@ _METHODS = (
 )
 
 
+def build_joint_sections(parts: Mapping[str, ReportData]) -> list[Section]:
+    """Build the sections of a report of several cases: signatures, inputs, and each case."""
+    report = next(iter(parts.values())).case.report
+    sections = [Section("Inputs of all cases", [build_signatures(report), compare_inputs(parts)])]
+    for name, data in parts.items():
+        own = [replace(each, level=each.level + 1) for each in _build_case_sections(data)]
+        sections += [Section(name, [Grid((), list_facts(data))]), *own]
+    return number_captions(sections)
+
+
 def build_sections(data: ReportData) -> list[Section]:
-    """Build all sections of a report; those without any result are left out."""
+    """Build all sections of a report, with numbered captions."""
+    return number_captions(_build_case_sections(data))
+
+
+def _build_case_sections(data: ReportData) -> list[Section]:
+    """Build all sections of a case; those without any result are left out."""
     studies = [piece for each in data.studies for piece in _build_study(data, each)]
     sections = [
         build_conclusion(data),
@@ -99,8 +114,7 @@ def build_sections(data: ReportData) -> list[Section]:
     ]
     # a heading of subsections has no pieces of its own
     followed = [*(section.level for section in sections[1:]), 2]
-    kept = [s for s, level in zip(sections, followed, strict=True) if s.pieces or level > s.level]
-    return number_captions(kept)
+    return [s for s, level in zip(sections, followed, strict=True) if s.pieces or level > s.level]
 
 
 def number_captions(sections: Sequence[Section]) -> list[Section]:
@@ -155,7 +169,8 @@ def build_input_section(data: ReportData) -> Section:
         words = "elastic in histories: it carries tension, and neither yields nor slides inside"
         assumptions.insert(2, ("fill", f"{words}; its E ({', '.join(fill)}) is among the inputs"))
     table = Grid((), assumptions, "Assumptions, units and signs")
-    return Section("Inputs and assumptions", [tabulate_inputs(data), table])
+    inputs = [] if data.is_part else [tabulate_inputs(data)]
+    return Section("Inputs and assumptions", [*inputs, table])
 
 
 def _describe_joints(data: ReportData) -> str:
