@@ -16,13 +16,7 @@ from archfem.cases.case import Case
 from archfem.cases.result_text import mark_remarks, record_doubts
 from archfem.cases.run import HISTORY_FILE, load_finished_run
 from archfem.commands.cli import ExitCode
-from archfem.commands.run import (
-    Command,
-    doubt_code,
-    keep_attempt,
-    name_group,
-    write_results,
-)
+from archfem.commands.run import Command, doubt_code, keep_attempt, name_group, write_results
 from archfem.dynamics.collapse_state import (
     DISLOCATION,
     FALLEN_STATES,

@@ -965,7 +965,8 @@ def test_a_report_of_several_folders_has_the_worst_verdict_and_the_inputs_once(
     words = " ".join(words_of(page).split())
     worst = f"verdict The worst of 2 cases is '{slender}': "
     assert f"{worst}By the kinematic assessment it does not withstand" in words
-    assert f"margin The least of all is {ratios[1]}, of '{slender}'." in words
+    least = [f"{ratio} of '{name}'" for ratio, name in zip(ratios, (broad, slender), strict=True)]
+    assert f"margin The least margins are {least[1]} and {least[0]}." in words
     assert f"{broad} By the kinematic assessment it withstands" in words
     assert f"breadth {broad}: 0.9 m (given); {slender}: 0.3 m (given) differs" in words
     assert words.count("heights 1, 1 given") == words.count("place, date signature") == 1

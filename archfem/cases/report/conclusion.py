@@ -11,11 +11,7 @@ from archfem.cases import result_text
 from archfem.cases.answers import RESULTS, Row, Statement, read_numbers
 from archfem.cases.case import REPORT_KEYS
 from archfem.cases.report import margins
-from archfem.cases.report.demands import (
-    list_demands,
-    name_spectrum,
-    tabulate_demands,
-)
+from archfem.cases.report.demands import list_demands, name_spectrum, tabulate_demands
 from archfem.cases.report.doubts import (
     HISTORIES,
     STUDIES,
@@ -42,11 +38,7 @@ from archfem.cases.report.scales import find_first_failures, say_fragile
 from archfem.cases.report.study_findings import say_what_changes
 from archfem.cases.result_text import PushFactors
 from archfem.cases.run import CASE_FILE
-from archfem.dynamics.collapse_state import (
-    COLLAPSE_STATES,
-    FALLEN_STATES,
-    RANGE_REMEDY,
-)
+from archfem.dynamics.collapse_state import COLLAPSE_STATES, FALLEN_STATES, RANGE_REMEDY
 from archfem.dynamics.rigid_body.rocking_body import describe_first_fall
 from archfem.dynamics.verdict_range import UNVARIED, VerdictRange
 from archfem.dynamics.walls_across import SCALES_ACROSS
@@ -126,13 +118,11 @@ def list_joint_facts(parts: Mapping[str, ReportData]) -> list[tuple[str, str]]:
         for name, head in heads.items()
     }
     ranks = {name: _rank_verdict(data) for name, data in parts.items()}
-    worst, least = min(ranks, key=ranks.__getitem__), min(ranks, key=lambda name: ranks[name][1])
+    worst, listed = min(ranks, key=ranks.__getitem__), list[str]()
+    for name, (_, least) in sorted(ranks.items(), key=lambda each: each[1][1]):
+        listed.append(f"{format_ratio(least) if least < np.inf else 'not known'} of '{name}'")
     facts = [(answer, f"The worst of {len(parts)} cases is '{worst}': {said.pop(worst)}")]
-    if unknown := [f"'{name}'" for name, rank in ranks.items() if rank[1] == np.inf]:
-        facts.append((margin, f"None is known of {join_words(unknown)}."))
-    if len(unknown) < len(parts):
-        of_all = f"The least of all is {format_ratio(ranks[least][1])}, of '{least}'."
-        facts.append((margin, of_all))
+    facts.append((margin, f"The least margins are {join_words(listed)}."))
     return [*signed, *facts, *said.items()]
 
 

@@ -130,9 +130,11 @@ def rank_margins(data: ReportData) -> list[tuple[float, bool, list[str]]]:
     """
     margins = sorted(_list_margins(data), key=lambda each: each[0])
     at_rest = list_margins_at_rest(data.case.structure, data.case.limit.strength)
+    least = min((each[0] for each in margins), default=np.inf)
     for factor, of in sorted(at_rest)[:1]:
-        if factor < min((each[0] for each in margins), default=np.inf):
-            margins.insert(0, (factor, bool(margins), [f"{format_ratio(factor)} at rest, of {of}"]))
+        if factor < least:  # alone it has no rank
+            ranked = (factor, True) if least < np.inf else (np.inf, False)
+            margins.insert(0, (*ranked, [f"{format_ratio(factor)} at rest, of {of}"]))
     push, demand = find_unchecked_push(data) or (np.nan, 0.0)
     if margins and push < demand * margins[0][0]:
         across = f"{push / demand:.3g} across the plane of the drawing, which was not checked"

@@ -9,7 +9,7 @@ from pathlib import Path
 from archfem.cases.case import Case
 from archfem.cases.report.conclusion import list_facts, list_joint_facts
 from archfem.cases.report.report_data import ReportData, build_live_page, build_player
-from archfem.cases.report.sections import build_joint_sections, build_sections
+from archfem.cases.report.sections import build_joint_sections, build_sections, number_captions
 from archfem.cases.result_folder import ResultFolder
 from archfem.cases.run import Run
 from archfem.cases.toml_file import parse_tables
@@ -39,7 +39,7 @@ def write_report(data: ReportData, path: str | Path, *others: ReportData) -> Pat
         facts = list_joint_facts(parts) if others else list_facts(data)
         sections = build_joint_sections(parts) if others else build_sections(data)
     title = join_words([*dict.fromkeys(each.case.title for each in cases)])
-    document = Document(title, origin, facts, sections, footer)
+    document = Document(title, origin, facts, number_captions(sections), footer)
     if Path(path).suffix.lower() == ".docx":
         return write_word(path, document)
     return write_page(path, document.page)

@@ -84,17 +84,12 @@ def build_joint_sections(parts: Mapping[str, ReportData]) -> list[Section]:
     report = next(iter(parts.values())).case.report
     sections = [Section("Inputs of all cases", [build_signatures(report), compare_inputs(parts)])]
     for name, data in parts.items():
-        own = [replace(each, level=each.level + 1) for each in _build_case_sections(data)]
+        own = [replace(each, level=each.level + 1) for each in build_sections(data)]
         sections += [Section(name, [Grid((), list_facts(data))]), *own]
-    return number_captions(sections)
+    return sections
 
 
 def build_sections(data: ReportData) -> list[Section]:
-    """Build all sections of a report, with numbered captions."""
-    return number_captions(_build_case_sections(data))
-
-
-def _build_case_sections(data: ReportData) -> list[Section]:
     """Build all sections of a case; those without any result are left out."""
     studies = [piece for each in data.studies for piece in _build_study(data, each)]
     sections = [
