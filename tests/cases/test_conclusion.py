@@ -693,6 +693,12 @@ def test_the_verdict_of_several_cases_is_the_worst_and_names_its_case(case):
         vars(data)["transverse_push"] = np.nan
         check = answers.Ratios("linear", ["right"], ratio or 1.0, ratio or 1.0)
         vars(data)["statements"] = {"assessment": state("assessment", check)} if ratio else {}
+    lorry = answers.Row("rating", "LM1", "fails", "0.8", {"passes": False})
+    load = answers.Row("limit analysis", "a load", "", "1.2", PushFactors(1.2, 1.2)._asdict())
+    for name, row, rank in (("rating", lorry, (1, 0.8)), ("limit", load, (4, 1.2))):
+        static = ReportData(case, {})
+        vars(static)["statements"] = {name: answers.Statement([], [row])}
+        assert conclusion._rank_verdict(static) == rank
     order = sorted(parts, key=lambda name: conclusion._rank_verdict(parts[name]))
     assert order[:4] == ["fallen 2.0", "stands 0.9", "mechanism 2.0", "dislocated 2.0"]
     assert order[4:] == ["stands 1.4", "stands 1.5", "stands None"]

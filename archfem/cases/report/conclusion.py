@@ -130,14 +130,16 @@ def _rank_verdict(data: ReportData) -> tuple[int, float]:
     """Return the place of a case among others, the worst first, and its least margin."""
     ranked, outcome = margins.rank_margins(data), find_worst(data)[1] if data.runs else ""
     rows = [row for each in data.statements.values() for row in each.rows]
+    rows = [row for row in rows if "passes" in row.numbers]
     loads = read_numbers(PushFactors, data.statements.get("limit"))
-    fails = [factor < 1.0 for factor, is_ranked, _ in ranked if is_ranked]
+    factors = [load.least for load in loads if not load.site]
+    fails = [x < 1.0 for x, is_ranked, _ in ranked if is_ranked] + [x < 1.0 for x in factors]
     fails += [least < 1.0 for least, *_ in margins.say_less(data)]
-    fails += [load.least < 1.0 for load in loads if not load.site]
-    fails += [row.numbers.get("passes") is False for row in rows]
+    fails += [not row.numbers["passes"] for row in rows]
+    factors += [*(x for x, *_ in ranked), *(float(x.factor) for x in rows if x.factor != "-")]
     undecided = outcome.startswith("may") or (bool(data.runs) and bool(_say_why_undecided(data)))
     places = outcome == "does not survive", any(fails), undecided, "damage" in outcome, True
-    return places.index(True), min((factor for factor, *_ in ranked), default=np.inf)
+    return places.index(True), min(factors, default=np.inf)
 
 
 def _say_plainly(data: ReportData, doubtful: Sequence[str]) -> Iterator[tuple[str, str]]:
