@@ -43,6 +43,7 @@ ALLOWED_IN = {
     "pyvista": "view.films",
     "imageio": "view.films",
     "imageio_ffmpeg": "view.films",
+    "highspy": "limit.linear_programme",
     "jinja2": "view.pages",
     "ifcopenshell": "masonry.survey.ifc",
     "docx": "view.pages.word",

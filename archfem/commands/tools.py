@@ -284,7 +284,7 @@ def _diagnose_requirements() -> Iterator[Diagnosis]:
         return
     for line in requirements:
         # Requirements of extras have a marker behind the version, and do not match.
-        if match := re.match(r"([\w.-]+)(?:\[.*\])?>=([\d.]+)$", line):
+        if match := re.match(r"([\w.-]+)(?:\[.*\])?(?:<[\d.]+,)?>=([\d.]+)$", line):
             yield _diagnose_package(*match.groups())
 
 

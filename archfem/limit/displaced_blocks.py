@@ -498,7 +498,7 @@ def _solve_static(
     equations = sparse.diags(bodies.units) @ balance, -bodies.units * dead / unit
     if (result := solve_linear(cost, bounds, equations, (limits, strength))) is None:
         return None
-    velocity = -bodies.units * np.array(result.eqlin.marginals)
+    velocity = -bodies.units * result.equation_multipliers
     return float(result.x[-1]), velocity, result.x
 
 

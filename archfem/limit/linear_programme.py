@@ -19,9 +19,10 @@ from copy import copy
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
 
+import highspy
 import numpy as np
+from highspy import HighsBasis, HighsBasisStatus, HighsModelStatus
 from scipy import sparse
-from scipy.optimize import OptimizeResult, linprog
 from scipy.sparse import csgraph
 from scipy.sparse.linalg import splu
 
@@ -44,37 +45,83 @@ HELD_SHARE = 1.0 - 1e-6
 # with 3000 unknowns it takes 0.1 to 4 s [s]
 STALLED_AFTER = 15.0
 
+# Number of the primal simplex method among the strategies of HiGHS
+PRIMAL_SIMPLEX = 4
+
 
 class NoEquilibrium(DidNotConverge):
     """The programme is infeasible: no forces within the limits balance the loads."""
 
 
+@dataclass(frozen=True, eq=False)
+class LinearSolution:
+    """Optimum of a linear programme, from which the next one of the same unknowns starts."""
+
+    x: Array  # unknowns (n,)
+    equation_multipliers: Array  # derivatives of the objective by the right sides
+    limit_multipliers: Array
+    cost: Array  # (n,)
+    basis: HighsBasis
+
+
 def solve_linear(
     cost: Array,
     bounds: Array,
-    equations: tuple[sparse.csr_matrix | Array, Array],
-    limits: tuple[sparse.csr_matrix | None, Array | None] = (None, None),
-    method: str = "highs-ds",
-) -> OptimizeResult | None:
-    """Minimise a cost under equations and limits A x <= b; None where it is unbounded."""
+    equations: tuple[sparse.csr_matrix, Array],
+    limits: tuple[sparse.csr_matrix, Array],
+    solver: str = "simplex",
+    known: LinearSolution | None = None,
+) -> LinearSolution | None:
+    """Minimise a cost under equations and limits A x <= b; None where it is unbounded.
+
+    The simplex method starts from the basis of a known solution, in which further rows are slack.
+    """
+    count, high = len(equations[1]), np.concatenate([equations[1], limits[1]])
+    low = np.where(np.arange(len(high)) < count, high, -np.inf)
+    matrix = sparse.vstack([equations[0], limits[0]], format="csc")
+    sizes, entries = (*matrix.shape[::-1], matrix.nnz), (matrix.indptr, matrix.indices, matrix.data)
+    # by columns, a minimum without a constant, of continuous unknowns
+    programme = *sizes, 1, 1, 0.0, cost, *bounds.T, low, high, *entries, np.zeros(len(cost))
     # Residuals are of order one. Where round-off stops the solver, presolve changes its path; then
     # a coarser tolerance lets it end, or the interior point. Without a cost presolve comes first:
     # it finds at once that fine pieces of fill do not stand, where the simplex method stalls, and
     # where that stalls all the same, the least residual decides (`minimise_residual`).
-    first = (method, not np.any(cost), 1e-9)
-    more = (method, True, 1e-9), (method, True, 1e-8), ("highs-ipm", True, 1e-8)
+    first = (solver, "off" if np.any(cost) else "on", 1e-9)
+    more = (solver, "on", 1e-9), (solver, "on", 1e-8), ("ipm", "on", 1e-8)
     for way, presolve, tolerance in dict.fromkeys((first, *more)):
+        highs = highspy.Highs()
         feasibility = (f"{side}_feasibility_tolerance" for side in ("primal", "dual"))
-        options = {**dict.fromkeys(feasibility, tolerance), "presolve": presolve}
-        options |= {} if np.any(cost) else {"time_limit": STALLED_AFTER}
-        result = linprog(cost, *limits, *equations, bounds, way, options=options)
-        if result.status == 2:
+        options = {"output_flag": False, **dict.fromkeys(feasibility, tolerance)}
+        options |= {"time_limit": np.inf if np.any(cost) else STALLED_AFTER}
+        for name, value in (options | {"solver": way, "presolve": presolve}).items():
+            highs.setOptionValue(name, value)
+        highs.passModel(*programme)
+        if known and presolve == "off":
+            _start_from(highs, known, cost)
+        highs.run()
+        if (status := highs.getModelStatus()) == HighsModelStatus.kInfeasible:
             raise NoEquilibrium("no state of equilibrium fulfils the limits")
-        if result.status in (0, 3):
-            return result if result.status == 0 else None
-        if "time_limit" in options and result.status == 1:
+        if status == HighsModelStatus.kUnbounded:
+            return None
+        if status == HighsModelStatus.kOptimal:
+            found = highs.getSolution()
+            x, duals = np.array(found.col_value), np.array(found.row_dual)
+            return LinearSolution(x, duals[:count], duals[count:], cost, highs.getBasis())
+        if status == HighsModelStatus.kTimeLimit:
             break
-    raise DidNotConverge(f"the linear programme found no state: {result.message}")
+    words = highs.modelStatusToString(status)
+    raise DidNotConverge(f"the linear programme found no state: {words}")
+
+
+def _start_from(highs: highspy.Highs, known: LinearSolution, cost: Array) -> None:
+    """Set the basis of a known solution, and the method for which it is feasible."""
+    basis, rows = highspy.HighsBasis(), list(known.basis.row_status)
+    basis.valid, basis.col_status = True, known.basis.col_status
+    basis.row_status = rows + [HighsBasisStatus.kBasic] * (highs.getNumRow() - len(rows))
+    highs.setBasis(basis)
+    # it is primal feasible where costs alone have changed, and dual feasible where limits have
+    if not np.array_equal(known.cost, cost):
+        highs.setOptionValue("simplex_strategy", PRIMAL_SIMPLEX)
 
 
 @dataclass(frozen=True, eq=False)
@@ -278,6 +325,8 @@ class Programme:
     columns: sparse.csr_matrix | None = None  # D (3 n_free, k); None without z
     unknown_cost: Array = field(default_factory=lambda: np.zeros(0))  # b (k,)
     upper_bounds: Array = field(default_factory=lambda: np.zeros(0))  # c (k,), infinite for none
+    # whether the solver starts from the last optimum: which of many is found depends on that then
+    in_search: bool = False
 
     def with_unknowns(
         self, columns: sparse.csr_matrix, cost: Array, upper_bound: float = np.inf
@@ -334,6 +383,8 @@ class Programme:
             limits = limits.joined(crushing_cuts(crushes, self.crushing[crushes], self.crushing))
         columns = sparse.csr_matrix((len(self.load), 0)) if self.columns is None else self.columns
         reduced = self.blocks.reduce(columns, self.friction, self.cohesion > 0.0)
+        if not self.in_search:
+            reduced.known.clear()
         # As tangents of a parabola the cuts converge quadratically, in about six rounds, where one
         # state is optimal. Where many are, as in walls, each round may find another one: once the
         # optimum is known, that of least compressions is sought.
@@ -421,6 +472,8 @@ class ReducedBalance:
             self._factors = splu(passed[:, self._is_pivot].tocsc())
             self._map = self._map + self._pass_on(passed @ self._map)
         self._equations = self._balance @ self._map
+        # the last solutions by their count of rows, from which the next one starts
+        self.known: dict[int, LinearSolution] = {}
         self._slides = self._pivots[np.isfinite(friction[self._pivots])]
         self._rows = _pivot_limits(friction, self._pivots, self._slides)
         self._limits = self._rows @ self._map
@@ -428,6 +481,7 @@ class ReducedBalance:
     def with_columns(self, columns: sparse.csr_matrix) -> "ReducedBalance":
         """Return the balance with further unknowns z."""
         passed, other = self._pass_on(columns[~self._kept]), copy(self)
+        other.known = {}
         direct = columns[self._kept] + self._balance @ passed
         other._map = sparse.hstack([self._map, passed], format="csr")
         other._equations = sparse.hstack([self._equations, direct], format="csr")
@@ -468,11 +522,13 @@ class ReducedBalance:
             bounds = np.concatenate([bounds, further.bounds - further.rows @ constant])
             reduced = sparse.vstack([reduced, further.rows @ self._map], format="csr")
         load = programme.load[self._kept] - self._balance @ constant
-        method = "highs-ipm" if len(load) > large and cost.any() else "highs-ds"
-        equations, rows = (self._equations, load), (reduced, bounds)
-        result = solve_linear(cost, self._bounds(programme), equations, rows, method)
-        if result is None:
+        count = len(load) + len(bounds)
+        known = {rows: each for rows, each in self.known.items() if rows <= count}
+        solver = "ipm" if len(load) > large and cost.any() and not known else "simplex"
+        given = cost, self._bounds(programme), (self._equations, load), (reduced, bounds), solver
+        if (result := solve_linear(*given, next(reversed(known.values()), None))) is None:
             return None
+        self.known = known | {count: result}
         forces, unknowns = self._map @ result.x + constant, result.x[self._count :]
         multipliers = self._multipliers(result, force_cost, further.rows)
         value = float(force_cost @ forces + programme.unknown_cost @ unknowns)
@@ -489,15 +545,15 @@ class ReducedBalance:
         return bounds
 
     def _multipliers(
-        self, result: OptimizeResult, force_cost: Array, further: sparse.csr_matrix
+        self, result: LinearSolution, force_cost: Array, further: sparse.csr_matrix
     ) -> Array:
         """Return the multipliers of the balance of all blocks (3 n_free,)."""
         every = np.empty(len(self._kept))
-        every[self._kept] = result.eqlin.marginals
+        every[self._kept] = result.equation_multipliers
         if len(self._pivots):
             # the forces of pivots are unknowns without bounds: their reduced costs vanish
-            cost = force_cost - self._balance.T @ result.eqlin.marginals
-            own, others = np.split(result.ineqlin.marginals, [self._rows.shape[0]])
+            cost = force_cost - self._balance.T @ result.equation_multipliers
+            own, others = np.split(result.limit_multipliers, [self._rows.shape[0]])
             cost -= self._rows.T @ own + further.T @ others
             every[~self._kept] = self._factors.solve(cost[self._is_pivot], trans="T")
         return every

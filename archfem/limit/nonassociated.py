@@ -383,7 +383,7 @@ def _search(
     programme: Programme, start: Optimum | None, scale: float
 ) -> tuple[Optimum | None, NonassociatedBounds]:
     """Return the result of `search_nonassociated` for a programme as it is."""
-    found, interrupted = _SearchState(), False
+    found, interrupted, programme = _SearchState(), False, replace(programme, in_search=True)
     associated = -np.inf if start is None else start.value
     try:
         _search_solutions(programme, start, found)
