@@ -39,8 +39,11 @@ OUTPUT_KEYS: toml_file.Table = {"joints": [(int, str)], "animation": bool, "free
 
 # Who signs what, against which demand: head and conclusion of a report
 REPORT_KEYS: toml_file.Table = dict.fromkeys(
-    ("project", "place", "author", "checked_by", "date", "norm", "demand"), str
+    ("project", "place", "author", "checked_by", "date", "version", "norm", "demand"), str
 )
+
+# The same, and of which pairs of a suite it shows the run: "worst" or "all"
+_REPORT_KEYS: toml_file.Table = {**REPORT_KEYS, "pairs": str}
 
 
 @dataclass(frozen=True)
@@ -347,7 +350,7 @@ def section_keys() -> Mapping[str, toml_file.Table]:
         "verdict": VERDICT_KEYS,
         "dead_load": DEAD_LOAD_KEYS,
         "output": OUTPUT_KEYS,
-        "report": REPORT_KEYS,
+        "report": _REPORT_KEYS,
     }
 
 
@@ -381,9 +384,11 @@ def sign(settings: dict[str, Any], changes: Sequence[str]) -> dict[str, Any]:
 
 def _read_report(settings: toml_file.Table) -> dict[str, str]:
     """Return the keys of [report]."""
-    report = toml_file.check_table(settings.get("report", {}), REPORT_KEYS, "report")
+    report = toml_file.check_table(settings.get("report", {}), _REPORT_KEYS, "report")
     for key, words in report.items():
         check_words(words, f"report.{key}")
+    if (pairs := report.get("pairs", "worst")) not in ("worst", "all"):
+        raise InvalidInput(f'report.pairs = {pairs!r} must be "worst" or "all"')
     return report
 
 

@@ -104,7 +104,9 @@ def _draw_state(panels: Sequence["PartPanel"], joints: xr.Dataset, label: str, *
         panel.axes.plot(places, own["eccentricity"].values, label=label, **look)
 
 
-def draw_envelopes(runs: Mapping[str, History], dead: xr.Dataset | None) -> list[Figure]:
+def draw_envelopes(
+    runs: Mapping[str, History | Sequence[History]], dead: xr.Dataset | None
+) -> list[Figure]:
     """Draw the envelopes of any number of runs, in as many figures as line styles require."""
     # of about equal numbers: the last run is not alone in a figure
     number = -(-len(runs) // len(Colour.LINES)) or 1

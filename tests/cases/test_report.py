@@ -88,8 +88,8 @@ def kept(carried_out, undrawn, tmp_path):
 def test_a_suite_has_a_report_with_a_player_for_each_pair(kept, capsys):
     with replace_results(kept, "modes", read_file_list(kept)["run"].inputs) as draft:
         (draft / "modes.txt").write_text("mode 1 at 3.14 Hz")
-    page = kept / "page.html"
-    assert af.commands.main(["report", str(kept), "--out", str(page)]) == 0
+    page, every = kept / "page.html", ["--set", "report.pairs=all"]
+    assert af.commands.main(["report", str(kept), "--out", str(page), *every]) == 0
     assert f"wrote {page}" in capsys.readouterr().out
     read = read_page(page.read_text(encoding="utf-8"))
     words = " ".join(read.words)
@@ -106,7 +106,8 @@ def test_a_suite_has_a_report_with_a_player_for_each_pair(kept, capsys):
     assert ", damping, size of the motions, time step and fidelity were not varied; displ" in words
     assert "another case" not in words
     case = af.Case.read(kept / "case.toml")
-    assert sha256(case.text().encode()).hexdigest() in words
+    digest = sha256(case.signed(["report.pairs=all"]).text().encode()).hexdigest()
+    assert digest in words
     # the digest and the table of inputs stand in place of the file, which is beside the report
     assert "case.toml" in words
     assert "[structure]" not in words
@@ -505,11 +506,12 @@ def words_of(path):
 
 def test_who_signs_is_in_the_head_and_changes_no_result(kept, unplotted, capsys):
     given = ["--set", "report.norm=NTC 2018", "--set", "report.author=A. Mason"]
+    given += ["--set", "report.version=issue 2"]
     assert af.commands.main(["report", str(kept), *given]) == 0
     words = words_of(kept / "report.html")
     head = words.partition("Conclusion")[0]
     # in the order of a title block, whatever the order in which they are given
-    assert 0 < head.index("A. Mason") < head.index("NTC 2018")
+    assert 0 < head.index("A. Mason") < head.index("issue 2") < head.index("NTC 2018")
     # the results are those of the case without it
     case = af.Case.read(kept / "case.toml")
     assert case.signed(["report.author=A. Mason"]).hash_inputs() == case.hash_inputs()
@@ -521,6 +523,8 @@ def test_who_signs_is_in_the_head_and_changes_no_result(kept, unplotted, capsys)
     capsys.readouterr()
     assert af.commands.main(["report", str(kept), "--set", "structure.breadth=2"]) == 1
     assert "'structure.breadth' changes results: run the case again" in capsys.readouterr().err
+    assert af.commands.main(["report", str(kept), "--set", "report.pairs=most"]) == 1
+    assert 'report.pairs = \'most\' must be "worst" or "all"' in capsys.readouterr().err
     # before the folder is opened, as its histories take their time
     assert af.commands.main(["report", str(kept / "none"), "--set", "report.autor=me"]) == 1
     assert "did you mean 'author'" in capsys.readouterr().err
@@ -540,11 +544,14 @@ def test_a_report_for_word_has_the_sections_of_the_page(
     docx = pytest.importorskip("docx")
     monkeypatch.setattr(FigureBlock, "raster", lambda _: PIXEL)
     path = tmp_path / "report.docx"
-    assert af.commands.main(["report", str(carried_out), "--out", str(path)]) == 0
+    every = ["--set", "report.pairs=all"]
+    assert af.commands.main(["report", str(carried_out), "--out", str(path), *every]) == 0
     assert "wrote" in capsys.readouterr().out
     found = docx.Document(str(path))
     headings = [each.text for each in found.paragraphs if each.style.name.startswith("Heading")]
-    words = words_of(af.cases.open_results(carried_out).report(tmp_path / "report.html"))
+    page = tmp_path / "report.html"
+    assert af.commands.main(["report", str(carried_out), "--out", str(page), *every]) == 0
+    words = words_of(page)
     assert len(headings) > 5
     # the players are pictures
     captions = [each.text for each in found.paragraphs if each.style.name == "Caption"]

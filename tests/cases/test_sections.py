@@ -107,7 +107,7 @@ def test_the_doubts_of_several_runs_stand_in_one_table(piers, runs, monkeypatch)
         "second": [Doubt("steps of {:g} ms are long", "", (2.0,)), Doubt("it slips")],
     }
     made = {name: run.with_doubts(stated[name]) for name, run in runs.items()}
-    case = SimpleNamespace(structure=piers, suite={}, title="piers")
+    case = SimpleNamespace(structure=piers, suite={}, title="piers", report={})
     data = report_data.ReportData(case, made)
     grid = response._build_suite_response(data)[-1]
     assert grid.caption == "Doubts of the runs"
@@ -254,18 +254,43 @@ def test_a_report_of_several_runs_has_a_section_for_each(runs, piers, monkeypatc
     (section,) = response.build_run_sections(one)
     assert section.pieces[-1] == "one of 1 players"
     assert section.level == 2
-    pairs = report_data.ReportData(SimpleNamespace(**vars(case) | {"suite": {}}), runs)
+    several = vars(case) | {"suite": {}, "report": {"pairs": "all"}}
+    pairs = report_data.ReportData(SimpleNamespace(**several), runs)
     assert response.build_ground_section(pairs).title == "Ground motions"
     *_, first, second = response.build_run_sections(pairs)
     assert (first.pieces[-1], second.pieces[-1]) == ("one of 2 players",) * 2
     assert (first.level, second.level) == (3, 3)
 
 
+def test_a_report_of_several_runs_shows_the_worst_of_them(runs, piers, monkeypatch):
+    """The first is pushed twice as hard as the second; an outcome counts before a displacement."""
+    monkeypatch.setattr(response, "build_player", lambda *given: f"one of {given[-1]} players")
+    case = SimpleNamespace(**vars(made_case(piers)) | {"suite": {}})
+    data = report_data.ReportData(case, runs)
+    every, title, worst = response.build_run_sections(data)
+    assert (title.title, worst.title, worst.level) == ("Response: the worst pair", "first", 3)
+    assert worst.pieces[-1] == "one of 1 players"
+    for table in every.pieces[:2]:  # outcomes and mechanisms
+        assert [row[0] for row in table.rows] == ["first", "second"]
+    worse = SimpleNamespace(verdict=replace(runs["second"].verdict, outcome="fallen"))
+    data = report_data.ReportData(case, runs | {"second": worse})
+    assert outcomes.find_worst_run(data) == "second"
+
+
+def test_a_report_of_many_runs_draws_the_worst_beside_the_others(runs, piers):
+    """There are fewer line styles than runs."""
+    many = {"first": runs["first"], **{f"{k}": runs["second"] for k in range(6)}}
+    case = SimpleNamespace(structure=piers, suite={}, report={})
+    assert len(response._build_envelopes(report_data.ReportData(case, many))) == 1
+    case.report["pairs"] = "all"
+    assert len(response._build_envelopes(report_data.ReportData(case, many))) == 2
+
+
 def test_tables_and_figures_of_all_pairs_say_what_they_show(runs, piers, monkeypatch):
     """Each of two figures has its part named."""
     monkeypatch.setattr(response.FigureBlock, "of", lambda figure, caption: caption)
     monkeypatch.setattr(response, "draw_envelopes", lambda *_: [Figure(), Figure()])
-    data = report_data.ReportData(SimpleNamespace(structure=piers), runs)
+    data = report_data.ReportData(SimpleNamespace(structure=piers, report={"pairs": "all"}), runs)
     _, *captions = response._build_suite_response(data)
     assert [text.rpartition("; ")[2] for text in captions] == [
         "part 1 of 2 of the motions",

@@ -7,6 +7,7 @@ from archfem.cases.report.doubts import peak_of_ground
 from archfem.cases.report.report_data import ReportData
 from archfem.dynamics.collapse_state import COLLAPSE_STATES, CollapseState
 from archfem.dynamics.history import History
+from archfem.dynamics.verdict import Verdict
 from archfem.dynamics.verdict_range import HALF_STEP, UNVARIED
 from archfem.masonry.structure import Structure, join_words
 from archfem.units import Ends
@@ -29,9 +30,19 @@ _VERBS = {
 
 def find_worst(data: ReportData) -> tuple[str, str]:
     """Return the worst outcome of the runs as a verb and in plain words."""
-    verdicts = [run.verdict for run in data.runs.values()]
-    outcomes = {"unknown" if x.incomplete else x.outcome for x in verdicts}
+    outcomes = {_name(run.verdict) for run in data.runs.values()}
     return next(words for outcome, words in _VERBS.items() if outcome in outcomes)
+
+
+def find_worst_run(data: ReportData) -> str:
+    """Return the motion of the worst outcome, and of the largest displacement among these."""
+    order, found = [*_VERBS], {name: run.verdict for name, run in data.runs.items()}
+    return min(found, key=lambda x: (order.index(_name(found[x])), -found[x].displacement))
+
+
+def _name(verdict: Verdict) -> str:
+    """Return the outcome of a run, which is unknown where it was broken off."""
+    return "unknown" if verdict.incomplete else verdict.outcome
 
 
 def describe_outcomes(data: ReportData) -> Iterator[str]:

@@ -125,6 +125,11 @@ class ReportData:
         """Names of the pairs of the case's suite, of which each may have results of its own."""
         return tuple((self.case.suite or {}).get("pairs", ()))
 
+    @property
+    def shows_all(self) -> bool:
+        """Whether each pair has its run shown, and not the worst alone."""
+        return self.case.report.get("pairs") == "all"
+
     def list_parts(self, name: str) -> dict[str, str]:
         """List the files of a result in the folder, by pair; that of all pairs is under ""."""
         places = {"": name, **{pair: f"{pair}/{name}" for pair in self.pairs}}

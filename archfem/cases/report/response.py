@@ -1,6 +1,6 @@
 """Sections of a report on ground motions, on the response of each run, and on its checks."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -11,7 +11,7 @@ from archfem.cases import result_text
 from archfem.cases.case import Case
 from archfem.cases.motion_keys import find_matched_band
 from archfem.cases.report.motion_rules import find_target, tabulate_checks
-from archfem.cases.report.outcomes import describe_lost, list_lost, sentence
+from archfem.cases.report.outcomes import describe_lost, find_worst_run, list_lost, sentence
 from archfem.cases.report.report_data import ReportData, build_player
 from archfem.dynamics.collapse_state import FALLEN_STATES
 from archfem.dynamics.history import History
@@ -26,7 +26,7 @@ from archfem.view.collapse import draw_fall
 from archfem.view.histories import draw_envelopes
 from archfem.view.motions import draw_motion, draw_spectra, draw_suite
 from archfem.view.pages.document import FigureBlock, Grid, Section, TextBlock
-from archfem.view.style import limit_width
+from archfem.view.style import Colour, limit_width
 
 # Width of figures of which two stand side by side [mm]
 HALF_WIDTH = 84.0
@@ -96,12 +96,15 @@ def build_run_sections(data: ReportData) -> list[Section]:
     if data.case.suite is None:
         (name,) = data.runs
         return [Section("Response", _build_response(data, name, 1))]
+    title, shown = "Response: pair by pair", [*data.runs]
+    if not data.shows_all:
+        title, shown = "Response: the worst pair", [find_worst_run(data)]
     sections = [
         Section("Response: all pairs", [*_build_suite_response(data), *missing]),
-        Section("Response: pair by pair", []),
+        Section(title, []),
     ]
-    for name in data.runs:
-        sections.append(Section(name, _build_response(data, name, len(data.runs)), level=3))
+    for name in shown:
+        sections.append(Section(name, _build_response(data, name, len(shown)), level=3))
     return sections
 
 
@@ -121,7 +124,12 @@ def _build_response(data: ReportData, name: str, players: int) -> list[Any]:
 def _build_envelopes(data: ReportData) -> list[FigureBlock]:
     """Draw the envelopes of all runs."""
     caption = "Least and largest eccentricity of each joint; dotted under dead load"
-    figures = draw_envelopes(data.runs, data.dead)
+    runs: Mapping[str, History | Sequence[History]] = data.runs
+    if len(runs) > len(Colour.LINES) and not data.shows_all:
+        worst = find_worst_run(data)
+        others = [run for name, run in data.runs.items() if name != worst]
+        runs = {worst: data.runs[worst], f"{len(others)} other motions": others}
+    figures = draw_envelopes(runs, data.dead)
     for figure in figures:
         figure.suptitle("")  # which the head of the report says
     part = f"; part {{}} of {len(figures)} of the motions" if len(figures) > 1 else ""
@@ -202,9 +210,14 @@ def _build_mechanism(data: ReportData, run: History) -> list[Any]:
 def _build_suite_response(data: ReportData) -> list[Any]:
     """Build the table of all runs, and their envelopes."""
     (head, rows), columns = result_text.tabulate_runs(data.runs), len(result_text.RUN_COLUMNS)
-    # mechanisms are stated with each run
     caption = "Outcome, PGA, and the critical joint of each run"
     tables = [Grid(head[:columns], [row[:columns] for row in rows[:-1]], caption)]
+    if not data.shows_all:  # which state it with each run
+        first = [
+            (name, describe_mechanism(run.verdict).partition("; it ")[0])
+            for name, run in data.runs.items()
+        ]
+        tables.append(Grid(("pair", "first mechanism"), first, "First mechanisms", "words"))
     falls, structure = {k: run.verdict.fall for k, run in data.runs.items()}, data.case.structure
     lost = [
         (name, f"{len(fall.blocks)}", f"{fall.time:.2f} s", list_lost(structure, fall.blocks))

@@ -409,7 +409,7 @@ def _build_search(data: ReportData, name: str, pair: str) -> list[Any]:
         return blocks
     scales: dict[tuple[str, str], list[str]] = {}
     for step, scale, _, outcome, *_ in [*reader(runs.splitlines())][1:]:
-        scales.setdefault((step, outcome), []).append(scale)
+        scales.setdefault((step, outcome.partition(" (")[0]), []).append(scale)
     rows = [(*key, ", ".join(found)) for key, found in scales.items()]
     head = ("time step", "the structure", "at the scales [× the motion]")
     text = blocks[0].text.rpartition("\n\n")[0]
@@ -510,11 +510,9 @@ def build_source_section(data: ReportData) -> Section:
     own = library_versions()
     rows = [("computed with", text) for text in made]
     rows += [] if made == [own] else [("report written with", own)]
-    rows += [
-        (f"SHA-256 of the inputs: {name}", str(run.dataset.attrs["inputs"]))
-        for name, run in runs
-        if "inputs" in run.dataset.attrs
-    ]
+    digests = {name: str(run.dataset.attrs.get("inputs", ""))[:12] for name, run in runs}
+    inputs = ", ".join(f"{name} {text}" for name, text in digests.items() if text)
+    rows += [("inputs, begin of SHA-256", inputs)] * bool(inputs)
     rows.append(("SHA-256 of the case", sha256(data.case.text().encode()).hexdigest()))
     place = "case.toml in the folder of the results"
     rows.append(("the case as a file", place if data.folder else "attribute 'case' of the history"))

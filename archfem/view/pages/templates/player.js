@@ -92,7 +92,7 @@
       this.top = instants.some(([, name]) => name) ? 40 : 22; // names of instants stand below the title
       this.svg.replaceChildren();
       // paper has larger type: names grow upwards from the axes
-      element("text", { x: this.left, y: this.top - 8, dy: this.top > 22 ? "-1em" : 0 }, this.svg).textContent = title;
+      element("text", { x: this.left, y: this.top - 8, dy: this.top > 22 ? "-1.25em" : 0 }, this.svg).textContent = title;
       for (const tick of ticks) {
         element("path", { class: "zero", d: `M${this.left} ${this.y(tick)}H${this.right}` }, this.svg);
         element("text", { x: this.left - 6, y: this.y(tick), "text-anchor": "end", "dominant-baseline": "central" }, this.svg).textContent = words(tick);
