@@ -393,9 +393,9 @@ def note_ties(case: Case) -> list[str]:
                     size = scale * float(np.hypot(*ties[0].force)) / kN
                     of = f"{size:.3g} kN of the tie at {ties[0].block}"
                 side = name_side(sense)
-                notes.append(
-                    f"{NOTE_MARK}pushed to the {side}, the linear check is just passed with {of}"
-                )
+                of += f", for {case.structure.width:g} m of width, without a factor on the tie"
+                text = f"pushed to the {side}, the linear check is just passed with {of}"
+                notes.append(f"{NOTE_MARK}{text}")
     return notes
 
 

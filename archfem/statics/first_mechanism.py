@@ -130,7 +130,9 @@ def describe_ties(
         size = np.hypot(*tie.force) / kN
         need = f"{share * size:.4g}" if share > 1e-4 else "none"
         needs.append(f"{need} of the {size:.4g} kN of the tie at {tie.name}")
-    return f"pushed to the {name_side(placed.direction)}, alpha_0 needs {join_names(needs)}"
+    side, listed = name_side(placed.direction), join_names(needs)
+    width = f"for {placed.structure.width:g} m of width, without a factor on the tie"
+    return f"pushed to the {side}, alpha_0 needs {listed}, {width}"
 
 
 def find_stretches(

@@ -191,6 +191,7 @@ def test_a_tie_bears_what_equilibrium_needs(force, factor, pull):
     assert found.alpha_0 == pytest.approx(factor, rel=1e-4)
     says = f"pushed to the right, alpha_0 needs {pull} of the {force / 1e3:g} kN of the tie at bl"
     assert found.notes[0].startswith(says)
+    assert ", for 1 m of width, without a factor on the tie; along the" in found.notes[0]
     if pull == 5:  # what rocks is the block above, which the tie does not reach
         alone = af.kinematic_assessment(af.column(breadth=0.5, heights=[2.0]), SPECTRUM)
         assert found.d_0_star == pytest.approx(alone.d_0_star, rel=1e-4)
@@ -289,7 +290,7 @@ def test_a_check_that_alone_fails_is_in_every_headline_with_the_force_of_a_tie()
     needed = 160.0 * (1.35 * pga / 2.0 - 0.125)
     assert note_ties(case) == [
         "note: pushed to the right, the linear check is just passed with "
-        f"{needed:.3g} kN of the tie at block 1"
+        f"{needed:.3g} kN of the tie at block 1, for 1 m of width, without a factor on the tie"
     ]
     bounded = replace(free, displacement=replace(free.displacement, bounded=True))
     assert describe_margin([bounded]).endswith(": fails")  # an upper bound shows no passing
