@@ -132,16 +132,22 @@ def in_si_unit(values: Sequence[Any]) -> tuple[list[Any], str]:
     return list(values), ""
 
 
-def warn_if_in_g(acceleration: float, key: str) -> None:
-    """Warn of a peak acceleration [m/s²] so small that it is probably a multiple of g."""
+def describe_if_in_g(acceleration: float, key: str) -> str:
+    """Describe a peak acceleration [m/s²] that is probably a multiple of g; empty if not."""
     # up to about 0.05 g seismicity is very low (EN 1998-1, 3.2.1); a multiple of 9.80665 that was
     # given as one, as "0.03 g", has more than five digits
-    if acceleration < 0.5 and acceleration == float(f"{acceleration:.5g}"):
-        words = "%s is %.3g m/s², which is %.3g g: write %.3g m/s² if it is %.3g g"
-        in_g = acceleration * STANDARD_GRAVITY
-        logger.warning(
-            words, key, acceleration, acceleration / STANDARD_GRAVITY, in_g, acceleration
-        )
+    if acceleration >= 0.5 or acceleration != float(f"{acceleration:.5g}"):
+        return ""
+    return (
+        f"{key} is {acceleration:.3g} m/s², which is {acceleration / STANDARD_GRAVITY:.3g} g: "
+        f"write {acceleration * STANDARD_GRAVITY:.3g} m/s² if it is {acceleration:.3g} g"
+    )
+
+
+def warn_if_in_g(acceleration: float, key: str) -> None:
+    """Warn of a peak acceleration [m/s²] that is probably a multiple of g."""
+    if words := describe_if_in_g(acceleration, key):
+        logger.warning("%s", words)
 
 
 def format_mm(length: float) -> str:

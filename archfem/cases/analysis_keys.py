@@ -38,7 +38,7 @@ from archfem.statics.mechanism_assessment import (
     kinematic_assessment,
 )
 from archfem.statics.pushover import Pushover, Stop, pushover
-from archfem.units import G, MPa, kN, warn_if_in_g
+from archfem.units import G, MPa, describe_if_in_g, kN
 
 # Least weight of the heaviest axle of a vehicle that a case may give without its unit [N]: those of
 # lorries in kg are less
@@ -253,7 +253,8 @@ def parse_limit(table: Any, strength: float | None = None) -> LimitAnalysis:
         given = np.inf
     if (demand := values.get("demand")) is not None:
         check_number(demand, "limit.demand [m/s²]", minimum=1e-3)
-        warn_if_in_g(demand, "limit.demand")
+        if words := describe_if_in_g(demand, "limit.demand"):
+            raise InvalidInput(f"{words}, and else with the unit g")
     return LimitAnalysis(live, friction, given, fill, dead, demand)
 
 

@@ -201,6 +201,9 @@ def show_both_senses(
         slides = [doubt for doubt in once if doubt.cause.startswith("joints slide (")]
         if len(slides) > 1 and opposite is not None:  # that of the sense which is shown is enough
             once.remove(slides[0 if found is opposite else 1])
+        if site and site.least < 1.0 <= site.most:
+            words = "what is assumed of the fill decides whether the ground sets it in motion"
+            once.append(Doubt(words, "measure it, or run motions on fill in pieces"))
         show(found, "\n".join([f"{text}{left}", *result_text.mark_remarks(once)]), site, once)
 
 

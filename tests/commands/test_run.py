@@ -13,6 +13,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
+from backfilled import slender_bridge
 from pages import read_page
 
 import archfem as af
@@ -669,6 +670,21 @@ def test_limit_analysis_of_a_case(tmp_path, ring, unplotted, capsys):
     assert "(the same)" in said
     assert af.commands.main(["limit", str(path), "--set", "limit.vertical=-1"]) == 0
     assert "in the other sense" not in capsys.readouterr().out
+
+
+def test_a_push_that_the_fill_decides_is_in_doubt(tmp_path, capsys):
+    """The demand is within the range over what is assumed of the fill, or below all of it."""
+    path = tmp_path / "bridge.toml"
+    af.Analysis(slender_bridge(arch=(5.0, 1.5)), fidelity="rigid").write(path)
+    fill = af.limit.Fill(friction_angle=35.0)
+    found = af.collapse_factor(slender_bridge(arch=(5.0, 1.5)), live=af.BodyForce(1.0), fill=fill)
+    low, high = found.range
+    assert low < 0.9 * high
+    for demand, decides in ((0.5 * (low + high), True), (0.5 * low, False)):
+        given = f'limit={{horizontal=1, demand="{demand} g", fill={{friction_angle="35 degree"}}}}'
+        assert af.commands.main(["limit", str(path), "--set", given]) == 3  # the fill slides
+        said = "in doubt: what is assumed of the fill decides whether the ground sets it in motion"
+        assert (said in capsys.readouterr().out) == decides
 
 
 @pytest.mark.parametrize("push", [1.0, -1.0])
