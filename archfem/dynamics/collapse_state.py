@@ -222,6 +222,16 @@ def doubt_collapse(
         )
 
 
+def doubt_standing(structure: Structure, kinds: Iterable[str], residuals: Array) -> Iterator[Doubt]:
+    """Yield the doubt of a structure that stands in all runs, and is nearly dislocated in some."""
+    limit = DISLOCATION * shallowest_part(structure)[0]
+    near = residuals[residuals > limit / NEAR_LIMIT]
+    if near.size and not {*kinds} & {*COLLAPSE_STATES[1:]}:
+        words = f"in {{}} of {len(residuals)} runs it stands by little: residual displacements"
+        remedy, values = "state the displacement rather than the kind", (near.size, near.max())
+        yield Doubt(f"{words} of up to {{:mm}}, limit {format_mm(limit)}", remedy, values)
+
+
 def shallowest_part(structure: Structure) -> tuple[float, str]:
     """Return the least depth of a ring or pier, the median of its joints [m], and its name."""
     judged = structure.judged if structure.judged.any() else np.ones_like(structure.judged)

@@ -26,13 +26,10 @@ from archfem.cases.toml_file import Table, format_key
 from archfem.cases.verdict_keys import DEFAULT_RANGES, NEUTRAL, check_ranges, default_ranges
 from archfem.dynamics.analysis import Analysis, with_one_facet
 from archfem.dynamics.collapse_state import (
-    COLLAPSE_STATES,
-    DISLOCATION,
-    NEAR_LIMIT,
     CollapseState,
     classify_collapse,
     doubt_soft_blocks,
-    shallowest_part,
+    doubt_standing,
 )
 from archfem.dynamics.damping import damping_kind, resolve_effective_damping, vary_damping
 from archfem.dynamics.loose_fill import loosen_fill
@@ -53,7 +50,7 @@ from archfem.statics.fill_checks import fill_doubts
 from archfem.studies.evaluators import PreparedRuns
 from archfem.studies.parameter_space import Point, WholePoint
 from archfem.studies.result_store import evaluate_with_progress
-from archfem.units import MPa, format_mm, in_degrees, in_unit
+from archfem.units import MPa, in_degrees, in_unit
 
 # Row of a rating with the worst value of each property
 ALL_AT_ONCE = "all unfavourable at once"
@@ -160,7 +157,8 @@ def verdict_range(  # noqa: PLR0913  (one call, one argument for each thing that
     steps = [row["found"].get("admissible_step", inf) for row in rows.values()]
     lacking = [row["found"].get("lacks_joints", False) for row in rows.values()]
     doubts += doubt_runs(steps, lacking, analysis.dt)
-    doubts += _doubt_standing(analysis.structure, dataset)
+    outcomes, residuals = dataset["outcome"].values, dataset["residual"].values
+    doubts += doubt_standing(analysis.structure, outcomes, residuals)
     dataset.attrs["doubts"] = write_doubts(doubts)
     contacts = [joint.contact for joint in analysis.structure.joints]
     dataset.attrs["k_n"] = float(np.mean([contact.normal_stiffness for contact in contacts]))
@@ -202,17 +200,6 @@ def doubt_runs(
         words = "blocks were loose, without elastic joints, before strong motion was over, and none"
         remedy = "`archfem run CASE.toml` says which stones met, and what to do"
         yield Doubt(f"{of} {words} fell", remedy, (lacking,))
-
-
-def _doubt_standing(structure: Structure, dataset: xr.Dataset) -> Iterator[Doubt]:
-    """Yield the doubt of a structure that stands in all runs, and is nearly dislocated in some."""
-    sizes, outcomes = dataset["residual"].values, dataset["outcome"].values
-    limit = DISLOCATION * shallowest_part(structure)[0]
-    near = int(np.sum(sizes > limit / NEAR_LIMIT))
-    if near and not np.isin(outcomes, COLLAPSE_STATES[1:]).any():
-        words = f"in {{}} of {len(sizes)} runs it stands by little: residual displacements of up to"
-        remedy, values = "state the displacement rather than the kind", (near, np.nanmax(sizes))
-        yield Doubt(f"{words} {{:mm}}, limit {format_mm(limit)}", remedy, values)
 
 
 def as_falling(
