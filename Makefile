@@ -4,7 +4,7 @@ SHELL := /bin/bash
 PYTHON := .venv/bin/python
 # Large packages are never compiled from source: that takes an hour, and fails in the end.
 PIP := .venv/bin/pip install -q --disable-pip-version-check -c constraints.txt \
-	--only-binary numpy,scipy,numba,llvmlite,vtk,gmsh,pandas,shapely
+	--only-binary numpy,scipy,highspy,numba,llvmlite,vtk,gmsh,pandas,shapely
 # From Debian 13 on, python3-h5py has the module, and python3-h5py-mpi what it imports.
 APT := python3-dolfinx python3-venv python3-netcdf4 python3-h5py python3-h5py-mpi \
 	libopenblas0-pthread libegl1 libgl1 libglu1-mesa libopengl0 \
