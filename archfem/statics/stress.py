@@ -197,10 +197,9 @@ def strength_use_table(use: xr.Dataset) -> str:
             rows.append([str(part) or "(no name)", "not computed (rigid)", *["-"] * 4])
             continue
         pressed, pulled = _largest(in_part, "compression"), _largest(in_part, "tension")
-        share = float(pressed["use"])
-        use_text = "-" if np.isnan(share) else f"{share:.2%}"
+        share = _say_share(float(pressed["use"]), float(pressed["strength"])).partition(" ")[0]
         row = [str(part) or "(no name)", _in_mpa(pressed["compression"])]
-        row += [str(pressed["name"].values), use_text]
+        row += [str(pressed["name"].values), share or "-"]
         rows.append([*row, _in_mpa(pulled["tension"]), str(pulled["name"].values)])
     return align_columns(head, rows)
 
@@ -208,18 +207,18 @@ def strength_use_table(use: xr.Dataset) -> str:
 def strength_use_text(use: xr.Dataset) -> str:
     """Return the largest compression and tension of all blocks as text."""
     pressed, pulled = _largest(use, "compression"), _largest(use, "tension")
-    share, strength = float(pressed["use"]), float(pressed["strength"]) / MPa
-    of = "" if np.isnan(share) else f" ({share:.2%} of {_say_strength(strength)})"
+    share = _say_share(float(pressed["use"]), float(pressed["strength"]))
+    of = f" ({share})" * bool(share)
     return (
         f"largest compression {_in_mpa(pressed['compression'])} in {_block_label(pressed)}{of}, "
         f"largest tension {_in_mpa(pulled['tension'])} in {_block_label(pulled)}"
     )
 
 
-def _say_strength(strength: float) -> str:
-    """Return the strength of stones [MPa] as text, and whether it is that of the preset."""
-    preset = " of the preset" * bool(np.isclose(strength, (STONE.strength or 0.0) / MPa))
-    return f"the stones' strength, {strength:.3g} MPa{preset}"
+def _say_share(share: float, strength: float) -> str:
+    """Return a share of a strength [Pa] as text; "" without one, and of that of the preset."""
+    given = strength > 0.0 and not np.isclose(strength, STONE.strength or 0.0)
+    return f"{share:.2%} of the stones' strength, {strength / MPa:.3g} MPa" * bool(given)
 
 
 def _in_mpa(stress: xr.DataArray) -> str:
@@ -238,13 +237,14 @@ def utilisation_text(structure: Structure, joints: xr.Dataset) -> str:
         if use.notnull().any() and float(use.max()) > largest:
             step, number = np.unravel_index(np.nanargmax(use.values), use.shape)
             largest, found = float(use[step, number]), some.isel(time=step, joint=number)
-            stress = float(joint_stress(structure, some)[step, number]) / MPa
+            stress = float(joint_stress(structure, some)[step, number])
     if found is None:
         return "no use of strength is known: all joints hinge or are open, or no strength is given"
     unknown = "; at hinges it is not computed" * bool((joints["hinge"] != 0).any())
+    share = _say_share(largest, stress / largest) if largest > 0.0 else ""
     return (
-        f"largest compression at the edge of a joint that does not hinge: {stress:.3f} MPa, "
-        f"{largest:.2%} of {_say_strength(stress / largest)}, in "
+        "largest compression at the edge of a joint that does not hinge: "
+        f"{stress / MPa:.3f} MPa{f', {share}' * bool(share)}, in "
         f"{found['name'].values} at {float(found['time']):.3f} s{unknown}"
     )
 

@@ -159,17 +159,27 @@ def test_utilisation_follows_time_and_the_weaker_block(stack):
     assert found.values[:, 1] == pytest.approx([0.1, 0.2, 0.0])
 
 
+def of_strength(structure, strength):
+    """The structure with stones of another strength [Pa]."""
+    blocks = (
+        replace(each, material=replace(each.material, strength=strength))
+        for each in structure.blocks
+    )
+    return replace(structure, blocks=tuple(blocks))
+
+
 def test_the_most_loaded_joint_of_a_run_is_named_but_not_a_hinge(stack):
     """Joint 1 peaks at 0.5 s; joint 0 presses harder at 1 s, but hinges then."""
     rows = np.zeros((3, 2, 3))
     rows[..., 0] = [[1e5, 1e5], [1e5, 5.6e5], [9e5, 1e5]]
     rows[2, 0, 2] = 0.47 * 9e5
     joints = af.joints.joint_dataset(stack, rows, np.array([0.0, 0.5, 1.0]))
-    assert utilisation_text(stack, joints) == (
-        "largest compression at the edge of a joint that does not hinge: 0.560 MPa, "
-        "1.00% of the stones' strength, 56 MPa of the preset, in joint 1 at 0.500 s; at hinges it "
-        "is not computed"
-    )
+    begin = "largest compression at the edge of a joint that does not hinge: 0.560 MPa, "
+    end = "in joint 1 at 0.500 s; at hinges it is not computed"
+    # that of the preset is nobody's
+    assert utilisation_text(stack, joints) == begin + end
+    given = f"{begin}2.00% of the stones' strength, 28 MPa, {end}"
+    assert utilisation_text(of_strength(stack, 28e6), joints) == given
     rows[2, 0, 2] = 0.0
     flat = af.joints.joint_dataset(stack, rows, np.array([0.0, 0.5, 1.0]))
     assert utilisation_text(stack, flat).endswith("in joint 0 at 1.000 s")
@@ -183,10 +193,9 @@ def test_the_most_loaded_joint_of_a_long_run_is_found(stack, step, again):
     rows = np.zeros((8301, 2, 3))
     rows[..., 0] = 1e5
     rows[again, 0, 0], rows[step, 1, 0] = 4e5, 5.6e5
-    text = utilisation_text(stack, af.joints.joint_dataset(stack, rows, 0.01 * np.arange(8301)))
-    assert text.endswith(
-        "0.560 MPa, 1.00% of the stones' strength, 56 MPa of the preset, in joint 1 at "
-        f"{0.01 * step:.3f} s"
+    joints = af.joints.joint_dataset(stack, rows, 0.01 * np.arange(8301))
+    assert utilisation_text(of_strength(stack, 28e6), joints).endswith(
+        f"0.560 MPa, 2.00% of the stones' strength, 28 MPa, in joint 1 at {0.01 * step:.3f} s"
     )
 
 
@@ -232,28 +241,30 @@ def test_the_use_of_an_unknown_strength_is_no_number(stack):
 )
 def test_a_block_is_named_with_its_part(stack, part, label):
     """Unless its name begins with that."""
-    use = strength_use(one_cell(stack, [-3e6, 2e4, 0.0]), np.ones(1))
+    use = strength_use(one_cell(of_strength(stack, 28e6), [-3e6, 2e4, 0.0]), np.ones(1))
     text = strength_use_text(use.assign_coords(part=("block", [part, part])))
     assert text.startswith(f"largest compression 3.000 MPa in {label} (")
     assert text.endswith(f"largest tension 0.020 MPa in {label}")
 
 
 def test_tension_and_compression_are_reported_by_part(stack):
-    use = strength_use(
-        one_cell(stack, [-2.8 * af.units.MPa, 0.014 * af.units.MPa, 0.0]), np.ones(1)
-    )
+    state = [-2.8 * af.units.MPa, 0.014 * af.units.MPa, 0.0]
+    use = strength_use(one_cell(of_strength(stack, 28e6), state), np.ones(1))
     nan = np.nan  # of the block without a cell
     assert use["compression"].values == pytest.approx([2.8 * af.units.MPa, nan], nan_ok=True)
     assert use["tension"].values == pytest.approx([0.014 * af.units.MPa, nan], nan_ok=True)
     assert strength_use_text(use) == (
-        "largest compression 2.800 MPa in column, block 1 (5.00% of the stones' strength, 56 MPa "
-        "of the preset), "
-        "largest tension 0.014 MPa in column, block 1"
+        "largest compression 2.800 MPa in column, block 1 (10.00% of the stones' strength, 28 "
+        "MPa), largest tension 0.014 MPa in column, block 1"
     )
     line = strength_use_table(use).splitlines()[1].split("  ")
     assert [cell.strip() for cell in line if cell.strip()] == [
-        "column", "2.800 MPa", "block 1", "5.00%", "0.014 MPa", "block 1",
+        "column", "2.800 MPa", "block 1", "10.00%", "0.014 MPa", "block 1",
     ]  # fmt: skip
+    # of the preset's strength, which nobody gave, there is no share
+    use = strength_use(one_cell(stack, state), np.ones(1))
+    assert strength_use_text(use).startswith("largest compression 2.800 MPa in column, block 1, ")
+    assert "%" not in strength_use_table(use)
 
 
 def test_the_tension_of_a_fill_is_that_of_its_corners():
