@@ -198,7 +198,7 @@ class CollapseScale:
         least, _ = self.first_falls
         falls = (run.fall for run in self._runs if run.scale == least)
         by = next((fall.mechanism for fall in falls if fall and fall.mechanism), "")
-        return f"at {least} × it falls {by}" if by else ""
+        return f"at {least:#.3g} × it falls {by}" if by else ""
 
     def _say_tested(self) -> str:
         """Return in words how closely scales were run up to `lower`; "" where none stands."""

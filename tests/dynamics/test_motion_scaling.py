@@ -804,7 +804,7 @@ def test_neither_a_twitch_moves_a_structure_nor_is_its_fall_without_a_mechanism(
     found = af.collapse_scale(model, af.Motion(np.array([0.0, 2.0, 0.0]), dt=0.01), dt=0.01)
     scales = [run.scale for each in found.searches.values() for run in each.runs]
     assert found.moves == min(scale for scale in scales if scale > 1.1) > min(scales)
-    falls = f"at {found.states['falls']} × it falls by hinges (joint 0) at 1.000 s"
+    falls = f"at {found.states['falls']:#.3g} × it falls by hinges (joint 0) at 1.000 s"
     assert (found.mechanism, replace(found, searches={}).mechanism) == (falls, "")
 
 

@@ -253,7 +253,7 @@ def _format(value: Any) -> str:
     """Return a number with four digits, "-" without one, or a word."""
     if value != value:
         return "-"
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
+    return f"{value:.3g}" if isinstance(value, float) else str(value)
 
 
 def say_what_changes(found: StudyFindings) -> Iterator[str]:
