@@ -20,6 +20,7 @@ from archfem._validation import validate_arguments
 from archfem.dynamics.history import History
 from archfem.errors import InvalidInput
 from archfem.limit.collapse import Collapse, Outcome
+from archfem.limit.displaced_blocks import PlacedBlocks
 from archfem.limit.rating import Rating
 from archfem.limit.vehicles import MovingLoad
 from archfem.masonry.loads import PointLoad
@@ -363,7 +364,18 @@ def _draw_displaced_mechanism(axes: Axes, found: KinematicAssessment) -> None:
     rest = np.zeros((len(structure.blocks), 3))
     _mark_hinges(axes, structure, found, rest, {"label": "hinge at rest", "ms": 6.5})
     _mark_sliding(axes, structure, found.sliding)
+    _draw_ties(axes, path.blocks)
     style.set_title(axes, f"alpha_0 = {found.alpha_0:.3f}, e* = {found.e_star:.2f}")
+
+
+def _draw_ties(axes: Axes, blocks: PlacedBlocks) -> None:
+    """Draw the ties at rest, to their anchors or towards the ground that holds them."""
+    size, label = 0.2 * np.ptp(np.concatenate(blocks.outlines), axis=0).max(), "tie"
+    for tie in (load for load in blocks.loads if load.passive and any(load.force)):
+        end = tie.point + size * np.array(tie.force) / np.hypot(*tie.force)
+        ends = np.array([tie.point, end if tie.anchor_point is None else tie.anchor_point])
+        axes.plot(*ends.T, color=Colour.LOAD, lw=1.4, marker=".", zorder=9, label=label)
+        label = ""
 
 
 def _draw_capacity_curve(axes: Axes, found: KinematicAssessment) -> None:

@@ -9,11 +9,13 @@ import pytest
 import xarray as xr
 from backfilled import arch_bridge
 from bonded import bonded_wall
+from matplotlib.figure import Figure
 from matplotlib.text import Text
 from portals import DRY, box, portal
 
 import archfem as af
 from archfem.limit import rating
+from archfem.limit.displaced_blocks import PlacedBlocks
 from archfem.limit.vehicles import cut_road
 from archfem.view import (
     draw_capacity,
@@ -25,6 +27,7 @@ from archfem.view import (
     draw_structure,
     draw_worst_places,
 )
+from archfem.view.collapse import _draw_ties
 from archfem.view.structure import draw_loads
 
 
@@ -172,6 +175,27 @@ def test_an_assessment_shows_moved_blocks_curve_and_demand(coarse_ring):
     locked = af.kinematic_assessment(piers, found.spectrum, part="left pier")
     with pytest.raises(af.InvalidInput, match="no mechanism moves under horizontal forces"):
         draw_kinematic_assessment(locked)
+
+
+def test_an_assessment_shows_ties_to_the_ground_and_between_blocks():
+    """A fifth of the height long towards the ground; that of a floor is no tie."""
+    piers = af.arch_on_piers(radius=3, thickness=0.6, voussoirs=7, pier_breadth=1.2, courses=[1.5])
+    names = [block.name for block in piers.blocks]
+    one, other = (names[piers.free[k]] for k in (0, -1))
+    ends = [piers.blocks[names.index(name)].centroid for name in (one, other)]
+    bar = {"anchor": other, "anchor_point": tuple(ends[1]), "passive": True}
+    loads = [
+        af.masonry.AttachedLoad(one, tuple(ends[0]), force=(1e3, 0.0), **bar),
+        af.masonry.AttachedLoad(one, tuple(ends[0]), force=(0.0, -1e3), passive=True),
+        af.masonry.AttachedLoad(one, tuple(ends[0]), weight=1e3),
+    ]
+    axes = Figure().add_subplot()
+    _draw_ties(axes, PlacedBlocks.at_rest(piers, loads))
+    between, down = (line.get_xydata() for line in axes.lines)
+    assert [*lines_of(axes)] == ["tie"]
+    np.testing.assert_allclose(between, ends)
+    size = 0.2 * np.ptp(np.concatenate([b.drawn() for b in piers.blocks]), axis=0).max()
+    np.testing.assert_allclose(down, [ends[0], ends[0] - [0.0, size]])
 
 
 @pytest.mark.slow
