@@ -37,7 +37,8 @@ def list_demands(data: ReportData) -> Iterator[tuple[str, Ends, str, list[str]]]
 def tabulate_demands(data: ReportData) -> list[Grid]:
     """Tabulate the demands with their sources; none where the capacities have a single one."""
     found, text = [each for each in list_demands(data) if each[-1]], data.case.report.get("demand")
-    rows = [("as stated", text, "[report]", "none: limit.demand is compared")] if text else []
+    compared = "none" + ": limit.demand is compared" * (data.case.limit.demand is not None)
+    rows = [("as stated", text, "[report]", compared)] if text else []
     rows += [(name, f"PGA {p:.3g} g", source, join_words(x)) for name, p, source, x in found]
     peaks = [peak for _, ends, *_ in found for peak in ends]
     differ = bool(peaks) and max(peaks) > MAX_RATIO_OF_PEAKS * min(peaks)
