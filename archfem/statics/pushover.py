@@ -37,6 +37,9 @@ FEW_STEPS = 15
 # Begin of the outcome of such a path
 CRAWLS = "it crawls"
 
+# Outcome of a path whose load would have to turn round
+LOST = "it bears no load any more"
+
 # Smallest relative load increment of relaxation, to which failed trials are halved: the accuracy of
 # the limit [-]
 MIN_RELAXATION_LOAD_STEP = 0.002
@@ -164,8 +167,8 @@ def pushover(
 
         λ = λ_limit - C d^(-1/2).
 
-    Bonds break or soften between steps, so that with them the curve does fall; follow it by
-    displacement.
+    Bonds break or soften between steps, so that with them the curve does fall; control by "path" is
+    then by "arc length", and that by displacement where it falls.
 
     A *settlement* moves a support instead, under the dead load alone. The force of the structure on
     it changes, and tends to that of the limit state with the least resistance to the settlement.
@@ -213,6 +216,8 @@ def pushover(
         path = SupportPath.of(model, live, begin, held)
     else:
         path = LoadPath.of(model, list_loads(live), begin, held)
+        if control == "path" and path.model.operator is not None and path.model.operator.bonds:
+            control = "arc length"  # a bond breaks at once: no path leads through that
     criteria = criteria or Criteria()
     return _label_result(path, criteria, follow(path, control, stop or Stop(), criteria))
 
@@ -242,7 +247,9 @@ def follow(path: Path, control: str, stop: Stop, criteria: Criteria) -> str:
                 return reason or failure_message(path, control, criteria)
             continue
         step = _last_step(path)
-        direction = step / np.linalg.norm(step)
+        # small displacements lose load where bonds break alone: the way back would unload the rest
+        loses = step[1] < 0.0 and not path.model.large_displacements
+        direction = fixed["displacement"] if loses else step / np.linalg.norm(step)
         if reason := stop_reason(path, stop, criteria, step):
             return reason
         if _is_stagnating(path, 0.02, FEW_STEPS) and sliding_joints(path, criteria):
@@ -278,11 +285,15 @@ def _last_step(path: Path) -> Array:
 def stop_reason(path: Path, stop: Stop, criteria: Criteria, step: Array) -> str | None:
     """Return the rule that is met after a step, as text, or None."""
     slope, displacement = abs(float(step[1] / step[0])), float(path.displacements[-1])
-    if slope <= stop.slope:
-        return f"the slope fell to {slope:.2g} of the initial one"
+    is_flat = slope <= stop.slope
+    is_far = displacement >= stop.displacement * path.model.structure.size
     if path.factors[-1] <= 0.0 and path.units == "1":
-        return "it bears no load any more"
-    if displacement >= stop.displacement * path.model.structure.size:
+        # under small displacements only bonds that broke push back, until the dry joints bear
+        if is_flat or is_far or path.model.large_displacements:
+            return LOST
+    elif is_flat:
+        return f"the slope fell to {slope:.2g} of the initial one"
+    elif is_far:
         return f"the {path.moving} moved by {displacement:.3g} m"
     if stop.hinges is not None:
         count = int((_last_joints(path, criteria)["hinge"] != 0).sum())
@@ -411,7 +422,8 @@ def _label_result(path: Path, criteria: Criteria, outcome: str) -> Pushover:
         {"step": np.arange(count)},
     )
     limit, uncertainty = np.nan, np.nan
-    if not outcome.startswith(CRAWLS):  # sliding has its limit at once, and no asymptote of hinges
+    # sliding has its limit at once, and no asymptote of hinges; no load has none
+    if not outcome.startswith((CRAWLS, LOST)):
         limit, uncertainty = _extrapolate_limit(path.displacements, factors)
         sliding = bool(joints["slide"][-1].any())
         if np.isnan(limit) and sliding and isinstance(path, LoadPath) and _has_reached_bound(path):

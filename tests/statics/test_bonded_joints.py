@@ -89,6 +89,42 @@ def test_the_factor_of_a_pushover_is_its_peak_where_bonds_break():
     assert "at the end 0.5, " in str(push)
 
 
+@pytest.mark.parametrize("control", ["displacement", "arc length", "path", "force"])
+def test_bonds_that_break_one_by_one_leave_the_dry_arch(control):
+    """After a break the arch pushes back until its dry joints bear: no less than they do alone."""
+
+    def ring(**bond):
+        contact = af.Contact(1e10, 4e9, 0.75, **bond)
+        return af.circular_arch(span=4.0, rise=2.0, thickness=0.24, voussoirs=9, contact=contact)
+
+    dry = af.collapse_factor(ring(), live=af.BodyForce(1.0)).factor
+    model = af.build(ring(tension=80e3, cohesion=160e3), fidelity="rigid")
+    stop = af.statics.Stop(displacement=0.02)
+    push = af.pushover(model, af.BodyForce(1.0), control=control, stop=stop)
+    factors = push.curve["factor"].values
+    assert control == "force" or factors.min() < 0.0 < factors[-1]
+    assert push.factor > dry
+    assert push.outcome.startswith("the load moved by")
+
+
+@pytest.mark.parametrize("control", ["displacement", "path"])
+def test_a_bond_without_which_nothing_stands_ends_the_load(control):
+    """A block of 0.5 m glued to a wall, by hand: W (1 + λ) 0.25 m = f_t w b² / 6; then it falls."""
+    wall, stone = (
+        af.Block(((x, 0), (x + 0.5, 0), (x + 0.5, 1), (x, 1)), af.STONE, str(x), fixed=x < 0)
+        for x in (-0.5, 0.0)
+    )
+    contact = af.Contact(STIFFNESS, STIFFNESS, 0.6, cohesion=1e6, tension=2e5)
+    bed = af.Joint((0, 1), (0.0, 1.0), (0.0, 0.0), contact, "bed")
+    structure = af.Structure((wall, stone), (bed,))
+    push = af.pushover(af.build(structure, fidelity="rigid"), af.BodyForce(0.0, -1.0),
+                       control=control)  # fmt: skip
+    most = 2e5 / 6.0 / (0.25 * structure.weight) - 1.0
+    assert most / 1.1 < push.factor <= most
+    assert push.outcome == "it bears no load any more"
+    assert np.isnan(push.limit)
+
+
 def cracked(moment, tension):
     """Depth that still bears and turn of a bed of 1 m under its weight and a moment, by hand [m].
 

@@ -447,8 +447,12 @@ def test_rules_end_a_path_where_they_are_met():
     )
     path.factors = [0.0, 0.05]
     assert stop_reason(path, Stop(displacement=1.0), criteria, even) is None
-    path.factors = [0.0, -1e-9]
-    assert stop_reason(path, Stop(displacement=1.0), criteria, even) == "it bears no load any more"
+    path.factors, flat = [0.0, -1e-9], np.array([1.0, 0.0])
+    for large, distance, step in ((True, 1.0, even), (False, 0.099, even), (False, 1.0, flat)):
+        path.model.large_displacements = large
+        said = stop_reason(path, Stop(displacement=distance), criteria, step)
+        assert said == "it bears no load any more"
+    assert stop_reason(path, Stop(displacement=1.0), criteria, even) is None  # broken bonds
     path.units = "N m"
     assert stop_reason(path, Stop(displacement=1.0), criteria, even) is None
 
