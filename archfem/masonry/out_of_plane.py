@@ -171,35 +171,49 @@ def _find_worst_pier(
 def _find_piers(wall: Structure, foot: float) -> Iterator[tuple[float, float, Array]]:
     """Yield left and right of each pier beside openings [m], and areas of the stones it carries.
 
-    Openings are holes between the stones and the level of the foot. A pier carries the wall up to
-    the middle of the openings beside it, but what is below their heads.
+    A pier carries the wall up to the middle of the openings beside it, but what is below their
+    heads.
     """
     import shapely
 
-    if not wall.heads.any():
-        return
-    polygons = np.array([shapely.Polygon(block.drawn()) for block in wall.blocks])
-    stones = polygons[list(wall.free)]
-    low, bottom, high, top = shapely.total_bounds(stones).tolist()
-    far, gap = 1e4, 0.5 * LEVEL_TOLERANCE * (top - bottom)  # beyond any wall; of a survey
-    grown = shapely.buffer(polygons, gap, join_style="mitre")
-    solid = shapely.union_all(shapely.intersection(grown, shapely.box(-far, foot, far, far)))
-    solid = shapely.union(solid, shapely.box(low, foot - 1.0, high, foot))
-    rings = (ring for part in shapely.get_parts(solid) for ring in part.interiors)
+    far = 1e4  # beyond any wall
+    stones = np.array([shapely.Polygon(wall.blocks[number].drawn()) for number in wall.free])
+    low, _, high, _ = shapely.total_bounds(stones).tolist()
     # left and right of openings above one another, and least head; the ends of the wall
     rows: list[list[float]] = [[low - 2.0, low, foot]]
-    for left, _, right, head in sorted(ring.bounds for ring in rings):
-        opening = left - gap, right + gap, head + gap
-        if opening[0] < rows[-1][1]:
-            rows[-1][1:] = max(rows[-1][1], opening[1]), min(rows[-1][2], opening[2])
+    for left, _, right, head in find_openings(wall, foot):
+        if left < rows[-1][1]:
+            rows[-1][1:] = max(rows[-1][1], right), min(rows[-1][2], head)
         else:
-            rows.append([*opening])
+            rows.append([left, right, head])
     if len(rows) == 1:
         return
     for (left, one, head), (other, right, beyond) in pairwise([*rows, [high, high + 2.0, foot]]):
         halves = (0.5 * (left + one), head, one, far), (other, beyond, 0.5 * (other + right), far)
         boxes = [shapely.box(*each) for each in ((one, -far, other, far), *halves)]
         yield one, other, shapely.area(shapely.intersection(stones, shapely.union_all(boxes)))
+
+
+def find_openings(
+    wall: Structure, foot: float | None = None
+) -> list[tuple[float, float, float, float]]:
+    """Return left, sill, right and head of the openings of a wall in bond, from the left [m].
+
+    They are holes between the stones and the level of the foot, by default that of the stones.
+    """
+    import shapely
+
+    if not wall.heads.any():
+        return []
+    polygons = np.array([shapely.Polygon(block.drawn()) for block in wall.blocks])
+    low, bottom, high, top = shapely.total_bounds(polygons[list(wall.free)]).tolist()
+    far, gap = 1e4, 0.5 * LEVEL_TOLERANCE * (top - bottom)  # beyond any wall; of a survey
+    foot = bottom if foot is None else foot
+    grown = shapely.buffer(polygons, gap, join_style="mitre")
+    solid = shapely.union_all(shapely.intersection(grown, shapely.box(-far, foot, far, far)))
+    solid = shapely.union(solid, shapely.box(low, foot - 1.0, high, foot))
+    rings = sorted(ring.bounds for part in shapely.get_parts(solid) for ring in part.interiors)
+    return [(a - gap, b - gap * (b > foot), c + gap, d + gap) for a, b, c, d in rings]
 
 
 def find_transverse_push(structure: Structure) -> tuple[float, str]:

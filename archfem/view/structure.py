@@ -382,6 +382,28 @@ def draw_names(structure: Structure) -> Figure:
     return figure
 
 
+def draw_dimensions(axes: Axes, structure: Structure) -> None:
+    """Draw length and height of what can move."""
+    outlines = np.concatenate([structure.blocks[number].outline for number in structure.free])
+    (left, bottom), (right, top) = outlines.min(axis=0), outlines.max(axis=0)
+    away = 0.06 * max(right - left, top - bottom)
+    look: dict[str, Any] = {"arrowstyle": "<->", "color": Colour.TEXT, "lw": 0.7, "shrinkA": 0}
+    look["shrinkB"] = 0
+    for one, other, turn in (
+        ((left, top + away), (right, top + away), 0.0),
+        ((right + away, bottom), (right + away, top), 90.0),
+    ):
+        axes.annotate("", one, other, arrowprops=look)
+        (x, y), size = 0.5 * np.add(one, other), max(np.subtract(other, one))
+        text: dict[str, Any] = {
+            "fontsize": Size.NOTE,
+            "rotation": turn,
+            "ha": "center",
+            "va": "center",
+        }
+        axes.text(x, y, f"{size:.3g} m", bbox={"fc": "white", "ec": "none", "pad": 1.0}, **text)
+
+
 def _keep_apart(texts: Sequence[Text]) -> None:
     """Remove texts that would be written over earlier ones."""
     kept = list[Any]()

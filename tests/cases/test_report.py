@@ -167,7 +167,7 @@ def test_demand_and_capacity_stand_beside_their_doubts(kept, undrawn):
     demands, table = (each for each in sentences if each.kind == "grid")
     vertical = "with vertical ones of up to 0.034 g"
     assert demands.rows == [
-        ("as stated", "0.25 g, 475 years", "[report]", "none: limit.demand is compared"),
+        ("as stated", "0.25 g, 475 years", "[report]", "none"),
         (f"motions, {vertical}", "PGA 0.051 g", "[suite]", demands.rows[1][-1]),
     ]
     verdicts = [run.verdict for run in data.runs.values()]
@@ -802,7 +802,7 @@ def test_sources_of_a_suite_are_inputs_each_with_its_mark():
     given, default = "given", "default"
     made = "duration 1 s; pga 1 m/s² (of 2 motions); seed 1, 2, 7"
     assert found["motion, synthetic", given] == made
-    rest = "pga 2.94199 m/s² (of 1 motion); dt 0.005 s"
+    rest = "pga 2.94 m/s² (of 1 motion); dt 0.005 s"
     assert sorted(found["motion, synthetic", default].split("; ")) == sorted(rest.split("; "))
     assert found["motion", given] == "reversed True (of 1 motion)"
     # the vertical of the first is a default, of the second none, of the third one of its own
@@ -1038,7 +1038,7 @@ def test_a_fill_is_stated_as_elastic_and_not_varied(kept):
     assert "carries tension" in dict(assumed.rows)["fill"]
     words = {(name, mark): value for name, value, mark in inputs.rows}
     assert words["backfill: E", "default"].startswith("6.25 MPa (table 2 of")
-    assert "pga 2.94199 m/s²" in words["motion, synthetic, before matching", "default"]
+    assert "pga 2.94 m/s²" in words["motion, synthetic, before matching", "default"]
     stated = ", ".join(conclusion.list_unvaried(data))
     assert "friction, damping, stiffness and strength of the fill, " in stated
     concluded = " ".join(getattr(x, "text", "") for x in build_conclusion(data).pieces)
@@ -1089,6 +1089,36 @@ def test_factors_of_a_vehicle_are_not_those_of_the_code(kept, undrawn):
     assert "live 1.35; impact 1.4" in rows["rating: vehicle"][0]
     stated = "1, none or by rule, see below"
     assert rows["rating: area load, dead, width"] == (stated, "default")
+
+
+def test_points_of_a_spectrum_and_attached_loads_are_stated(kept, undrawn):
+    """Of more points than are listed elsewhere; a floor, a tie and a bar between two blocks."""
+    periods = [0.0, "100 ms", 0.2, 0.3, 0.4, 0.5, 1.0, 2.0]
+    spectrum = {"code": "table", "periods": periods, "values": [0.2, *[0.5] * 5, 0.25, 0.125]}
+    bar = {"anchor": "block 1", "anchor_point": ["0 m", "0.5 m"], "force": ["0 kN", "-2 kN"]}
+    loads = [
+        {"block": "block 2", "point": ["0.2 m", 1.5], "weight": "12 kN"},
+        {"block": "block 2", "point": [0.0, 1.5], "force": ["-3 kN", 0.0], "passive": True},
+        {"block": "block 2", "point": [0.0, 1.5], "passive": True, **bar},
+        {"block": "block 1", "point": [0.0, 0.5], "force": [1500.0, 0.0]},
+    ]
+    tables = tomllib.loads(CASE) | {"assessment": {"spectrum": spectrum, "loads": loads}}
+    with replace_results(kept, "assess", read_file_list(kept)["run"].inputs) as draft:
+        write_files({"assessment.txt": "it"}, draft)
+    data = report_data.ReportData(af.Case.of(tables), {}, kept)
+    rows = {row[0]: row[1:] for row in tabulate_inputs(data).rows}
+    pairs = "0 0.2; 100 ms 0.5; 0.2 0.5; 0.3 0.5; 0.4 0.5; 0.5 0.5; 1 0.25; 2 0.125"
+    table = f"table of period [s] and accelerations [g]: {pairs}"
+    assert rows["assessment: spectrum"] == (table, "given")
+    assert [rows[f"assessment: load {k}"] for k in range(1, 5)] == [
+        (text, "given")
+        for text in (
+            "on block 2 at (0.2, 1.5) m; weight 12 kN",
+            "on block 2 at (0, 1.5) m; tie of at most (-3, 0) kN; held by the ground",
+            "on block 2 at (0, 1.5) m; tie of at most (0, -2) kN; held by block 1 at (0, 0.5) m",
+            "on block 1 at (0, 0.5) m; constant force (1.5, 0) kN",
+        )
+    ]
 
 
 @pytest.mark.parametrize("spandrels", ["0 m", "0.6 m"])

@@ -15,7 +15,7 @@ import archfem as af
 from archfem._files import replace_results
 from archfem.cases import answers
 from archfem.cases.case import case_of
-from archfem.cases.report import conclusion, outcomes, report_data, response, sections
+from archfem.cases.report import conclusion, inputs, outcomes, report_data, response, sections
 from archfem.cases.report.response import _check_row, supported_weight_ratio
 from archfem.cases.result_text import tabulate_joints, tabulate_motions, tabulate_runs
 from archfem.cases.run import MOTION_VARIABLE
@@ -84,7 +84,8 @@ def test_the_names_of_a_wall_do_not_fill_pages():
     case = case_of(af.Analysis(wall, fidelity="rigid"))
     pieces = sections.build_structure_section(report_data.ReportData(case, {})).pieces
     (caption,) = (piece.caption for piece in pieces if piece.kind == "plate")
-    assert caption == "The structure, with numbers of stones in the order of the case, from 0 on."
+    begin = "The structure, 1 m thick, with numbers"
+    assert caption == f"{begin} of stones in the order of the case, from 0 on."
 
 
 def test_lost_blocks_are_listed_by_their_parts(piers):
@@ -549,3 +550,21 @@ def test_caption_and_definitions_of_an_assessment_are_of_what_was_computed(moves
     words = str(table.rows)
     assert ("displacement" in words) is moves
     assert "e* = g M* / Σ P, with the weights P that move alone" in words
+
+
+def test_openings_of_a_wall_given_by_its_blocks_are_measured():
+    opening = af.shapes.Opening(left=-0.7, breadth=1.4, head=2.0, name="door")
+    wall = af.shapes.wall(breadth=4.0, height=3.0, width=0.5, course=0.5, openings=[opening])
+    words = "1.4 m wide and 2 m high, from x = -0.7 m, y = 0 m"
+    assert ("opening", words, "inferred") in [*inputs._measure_rows(wall)]
+
+
+@pytest.mark.parametrize("norm", ["EN 1998-1", "NTC 2018"])
+def test_a_norm_without_an_assessment_is_named_as_such(piers, norm, tmp_path):
+    data = report_data.ReportData(made_case(piers, settings={}), {})
+    data.case.report["norm"] = norm
+    vars(data)["files"] = {"assessment.txt": tmp_path}
+    (grid,) = sections.build_method_section(data).pieces
+    texts = [text for word, text in grid.rows if word == "assessment"]
+    assert texts[0] == "NTC 2018, with its Circolare 7/2019, C8.7.1.2"
+    assert texts[1:] == ["EN 1998-1 itself has no such check"] * (norm == "EN 1998-1")

@@ -7,7 +7,11 @@ import numpy as np
 import pytest
 
 import archfem as af
-from archfem.masonry.out_of_plane import describe_transverse_push, find_transverse_push
+from archfem.masonry.out_of_plane import (
+    describe_transverse_push,
+    find_openings,
+    find_transverse_push,
+)
 from archfem.masonry.standing import describe_carried
 from archfem.masonry.structure import merge_levels
 
@@ -64,6 +68,7 @@ def test_a_wall_across_its_plane_is_a_strip_and_the_whole_less_its_openings():
             outline = ((a, low), (b, low), (b, high), (a, high))
             blocks.append(af.Block(outline, af.STONE, f"{low} {a}", part="wall", role="pier"))
     wall = af.masonry.assembled(blocks, af.Contact(1e9, 4e8, friction=0.7), width=0.6)
+    assert find_openings(wall) == [pytest.approx((1.0, 0.0, 2.0, 2.0))]
     columns = af.masonry.columns_across(wall)
     strip, whole = columns["strip"], columns["whole"]
     assert [len(each.free) for each in columns.values()] == [3, 3, 3]

@@ -12,7 +12,7 @@ import archfem as af
 from archfem.cases.analysis_keys import LimitAnalysis
 from archfem.cases.result_text import describe_collapse, describe_run
 from archfem.view import draw_envelope, draw_names, draw_structure
-from archfem.view.structure import list_numbers, short_name
+from archfem.view.structure import draw_dimensions, list_numbers, short_name
 from archfem.view.style import limit_width
 
 
@@ -265,3 +265,16 @@ def test_joints_of_a_wedge_that_turn_and_slide_are_counted_as_both():
     both = f"{len(slides)} joints, {len(turns & slides)} of which hinge too, drawn in the picture"
     assert f"\nsliding: {both}\n" in text
     assert f"hinges: {drawn}; sliding: " in str(found)
+
+
+def test_length_and_height_of_a_wall_are_drawn_beside_it():
+    """Not those of the ground below it."""
+    wall = af.shapes.wall(breadth=4.0, height=3.0, width=0.5, course=0.5, stone=1.0)
+    figure = draw_names(wall)
+    draw_dimensions(figure.axes[0], wall)
+    notes = {word: note.get_position() for word, note in written(figure)}
+    (x, above), (beside, y) = notes["4 m"], notes["3 m"]
+    middle = np.mean([wall.blocks[k].centroid[0] for k in wall.free])
+    assert (x, y) == pytest.approx((middle, 1.5), abs=1e-9)
+    assert above > 3.0
+    assert beside > x + 2.0

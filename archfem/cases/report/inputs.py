@@ -1,7 +1,7 @@
 """Inputs of a report: each value with its mark given, default or inferred."""
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from inspect import Parameter, signature
 from typing import Any
 
@@ -31,13 +31,15 @@ from archfem.cases.structure_keys import (
 from archfem.dynamics.schemes import EffectiveDamping, Rayleigh, interpret_damping
 from archfem.limit.collapse import collapse_factor
 from archfem.masonry.joint_closing import FINISHED_KEYS
+from archfem.masonry.loads import AttachedLoad
 from archfem.masonry.materials import Contact, Material
+from archfem.masonry.out_of_plane import find_openings
 from archfem.masonry.shapes.bridge_parts import Backfill
 from archfem.masonry.structure import Structure, describe_piers, find_clear_spans
 from archfem.motion.design_spectra import CodeSpectrum
 from archfem.statics.mechanism_assessment import kinematic_assessment
 from archfem.statics.pushover import pushover
-from archfem.units import Ends, in_unit
+from archfem.units import Ends, in_unit, kN
 from archfem.view.pages.document import Grid
 
 Row = tuple[str, str, str]  # quantity, value, mark
@@ -72,6 +74,9 @@ _SOURCES = {
 
 _WEIGHT = DECIDING_VALUES["materials"]["unit_weight"][0]
 _YOUNG = DECIDING_VALUES["materials"]["young"][0]
+
+# Keys of a spectrum given by points
+_TABLE_KEYS = ("periods", "values", "vertical_values")
 
 # Quantities of which a row may state a range, by their words
 _VARIED = {_WEIGHT: "unit_weight", "k_n": "normal_stiffness", "k_s": "shear_stiffness"}
@@ -171,6 +176,9 @@ def _measure_rows(structure: Structure) -> Iterator[Row]:
         yield part or "ring", text, "inferred"
     for part, words in describe_piers(structure).items():
         yield part or "pier", words, "inferred"
+    for left, sill, right, head in find_openings(structure):
+        size = f"{right - left:.3g} m wide and {head - sill:.3g} m high"
+        yield "opening", f"{size}, from x = {left:.3g} m, y = {sill:.3g} m", "inferred"
     areas = Ends.of(structure.blocks[number].area for number in structure.free)
     yield "stones", f"{len(structure.free)} that can move, of {areas:.2g} m²", "inferred"
 
@@ -206,6 +214,10 @@ def _say_key(key: str) -> str:
 def describe_value(value: Any, kind: Any = None) -> str:
     """Return a value of a case in words, numbers with the unit of their key; lists by number."""
     if isinstance(value, Mapping):
+        if value.get("code") == "table":  # each value at its period
+            rows = zip(*(value[k] for k in _TABLE_KEYS if k in value), strict=True)
+            pairs = (" ".join(map(describe_value, row)) for row in rows)
+            return f"table of period [s] and accelerations [g]: {'; '.join(pairs)}"
         kinds = kind if isinstance(kind, Mapping) else {}
         own = [
             f"{_say_key(key)} {describe_value(each, kinds.get(key))}" for key, each in value.items()
@@ -318,7 +330,9 @@ def _command_rows(data: ReportData) -> Iterator[Row]:
         if not any(f"{name}.txt" in data.files for name in users):
             continue
         for key, value in table.items():
-            if key != "fill":
+            if section == "assessment" and key == "loads":
+                yield from _load_rows(data.case.assessment.options[key])
+            elif key != "fill":
                 unit = "× the weight" * (key in ("horizontal", "vertical"))
                 yield f"{section}: {key.replace('_', ' ')}", describe_value(value, unit), "given"
         if section in _FUNCTIONS:
@@ -331,6 +345,26 @@ def _command_rows(data: ReportData) -> Iterator[Row]:
         for path, text, given in list_fill_values(data.case):
             section, _, key = path.split(".")
             yield f"{section}: fill, {key.replace('_', ' ')}", text, _mark(given)
+
+
+def _load_rows(loads: Sequence[AttachedLoad]) -> Iterator[Row]:
+    """Yield the attached loads of an assessment."""
+    for number, load in enumerate(loads, start=1):
+        words = [f"on {load.block} at {_say_pair(load.point)} m"]
+        words += [f"weight {load.weight / kN:g} kN"] * (load.weight > 0.0)
+        if any(load.force):
+            what = "tie of at most" if load.passive else "constant force"
+            words.append(f"{what} {_say_pair(np.array(load.force) / kN)} kN")
+        if load.anchor_point is not None:
+            words.append(f"held by {load.anchor} at {_say_pair(load.anchor_point)} m")
+        elif load.passive:
+            words.append("held by the ground")
+        yield f"assessment: load {number}", "; ".join(words), "given"
+
+
+def _say_pair(pair: Iterable[float]) -> str:
+    """Return components along x and y."""
+    return f"({', '.join(f'{value:.4g}' for value in pair)})"
 
 
 def _further_rows(data: ReportData, section: str, table: Mapping[str, Any]) -> Iterator[Row]:
@@ -436,6 +470,8 @@ def _describe_motion(motion: Mapping[str, Any]) -> Iterator[tuple[str, str, str,
             usual = {name: x.default for name, x in signature(MADE[source]).parameters.items()}
             ratio = (values := usual | made).pop("vertical_ratio", None)
             for key, value in values.items():
+                if isinstance(value, float) and key not in made:
+                    value = float(f"{value:.3g}")
                 text = describe_value(value, kinds[key])
                 yield f"{part}, {source}", key, text, _mark(key in made)
             if ratio is None or "vertical" in motion:

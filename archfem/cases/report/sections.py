@@ -18,6 +18,7 @@ from archfem.cases.defaults import describe_margins_at_rest
 from archfem.cases.report.conclusion import build_conclusion, build_signatures, list_facts
 from archfem.cases.report.doubts import list_elastic_fill, list_ranges, list_varied, spans_run
 from archfem.cases.report.inputs import compare_inputs, describe_value, tabulate_inputs
+from archfem.cases.report.motion_rules import find_rule
 from archfem.cases.report.outcomes import sentence
 from archfem.cases.report.report_data import STATIC_RESULTS, ReportData
 from archfem.cases.report.response import (
@@ -43,10 +44,11 @@ from archfem.masonry.block import Block
 from archfem.masonry.joint_closing import describe_closing
 from archfem.masonry.materials import COURSE_LENGTH
 from archfem.masonry.structure import Structure, join_names
+from archfem.motion.record_selection import SELECTION_RULES
 from archfem.statics.assessment_checks import LIMIT_STATES, LimitState
 from archfem.units import MPa, format_mm, kN
 from archfem.view.pages.document import FigureBlock, Grid, Section, TextBlock
-from archfem.view.structure import draw_names, draw_structure, list_numbers
+from archfem.view.structure import draw_dimensions, draw_names, draw_structure, list_numbers
 from archfem.view.studies import draw_findings
 from archfem.view.style import limit_width
 
@@ -198,8 +200,11 @@ def build_structure_section(data: ReportData) -> Section:
         # of a wall in bond the picture has numbers of stones
         named = ["The structure, with its assessed joints", *list_numbers(structure)]
         if structure.heads.any():
-            named = ["The structure, with numbers of stones in the order of the case, from 0 on"]
+            thick = f"The structure, {structure.width:g} m thick"
+            named = [f"{thick}, with numbers of stones in the order of the case, from 0 on"]
         figures = [(draw_names(structure), f"{'; '.join(named)}.")]
+        if structure.heads.any():
+            draw_dimensions(figures[0][0].axes[0], structure)
         if data.dead is not None:
             criteria = case.analysis.failure_criteria
             figures.append((draw_structure(structure, data.dead, criteria=criteria), _THRUST))
@@ -496,9 +501,13 @@ def build_method_section(data: ReportData) -> Section:
     norm = [("norm", data.case.report["norm"])] if data.case.report.get("norm") else []
     suite, assessment = (data.case.settings.get(key, {}) for key in ("suite", "assessment"))
     given = filter(None, [suite.get("target"), assessment.get("spectrum")])
-    spectra = [("design spectrum", text) for text in dict.fromkeys(map(describe_value, given))]
+    named = (each["code"] if each["code"] == "table" else describe_value(each) for each in given)
+    spectra = [("design spectrum", text) for text in dict.fromkeys(named)]
     used = [row[1:] for row in _METHODS if not row[0] or data.list_parts(row[0])]
     used = [row for row in used if data.runs or row[0] != "joints, criteria"]
+    if find_rule(data) is SELECTION_RULES["EC8"]:
+        without = ("assessment", "EN 1998-1 itself has no such check")
+        used += [without] * ("assessment" in dict(used))
     return Section("Norms and methods", [Grid((), [*norm, *spectra, *used])])
 
 
