@@ -16,8 +16,8 @@ import archfem as af
 SAME = 1e-8
 """Of states that Newton's method ends at 1e-10 of the load, over some sixty steps."""
 
-SCALES = [(1e-4, 1e-3, 1.0), (1.0, 0.04, 0.04)]
-"""Of γ, w and l: joints bear some thousandths of a newton; a ring that spans 23 cm."""
+SCALES = [(4e-3, 1e-3, 1.0), (1.0, 0.04, 0.04)]
+"""Of γ, w and l: joints bear some hundredths of a newton; a ring that spans 23 cm."""
 
 FREQUENCIES = (8.0, 16.0)
 
