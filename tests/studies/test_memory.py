@@ -118,7 +118,7 @@ def test_a_suite_is_matched_once_for_all_factors(monkeypatch):
         cases.append(af.Case.of(changed))
     met = []
 
-    def matched(suite, target):  # which would take a second
+    def matched(suite, target, band):  # which would take a second
         met.append(target)
         return replace(suite, pairs=tuple(pair.scaled(target.ss / 3.0) for pair in suite.pairs))
 

@@ -714,9 +714,9 @@ def test_what_is_not_proved_least_is_marked(tmp_path, capsys):
     shown = [dict(zip(rows[0], row, strict=True)) for row in rows[1:]]
     for name in ("factor", "push [g]", "least_push [g]", "least_push_over_site"):
         assert [row[name] for row in shown] == [f"{stack:.5g}", f"≤ {bond:.5g}"]
-    assert f"; 'bond', at ≤ {bond:.4g} of it" in text
+    assert f"; 'bond', at ≤ {bond:.3g} of it" in text
     found = collect_findings("", "", table)
-    assert [row[1] for row in tabulate_study(found).rows] == [f"{stack:.4g}", f"≤ {bond:.4g}"]
+    assert [row[1] for row in tabulate_study(found).rows] == [f"{stack:.3g}", f"≤ {bond:.3g}"]
 
 
 def test_a_case_above_the_tables_is_that_of_those_that_name_none(tmp_path):
