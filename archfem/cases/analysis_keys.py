@@ -20,7 +20,6 @@ from archfem.limit.vehicles import VEHICLES, VEHICLES_OF_CODES, Vehicle
 from archfem.masonry.loads import (
     Action,
     AttachedLoad,
-    BlockLoad,
     BodyForce,
     PointLoad,
     Settlement,
@@ -141,30 +140,6 @@ class LimitAnalysis:
         weaker = replace(self, strength=ASSUMED_STRENGTH).solve(structure)
         return f"{words}; with {ASSUMED_STRENGTH / MPa:g} MPa, {weaker.sentence}"
 
-    def crushing_share(
-        self, structure: Structure, direction: float, loads: Sequence[AttachedLoad] = ()
-    ) -> float:
-        """Return the least share of a push that is left where stones crush, over the fill [-].
-
-        Args:
-            structure: structure of the case.
-            direction: sense of the push along x, 1 or -1.
-            loads: masses and forces attached to blocks; ties bear nothing.
-        """
-        live, dead = list[Action]([BodyForce(direction)]), list[Action]()
-        for load in loads:
-            (x, y), force = load.point, (0.0, 0.0) if load.passive else load.force
-            name = structure.blocks[structure.block_number(load.block)].name
-            live.append(BlockLoad(x, (direction * load.weight, 0.0), y, name))
-            dead.append(BlockLoad(x, (force[0], force[1] - load.weight), y, name))
-        given: dict[str, Any] = {"live": live, "dead": dead, "fill": self.fill}
-        given["friction"] = self.friction and "coulomb"  # as assessments slide by default
-        crushing, without = (
-            collapse_factor(structure, strength=strength, **given).range
-            for strength in (self.strength, np.inf)
-        )
-        return min(1.0 if x == y else x / y for x, y in zip(crushing, without, strict=True))
-
     @property
     def opposite(self) -> "LimitAnalysis | None":
         """The analysis with the load in the other sense; None unless all of it is horizontal."""
@@ -230,8 +205,8 @@ def rating_keys() -> dict[str, Any]:
 
 
 def assessment_keys() -> dict[str, Any]:
-    """Return the keys of [assessment]."""
-    return _keys_beside(kinematic_assessment)
+    """Return the keys of [assessment]; the strength is that of [limit]."""
+    return _keys_beside(kinematic_assessment, "strength")
 
 
 def find_given_strength(structure: Structure, settings: Table) -> float | None:
@@ -424,6 +399,8 @@ def parse_assessment(
 ) -> AssessmentSettings:
     """Return the kinematic assessment of a case, by default with fill and sliding of its limit."""
     options = check_table(table, assessment_keys(), "assessment")
+    if limit and limit.strength is not None:
+        options["strength"] = limit.strength
     spectrum = None
     if "spectrum" in options:
         spectrum = build_spectrum(options.pop("spectrum"), "assessment.spectrum")

@@ -27,7 +27,7 @@ from archfem.motion.hazard import DESIGN_PERIOD, MEASURES
 from archfem.motion.motion import Motion
 from archfem.statics.assessment_checks import AssessmentCheck, describe_difference
 from archfem.statics.mechanism_assessment import KinematicAssessment
-from archfem.units import STANDARD_GRAVITY, Ends, MPa, format_ratio, kN
+from archfem.units import STANDARD_GRAVITY, Ends, format_ratio, kN
 
 # Results by the names of their files
 RESULTS = {
@@ -344,22 +344,6 @@ def describe_margin(found: Iterable[KinematicAssessment]) -> str:
         other = f"; pushed to the {name_side(-sense)} {format_ratio(min(others))} by the same check"
     outcome = compare_checks(checks) or check.words
     return f"least margin {ratios}, by {check.name}{side}: {outcome}{other}"
-
-
-def compare_crushing(case: Case, found: Iterable[KinematicAssessment]) -> list[Remark]:
-    """Return a remark on stones that crush, which an assessment leaves out: a doubt from 2 % on."""
-    if case.limit.strength in (None, np.inf):
-        return []
-    least = min(found, key=lambda result: find_margin([result]))
-    loads = case.assessment.options.get("loads", ())
-    share = case.limit.crushing_share(case.structure, least.direction, loads)
-    margin = share * find_margin([least])
-    text = (
-        f"joints hinge about their edges: crushing at {case.limit.strength / MPa:.3g} MPa lowers "
-        f"the push at which the whole begins to move by {100.0 * (1.0 - share):.2g} %, and margins "
-        f"by as much: the least one to {margin:.3g}"
-    )
-    return [f"{NOTE_MARK}{text}" if share > 0.98 else Doubt(text)]
 
 
 def note_across(structure: Structure, found: Iterable[KinematicAssessment]) -> list[str]:

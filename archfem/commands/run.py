@@ -246,9 +246,8 @@ def assess(options: argparse.Namespace) -> int:
             bound = f"{error.last.sentence}; " if isinstance(error, Interrupted) else ""
             write_progress_line("assessment", f"{bound}nothing is kept")
             raise
-    # warnings of the comparison are those of the assessment, or of a sliding that it leaves out
-    with keep_warnings():
-        remarks = [*doubts, *answers.compare_crushing(case, found.values())]
+    remarks: list[result_text.Remark] = [*doubts]
+    with keep_warnings():  # which are those of the assessment
         remarks += [] if options.parts else answers.note_ties(case)
     remarks += answers.note_band(case, found.values())
     remarks += answers.note_across(case.structure, found.values())

@@ -9,7 +9,7 @@ that few rigid bodies remain.
 
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -86,6 +86,8 @@ class PlacedBlocks:
     direction: float = 1.0  # sense of the horizontal forces along x, 1 or -1
     fill: FillPressure | None = None
     growing: tuple[AttachedLoad, ...] = ()  # forces that grow, instead of the horizontal ones
+    # by which faces end before each joint, where it crushes (n_joints,) [m]
+    setback: Array = field(default_factory=lambda: np.zeros(0))
 
     @classmethod
     def at_rest(
@@ -97,11 +99,18 @@ class PlacedBlocks:
     ) -> "PlacedBlocks":
         """Return the blocks of a structure at rest."""
         still = np.zeros((len(structure.blocks), 3))
-        return cls(structure, still, find_corners(structure), tuple(loads), direction, fill)
+        placed = cls(structure, still, find_corners(structure), tuple(loads), direction, fill)
+        return replace(placed, setback=np.zeros(len(structure.joints)))
 
     def moved(self, displacement: Array) -> "PlacedBlocks":
         """Return the blocks at other displacements from rest."""
         return replace(self, displacement=displacement)
+
+    def set_back(self, setback: Array) -> "PlacedBlocks":
+        """Return the blocks with faces that end a distance before each joint (n_joints,) [m]."""
+        inwards = (setback[:, None] * self.structure.tangents)[:, None] * [[1.0], [-1.0]]
+        corners = find_corners(self.structure) + inwards
+        return replace(self, corners=corners, setback=setback)
 
     @cached_property
     def centroids(self) -> Array:
@@ -273,6 +282,11 @@ class Bodies:
         """Number of bodies that move."""
         return int(self.body.max()) + 1
 
+    @property
+    def force_unit(self) -> float:
+        """Mean weight of a body [N]."""
+        return float(np.abs(self.blocks.dead[:, 1]).sum() / self.count)
+
     @cached_property
     def units(self) -> Array:
         """Units of the coordinates, rotations over the size (3 n_bodies,) [m, m, rad]."""
@@ -427,6 +441,16 @@ def find_tie_shares(
     return solution[2][-1 - len(blocks.ties) : -1]
 
 
+def find_thrusts(blocks: PlacedBlocks, joints: Sequence[int], friction: Array) -> Array:
+    """Return the normal forces at the least factor, zero without a mechanism (n_joints,) [N]."""
+    bodies, contacts, _ = given = _select_bodies(blocks, joints, friction)
+    thrusts = np.zeros(len(blocks.structure.joints))
+    if bodies.count and (solution := _solve_static(*given)) is not None:
+        forces = bodies.force_unit * solution[2][: len(contacts)]
+        np.add.at(thrusts, [contact.joint for contact in contacts], forces)
+    return thrusts
+
+
 def _select_bodies(
     blocks: PlacedBlocks, joints: Sequence[int], friction: Array
 ) -> tuple[Bodies, list[Contact], Array]:
@@ -476,8 +500,8 @@ def _solve_static(
     dead, live = bodies.dead_forces(), bodies.generalised(bodies.blocks.live)
     further = bodies.bounded_forces[1]
     # forces in mean body weights and lengths in metres over the size keep coefficients near one
-    unit = np.abs(bodies.blocks.dead[:, 1]).sum() / bodies.count
-    count, slides = len(contacts), np.isfinite(coefficient)
+    unit, count = bodies.force_unit, len(contacts)
+    slides = np.isfinite(coefficient)
     coefficient_or_zero = np.where(slides, coefficient, 0.0)
     balance = sparse.hstack([normal.T, along.T, further.T / unit, (live / unit)[:, None]])
     slope, one = (sparse.diags(v).tocsr()[slides] for v in (coefficient_or_zero, np.ones(count)))

@@ -582,7 +582,8 @@ class PathFollower:
         # well above the tolerance of the programme that follows; undetermined forces are NaN
         forces = np.nan_to_num(normal_forces + 1e-5 * self._force_unit, nan=np.inf)
         ways = [self._way_to_end(blocks, each) if each.slip else np.inf for each in state.contacts]
-        room = 1e-5 * size - largest_overlap(blocks.outlines, body)
+        crushed = pairs[np.flatnonzero(blocks.setback)]
+        room = 1e-5 * size - largest_overlap(blocks.outlines, body, crushed)
         edges = np.array(ways) + 2.0 * near
         return np.concatenate([[factor], gaps.ravel() + 0.5 * near, forces, edges, [room]])
 

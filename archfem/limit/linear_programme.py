@@ -168,7 +168,7 @@ class RigidBlocks:
         # both ends, N = F_i + F_e >= -T and |M| <= (N + T) h/2.
         return np.concatenate([0.5 * self.tension, 0.5 * self.tension, 0.0 * self.tension])
 
-    def crushing_forces(self, strength: float) -> Array:
+    def crushing_forces(self, strength: float | Array) -> Array:
         """Return σ w h of each joint, with tension beside the stress block (n_joints,)."""
         structure = self.structure
         return strength * structure.width * structure.depths / self.force_unit + self.tension

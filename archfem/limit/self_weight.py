@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy import sparse
 
+from archfem._typing import Array
 from archfem._validation import check_between, check_choice, check_type
 from archfem.errors import InvalidInput
 from archfem.limit.backfill import SELF_WEIGHT, BlocksWithFill, attach_fill
@@ -39,6 +40,12 @@ def check_options(structure: Structure, friction: str | None, strength: float | 
     return strength
 
 
+def joint_strengths(structure: Structure, strength: float) -> Array:
+    """Return the strength of each joint, infinite beside fill in pieces (n_joints,) [Pa]."""
+    is_piece = np.array([block.grain for block in structure.blocks])[structure.pairs].any(axis=1)
+    return np.where(is_piece, np.inf, strength)
+
+
 def self_weight_programme(
     structure: Structure,
     friction: str | None,
@@ -55,10 +62,7 @@ def self_weight_programme(
     coefficient = rigid.friction if friction is not None else np.full(len(rigid.joints), np.inf)
     crushing = None
     if np.isfinite(strength):
-        # pieces of fill have the strength of their joints, and none of stone
-        is_piece = np.array([block.grain for block in rigid.blocks])[rigid.pairs].any(axis=1)
-        crushing = blocks.crushing_forces(strength)
-        crushing = np.where(is_piece, np.inf, crushing)
+        crushing = blocks.crushing_forces(joint_strengths(rigid, strength))
     weight = blocks.dimensionless(stones.load([SELF_WEIGHT, *dead]) + stones.active_forces())
     # Compressions are counted from the plastic tension of bonds on: F + T/2 >= 0 at each end.
     slope = np.where(np.isfinite(coefficient), coefficient, 0.0)

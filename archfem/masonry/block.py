@@ -392,9 +392,14 @@ def say_others(rank: str, found: Sequence[Fault], place: Callable[[Point], str])
     return f", {rank} of {len(found)} {found[0][0]}s (also {listed}{more})" if others else ""
 
 
-def largest_overlap(outlines: Sequence[Array], body: Numbers) -> float:
-    """Return the largest depth by which outlines of different bodies overlap [m]."""
-    return float(_find_overlaps(outlines, body)[2].max(initial=0.0))
+def largest_overlap(outlines: Sequence[Array], body: Numbers, crushed: Numbers) -> float:
+    """Return the largest depth by which outlines of different bodies overlap [m].
+
+    Pairs of blocks that crush each other are left out (n_crushed, 2).
+    """
+    pairs, _, depths = _find_overlaps(outlines, body)
+    crush = (pairs[:, None] == crushed).all(axis=2).any(axis=1)
+    return float(depths[~crush].max(initial=0.0))
 
 
 def _find_overlaps(

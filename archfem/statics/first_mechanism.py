@@ -12,25 +12,32 @@ import numpy as np
 from archfem._typing import Array
 from archfem.errors import InvalidInput
 from archfem.limit.backfill import BlocksWithFill, FillProfile
+from archfem.limit.collapse import collapse_factor
 from archfem.limit.displaced_blocks import (
     FillPressure,
     KinematicChain,
     PlacedBlocks,
+    classify_motion,
     find_mechanism,
+    find_thrusts,
     find_tie_shares,
 )
 from archfem.limit.finite_mechanism import MechanismPath
 from archfem.limit.linear_programme import NoEquilibrium
 from archfem.limit.mechanism_kinematics import find_rigid_regions
-from archfem.masonry.loads import AttachedLoad, name_side
+from archfem.limit.self_weight import joint_strengths
+from archfem.masonry.loads import AttachedLoad, BodyForce, name_side
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import Structure, join_names
 from archfem.models.model import Doubt
 from archfem.statics.assessment_checks import UPPER_BOUND, measure_blocks
-from archfem.units import format_mm, kN
+from archfem.units import MPa, format_mm, kN
 
 # Stretch from which a tie is doubted, as its free length is not known: 2 % of 2 m [m]
 MAX_STRETCH = 0.04
+
+# Rounds of thrusts and hinges, of which two or three usually suffice
+MAX_ROUNDS = 40
 
 
 class DoesNotStand(InvalidInput):
@@ -96,19 +103,22 @@ def select_joints(
 
 
 def find_first_mechanism(
-    placed: PlacedBlocks, joints: list[int], coefficient: Array
-) -> KinematicChain | None:
-    """Return the mechanism of least factor at rest; None where there is none."""
+    placed: PlacedBlocks, joints: list[int], coefficient: Array, strength: float
+) -> tuple[PlacedBlocks, KinematicChain | None]:
+    """Return the blocks with crushed edges, and their mechanism of least factor, if any."""
     why = "af.stands and `archfem check` say why"
     if any(any(load.force) and not load.passive for load in placed.loads):
         why = "their forces act whole; a tie, which bears up to its force, is `passive = true`"
+    crushed = f" where joints crush at {strength / MPa:.3g} MPa" * bool(np.isfinite(strength))
     refusal = DoesNotStand(
-        f"{placed.structure.name} does not stand under its own weight and the attached loads: {why}"
+        f"{placed.structure.name} does not stand under its own weight and the attached "
+        f"loads{crushed}: {why}"
     )
     # At rest constant forces may be missing: a tie pulls only once the mechanism moves.
     weights = tuple(replace(load, force=(0.0, 0.0)) for load in placed.loads)
-    opposite = replace(placed, loads=weights, direction=-placed.direction)
     try:
+        placed = _crush_edges(placed, joints, coefficient, strength)
+        opposite = replace(placed, loads=weights, direction=-placed.direction)
         mechanism = find_mechanism(placed, joints, coefficient)
         # The least factor in the other direction is below zero where it stands only if pushed.
         others = [find_mechanism(opposite, joints, coefficient)]
@@ -116,7 +126,66 @@ def find_first_mechanism(
         raise refusal from error
     if any(found is not None and found.factor <= 1e-9 for found in (mechanism, *others)):
         raise refusal
-    return mechanism
+    return placed, mechanism
+
+
+def _crush_edges(
+    placed: PlacedBlocks, joints: list[int], coefficient: Array, strength: float
+) -> PlacedBlocks:
+    """Return the blocks with hinges at the resultants of edges that crush, N / (2 w f) inside."""
+    structure = placed.structure
+    forces = joint_strengths(structure, strength) * structure.width * structure.depths
+    shares = np.zeros(len(forces))  # N / (w f h), of the state with the hinges before
+    for number in range(MAX_ROUNDS if np.isfinite(strength) else 0):
+        before, shares = shares, find_thrusts(placed, joints, coefficient) / forces
+        if number > 5:  # where many states are optimal, each round may find another one
+            shares = np.maximum(shares, before)
+        if (np.abs(shares - before) <= 1e-4).all():
+            break
+        placed = placed.set_back(0.5 * structure.depths * np.minimum(shares, 0.999))
+    if (shares >= 0.999).any():
+        raise NoEquilibrium("joints crush over their whole depth")
+    return placed
+
+
+def search_flat(
+    placed: PlacedBlocks, joints: list[int], first: KinematicChain, friction: str | None
+) -> tuple[KinematicChain, Doubt | None]:
+    """Return the mechanism of the search without dilatancy, or the first, and a doubt."""
+    structure = placed.structure
+    dilates = Doubt(
+        "faces dilate as this mechanism slides: alpha_0 = {:.4g} is {}",
+        "a search without dilatancy takes no part, loads and fill",
+        (first.factor, UPPER_BOUND),
+    )
+    if len(joints) < len(structure.joints) or placed.loads:
+        if friction == "nonassociated":
+            raise InvalidInput(
+                "friction 'nonassociated' is searched for the whole structure only: leave out "
+                "part and blocks, or use 'coulomb'"
+            )
+        return first, dilates
+    inwards = placed.setback[:, None] * structure.tangents
+    ends = structure.ends[:, 0] + inwards, structure.ends[:, 1] - inwards
+    dry = [
+        replace(x, contact=replace(x.contact, cohesion=0.0), intrados=one, extrados=other)
+        for x, one, other in zip(structure.joints, *ends, strict=True)
+    ]
+    wall, live = replace(structure, joints=tuple(dry)), BodyForce(placed.direction)
+    found = collapse_factor(wall, live=live, friction="nonassociated", strength=np.inf)
+    if not np.isfinite(found.factor):
+        words = "a search without dilatancy found none: hold a motion"
+        return first, replace(dilates, remedy=words)
+    contacts, doubt = placed.touching(joints), None
+    flat = np.zeros(len(contacts))
+    if found.solutions is not None and found.solutions.may_be_less:
+        doubt = Doubt(
+            "alpha_0 is {}, the least that a search without dilatancy found, and a weaker "
+            "mechanism may exist",
+            f"hold a push of {0.9 * found.factor:.3g} g, a tenth below, by [motion] held",
+            (UPPER_BOUND,),
+        )
+    return classify_motion(placed, joints, found.motion, flat, contacts, found.factor), doubt
 
 
 def describe_ties(

@@ -28,22 +28,22 @@ import xarray as xr
 
 from archfem._display import DOUBT_MARK, NOTE_MARK, ResultDisplay
 from archfem._files import align_columns
-from archfem._typing import Array
+from archfem._typing import Array, CrushingStrength
 from archfem._validation import check_between, check_choice, validate_arguments
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.limit.backfill import attach_fill
-from archfem.limit.collapse import ONE_OF_MANY, collapse_factor, slides_anywhere
+from archfem.limit.collapse import ONE_OF_MANY, slides_anywhere
 from archfem.limit.displaced_blocks import (
     STILL,
     TOUCHING,
     KinematicChain,
     PlacedBlocks,
-    classify_motion,
 )
 from archfem.limit.fill_range import FillAssumption, vary_fill
 from archfem.limit.fill_strength import Fill, PlasticFill
 from archfem.limit.finite_mechanism import MechanismPath, PathEnd, PathFollower
 from archfem.limit.mechanism_names import name_mechanism
+from archfem.limit.self_weight import check_options
 from archfem.masonry.loads import AttachedLoad, BodyForce, name_side
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import (
@@ -76,10 +76,11 @@ from archfem.statics.first_mechanism import (
     find_first_mechanism,
     find_stretches,
     press_stones,
+    search_flat,
     select_joints,
     take_fill_as_loads,
 )
-from archfem.units import STANDARD_GRAVITY, format_ratio, kN
+from archfem.units import STANDARD_GRAVITY, Ends, MPa, format_ratio, kN
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -107,6 +108,7 @@ class KinematicAssessment(ResultDisplay):
         displacement: check of the displacement; None where the mechanism cannot move.
         limit_state: rules of the displacement check.
         confidence_factor: FC, by which accelerations of the curve are divided in both checks [-].
+        strength: compressive strength at which joints crush [Pa]; infinite where they do not.
         control: name of the block whose centroid is the control point.
         path: finite motion of the mechanism; None where nothing moves.
         notes: assumptions of the result, and omissions on the safe side.
@@ -130,6 +132,7 @@ class KinematicAssessment(ResultDisplay):
     displacement: AssessmentCheck | None
     limit_state: LimitState
     confidence_factor: float
+    strength: float
     control: str
     path: MechanismPath | None
     notes: tuple[str, ...]
@@ -214,7 +217,8 @@ class KinematicAssessment(ResultDisplay):
         side = name_side(self.direction)
         lines = [f"kinematic assessment of {self.structure.name}, pushed to the {side}"]
         if self.path is None:
-            lines.append("no horizontal force makes it a mechanism")
+            crush = " unless joints crush" * bool(np.isfinite(self.strength))
+            lines.append(f"no horizontal force makes it a mechanism{crush}")
         else:
             joints = self.structure.joints
             sides = [(joints[k], side) for k, side in self.hinges]
@@ -234,11 +238,8 @@ class KinematicAssessment(ResultDisplay):
                 f"{divided}{vanishes if np.isfinite(self.d_0_star) else ''}",
             ]
             changes = [event.text for event in self.path.events if event.text != self.path.end]
-            lines += (
-                [f"along the path the mechanism changes: {join_names(changes, '; ')}"]
-                if changes
-                else []
-            )
+            changed = f"along the path the mechanism changes: {join_names(changes, '; ')}"
+            lines += [*self._setbacks, *[changed] * bool(changes)]
             lines += [self.path.end.sentence] if self.displacement else []
             lines += map(str, self.checks)
             if (over_fill := self.checks[-1].over_fill) is not None:
@@ -247,6 +248,14 @@ class KinematicAssessment(ResultDisplay):
                 lines += [f"all else is under one assumption: {key}" for key in [*own][:1]]
         lines += [f"{NOTE_MARK}{note}" for note in [*self.notes, *self._split_note]]
         return "\n".join([*lines, *(f"{DOUBT_MARK}{doubt}" for doubt in self.doubts)])
+
+    @property
+    def _setbacks(self) -> list[str]:
+        """Return how far hinges are from the edges of joints that crush."""
+        if not (self.path and np.isfinite(self.strength) and self.hinges):
+            return []
+        back = Ends.of(self.path.blocks.setback[[k for k, _ in self.hinges]])
+        return [f"joints crush at {self.strength / MPa:.3g} MPa: hinges are set back by {back:mm}"]
 
     @property
     def _split_note(self) -> list[str]:
@@ -275,6 +284,7 @@ def kinematic_assessment(  # noqa: PLR0913  (the factors of the codes are argume
     limit_state: str | LimitState = "NTC-2018 SLV",
     q: float = 2.0,
     confidence_factor: float = 1.35,
+    strength: CrushingStrength = None,
 ) -> KinematicAssessment:
     """Assess the collapse mechanism under horizontal forces against a spectrum at the ground.
 
@@ -289,6 +299,9 @@ def kinematic_assessment(  # noqa: PLR0913  (the factors of the codes are argume
       acceleration does not set in motion, a₀* / FC above it, passes as well. There is no check of a
       mechanism without a finite motion, such as most wedges of walls in bond. Nor is there one
       where the mechanism slides without turning, and its factor does not fall as it moves.
+
+    Where joints crush, hinges are at the resultants of their crushed edges, N / (2 w f) inside: N
+    is the thrust as the mechanism begins, width w and strength f.
 
     A fill, bodies softer than their joints, counts by its weight and mass on the stones below,
     column by column; with its strength, `fill`, it presses on them as in `collapse_factor`. Along
@@ -316,8 +329,9 @@ def kinematic_assessment(  # noqa: PLR0913  (the factors of the codes are argume
             617/2009, from memory), or a `LimitState` with rules of another code.
         q: behaviour factor [-]; Circolare 7/2019, C8.7.1.2.1.7.
         confidence_factor: FC [-], that of knowledge level LC1 where the strength of the masonry is
-            not taken into account, as here; Circolare 7/2019, C8.7.1.2.1.3. The value 1.35 of LC1
+            not taken into account; Circolare 7/2019, C8.7.1.2.1.3. The value 1.35 of LC1
             is from memory (C8.5.4.1).
+        strength: as for `collapse_factor`, where the joints crush [Pa]; in a case that of [limit].
 
     Returns:
         Oscillator, capacity curve and checks.
@@ -351,7 +365,7 @@ def kinematic_assessment(  # noqa: PLR0913  (the factors of the codes are argume
     check_assessable(structure, friction, loads)
     search = _Search(
         *(structure, spectrum, float(direction), friction, part, blocks, tuple(loads), rules),
-        *(confidence_factor, q),
+        *(confidence_factor, q, check_options(structure, friction, strength)),
     )
     lever = fill.lever if isinstance(fill, Fill) else 0.0
     found = search.assess(lever, fill)
@@ -377,6 +391,7 @@ class _Search:
     rules: LimitState
     confidence_factor: float
     q: float
+    strength: float = np.inf  # at which joints crush [Pa]
 
     def assess(self, lever: float, fill: Fill | PlasticFill | None) -> KinematicAssessment:
         """Return the assessment with a fill, whose horizontal forces act at a lever."""
@@ -388,7 +403,7 @@ class _Search:
         loads = (*weights, *self.loads)
         placed = PlacedBlocks.at_rest(stones, loads, self.direction, pressure)
         friction = stones.friction if self.friction else np.full(len(stones.joints), np.inf)
-        mechanism = find_first_mechanism(placed, joints, friction)
+        placed, mechanism = find_first_mechanism(placed, joints, friction, self.strength)
         if mechanism is None:
             return _Oscillator(self, placed, None, 0, bool(weights)).assess()
         path, holds, doubt = self._follow(placed, joints, friction, mechanism)
@@ -409,7 +424,7 @@ class _Search:
         searches = [False, True] if self.friction == "coulomb" else [True]
         for searched in searches if slides else [False]:
             if searched:
-                mechanism, doubt = self._search_flat(placed, joints, first)
+                mechanism, doubt = search_flat(placed, joints, first, self.friction)
                 if moved is not None and moved[0].factors[0] <= mechanism.factor:
                     return (*moved, doubt if mechanism is not first else None)
             follower = PathFollower(placed, joints, friction)
@@ -424,40 +439,6 @@ class _Search:
         rest = np.array([mechanism.factor]), np.zeros((1, *mechanism.motion.shape))
         path = MechanismPath(placed, *rest, mechanism.motion, (mechanism,), (), PathEnd.LOCKS)
         return path, 0, doubt
-
-    def _search_flat(
-        self, placed: PlacedBlocks, joints: list[int], first: KinematicChain
-    ) -> tuple[KinematicChain, Doubt | None]:
-        """Return the mechanism of the search without dilatancy, or the first, and a doubt."""
-        structure, searches = placed.structure, self.friction == "nonassociated"
-        dilates = Doubt(
-            "faces dilate as this mechanism slides: alpha_0 = {:.4g} is {}",
-            "a search without dilatancy takes no part, loads and fill",
-            (first.factor, UPPER_BOUND),
-        )
-        if len(joints) < len(structure.joints) or placed.loads:
-            if searches:
-                raise InvalidInput(
-                    "friction 'nonassociated' is searched for the whole structure only: leave out "
-                    "part and blocks, or use 'coulomb'"
-                )
-            return first, dilates
-        dry = [replace(x, contact=replace(x.contact, cohesion=0.0)) for x in structure.joints]
-        wall, live = replace(structure, joints=tuple(dry)), BodyForce(placed.direction)
-        found = collapse_factor(wall, live=live, friction="nonassociated", strength=np.inf)
-        if not np.isfinite(found.factor):
-            words = "a search without dilatancy found none: hold a motion"
-            return first, replace(dilates, remedy=words)
-        contacts, doubt = placed.touching(joints), None
-        flat = np.zeros(len(contacts))
-        if found.solutions is not None and found.solutions.may_be_less:
-            doubt = Doubt(
-                "alpha_0 is {}, the least that a search without dilatancy found, and a weaker "
-                "mechanism may exist",
-                f"hold a push of {0.9 * found.factor:.3g} g, a tenth below, by [motion] held",
-                (UPPER_BOUND,),
-            )
-        return classify_motion(placed, joints, found.motion, flat, contacts, found.factor), doubt
 
     def vary(
         self, lever: float, fill: Any, found: KinematicAssessment
@@ -681,6 +662,7 @@ class _Oscillator:
             displacement,
             given.rules,
             given.confidence_factor,
+            given.strength,
             control,
             path,
             tuple(self.notes(alpha_0)),

@@ -13,7 +13,7 @@ import xarray as xr
 from archfem._validation import validate_arguments
 from archfem.cases import result_text
 from archfem.cases.analysis_keys import rate_case
-from archfem.cases.answers import compare_crushing, find_margin
+from archfem.cases.answers import find_margin
 from archfem.cases.case import Case
 from archfem.cases.provenance import hash_inputs, remove_presentation
 from archfem.cases.run import DeadLoadResult, log_prefix
@@ -29,7 +29,7 @@ from archfem.dynamics.motion_scaling import mechanism_scales
 from archfem.dynamics.schemes import EffectiveDamping, Viscous
 from archfem.dynamics.time_history import time_history
 from archfem.dynamics.verdict import ALL_DEFINITIONS, MECHANISM_DEFINITIONS
-from archfem.errors import DidNotConverge, InvalidInput, keep_warnings
+from archfem.errors import DidNotConverge, InvalidInput
 from archfem.joints import criteria
 from archfem.limit.collapse import Outcome
 from archfem.limit.fill_range import BACKED, FillRange
@@ -235,8 +235,6 @@ def evaluate_assessment(case: Case) -> Findings:
     """
     with result_text.record_doubts(case.structure) as doubts:
         found = case.assessment.solve(case.structure, case.demand).values()
-    with keep_warnings():  # which are those of the assessment
-        doubts += [each for each in compare_crushing(case, found) if isinstance(each, Doubt)]
     doubts += [doubt for each in found for doubt in each.doubts]
     least = {"least_margin": find_margin(found), "alpha_0": min(float(x.alpha_0) for x in found)}
     bounds = ["least_margin"] * any(check.bounded for each in found for check in each.checks)

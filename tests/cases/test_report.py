@@ -163,7 +163,7 @@ def test_demand_and_capacity_stand_beside_their_doubts(kept, undrawn):
     *sentences, signatures = build_conclusion(data).pieces
     assumed = dict(build_input_section(data).pieces[1].rows)
     assert "no crushing" not in assumed["joints"]
-    assert assumed["joints"].endswith("crushing in limit analysis alone, at 20 MPa")
+    assert assumed["joints"].endswith("crushing in limit analysis and assessments alone, at 20 MPa")
     demands, table = (each for each in sentences if each.kind == "grid")
     vertical = "with vertical ones of up to 0.034 g"
     assert demands.rows == [

@@ -89,6 +89,44 @@ def test_a_rigid_block(verified):
     assert displacement == pytest.approx(spectrum * periods**2 / (4.0 * pi**2))
 
 
+def test_a_crushed_edge_sets_the_hinge_of_a_block_back(verified):
+    """By W / (2 f w) from the edge: α0 = 2 (b/2 - W / (2 f w)) / h, and d0* is that arm."""
+    breadth, height, strength = 0.6, 2.4, 0.4e6
+    for heights in ([1.4, 1.0], [height]):
+        block = replace(af.column(breadth=breadth, heights=heights), width=0.5)
+        arm = 0.5 * breadth - 0.5 * block.weight / (strength * 0.5)
+        for direction in (1.0, -1.0):
+            found = af.kinematic_assessment(block, SPECTRUM, strength=strength, direction=direction)
+            assert found.alpha_0 == pytest.approx(2.0 * arm / height)
+            assert f"0.4 MPa: hinges are set back by {1e3 * (0.3 - arm):.3g} mm" in str(found)
+    values = {"alpha_0": 2.0 * arm / height, "d_0_star": arm}
+    check_values(found, values, verified, "rigid block that crushes at 0.4 MPa")
+    weak = replace(
+        block,
+        blocks=[replace(x, material=replace(af.STONE, strength=strength)) for x in block.blocks],
+    )
+    assert af.kinematic_assessment(weak, SPECTRUM).alpha_0 == pytest.approx(2.0 * arm / height)
+    assert af.kinematic_assessment(block, SPECTRUM).alpha_0 == pytest.approx(0.25)
+    mass = af.masonry.AttachedLoad("block 1", (0.0, 2.4), weight=110e3)
+    with pytest.raises(af.InvalidInput, match=r"loads where joints crush at 0.4 MPa: af.stands"):
+        af.kinematic_assessment(block, SPECTRUM, strength=strength, loads=[mass])
+
+
+@pytest.mark.parametrize("strength", [5e6, 1e6, 0.3e6])
+def test_an_arch_that_crushes_has_the_factor_of_limit_analysis(strength, verified):
+    """That of |M| <= N (h - N / (f w)) / 2, whose cuts are another programme."""
+    found = af.kinematic_assessment(RING, SPECTRUM, strength=strength)
+    limit = af.collapse_factor(RING, live=af.BodyForce(1.0), strength=strength)
+    source = "limit analysis with cuts of the crushing limit"
+    verified(f"arch that crushes at {strength:g} Pa", limit.factor, source, found.alpha_0)
+    assert found.alpha_0 == pytest.approx(limit.factor, rel=2e-4)
+    assert found.hinges == limit.hinges
+    thrusts = limit.joints["N"].values[[k for k, _ in limit.hinges]]
+    back = found.path.blocks.setback[[k for k, _ in found.hinges]]
+    # thrusts converge to 1e-4 of the depth
+    assert back == pytest.approx(thrusts / (2.0 * strength * RING.width), abs=0.5e-4 * 0.55)
+
+
 def two_storeys():
     """A wall of two storeys, 0.5 and 0.4 m thick, flush on its left face, with two floors."""
     blocks = (
@@ -690,6 +728,21 @@ def test_a_wedge_of_a_wall_in_bond_has_the_linear_check_alone(wedge, verified):
     assert found.linear.bounded
     assert "nan" not in str(found) + found.table()
     assert "NTC-2018 SLV" not in str(found)
+
+
+@pytest.mark.slow
+def test_a_wall_in_bond_that_crushes_is_searched_with_its_hinges_set_back(wedge):
+    """Without sliding the factor is that of limit analysis; with it less than without dilatancy."""
+    wall, strength = wedge[0].structure, 1e6
+    for friction in (None, "nonassociated"):
+        found = af.kinematic_assessment(wall, SPECTRUM, friction=friction, strength=strength)
+        law = friction and "coulomb"
+        given = {"live": af.BodyForce(1.0), "friction": law, "strength": strength}
+        limit = af.collapse_factor(wall, **given).factor
+        if friction is None:
+            assert found.alpha_0 == pytest.approx(limit, rel=1e-4)
+        else:
+            assert 0.9 * limit < found.alpha_0 < min(limit, 0.99 * wedge[0].factor)
 
 
 @pytest.mark.slow

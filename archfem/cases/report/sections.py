@@ -177,10 +177,10 @@ def _describe_joints(data: ReportData) -> str:
         varied = {"joint_rule", "k_n", "finish"}.intersection(list_varied(data))
         law += f"; {closing}, which was {'varied' if varied else 'not varied'}"
     strength = data.case.limit.strength
-    computed = {"limit", "thickness", "rating"} & data.statements.keys()
+    computed = {"limit", "thickness", "rating", "assessment"} & data.statements.keys()
     if strength is None or strength == np.inf or not computed:  # infinite is "none"
         return f"{law}; no crushing"
-    return f"{law}; crushing in limit analysis alone, at {strength / MPa:.3g} MPa"
+    return f"{law}; crushing in limit analysis and assessments alone, at {strength / MPa:.3g} MPa"
 
 
 def build_structure_section(data: ReportData) -> Section:
