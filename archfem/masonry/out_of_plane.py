@@ -35,9 +35,9 @@ def columns_across(wall: Structure, *, above: Metres | None = None) -> dict[str,
 
     All are as broad as the wall is thick, and have its courses: from one bed over most of its
     length to the next or, without any, one at each bed of a stone. A course of the whole weighs as
-    much as that of the wall, less its openings; its joints are as long as the wall. A course of
-    less than a fifth of the median weight, as the tip of a gable, is one block with the course
-    below it. The strip has a mean metre of the wall, its openings filled with stones of the course.
+    much as that of the wall, less its openings; its joints are as long as the stones of the lowest
+    course. A course of less than a fifth of the median weight, as the tip of a gable, is one block
+    with the course below it. The strip has a mean metre of the wall, its openings filled with stones of the course.
     What stones stand for besides themselves, such as a floor, weighs on all, and is named there. On
     the strip that of a sloping crown is at the top, by its mean over the length of the wall.
 
@@ -97,7 +97,7 @@ def columns_across(wall: Structure, *, above: Metres | None = None) -> dict[str,
     spans = np.array([np.ptp(sides[each > 0.0]) for each in areas.T])
     columns = {
         "strip": build("strip", 1.0, *_fill_strip(levels, solid, carried, areas, spans)),
-        "whole": build("whole", length, weights, areas),
+        "whole": build("whole", float(areas[:, 0].sum() / (levels[1] - levels[0])), weights, areas),
     }
     if pier := _find_worst_pier(wall, levels, shares, unit_weights):
         columns["pier"] = build(*pier)
