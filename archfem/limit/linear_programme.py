@@ -326,7 +326,7 @@ class Programme:
     unknown_cost: Array = field(default_factory=lambda: np.zeros(0))  # b (k,)
     upper_bounds: Array = field(default_factory=lambda: np.zeros(0))  # c (k,), infinite for none
     # whether the solver starts from the last optimum: which of many is found depends on that then
-    in_search: bool = False
+    starts_from_last: bool = False
 
     def with_unknowns(
         self, columns: sparse.csr_matrix, cost: Array, upper_bound: float = np.inf
@@ -383,7 +383,7 @@ class Programme:
             limits = limits.joined(crushing_cuts(crushes, self.crushing[crushes], self.crushing))
         columns = sparse.csr_matrix((len(self.load), 0)) if self.columns is None else self.columns
         reduced = self.blocks.reduce(columns, self.friction, self.cohesion > 0.0)
-        if not self.in_search:
+        if not self.starts_from_last:
             reduced.known.clear()
         # As tangents of a parabola the cuts converge quadratically, in about six rounds, where one
         # state is optimal. Where many are, as in walls, each round may find another one: once the

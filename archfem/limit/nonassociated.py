@@ -383,7 +383,7 @@ def _search(
     programme: Programme, start: Optimum | None, scale: float
 ) -> tuple[Optimum | None, NonassociatedBounds]:
     """Return the result of `search_nonassociated` for a programme as it is."""
-    found, interrupted, programme = _SearchState(), False, replace(programme, in_search=True)
+    found, interrupted, programme = _SearchState(), False, replace(programme, starts_from_last=True)
     associated = -np.inf if start is None else start.value
     try:
         _search_solutions(programme, start, found)
@@ -439,7 +439,9 @@ def _search_solutions(programme: Programme, start: Optimum | None, found: _Searc
     if first is not None:
         least = first.state.value + OBJECTIVE_DECREASE * abs(first.state.value)
     if starts and max(found.bound, associated) > least:  # a weaker solution is possible
-        for iterate in descend(programme, first, starts[0], patience=30):
+        # near the last optimum slips changed at random would lead to few other vertices
+        fresh = replace(programme, starts_from_last=False)
+        for iterate in descend(fresh, first, starts[0], patience=30):
             found.weaker += (iterate,)
 
 
