@@ -40,6 +40,10 @@ NO_LIMIT = 1e300
 # are closed to any program.
 LARGEST_CLOSING = 0.98
 
+# Opening up to which joints cohere, over c / k_n [-]. Joints that nothing presses rest at zero
+# opening, within 1e-8 m: if cohesion ended there, shear would jump, and no iteration converge.
+COHESIVE_OPENING = 1e-3
+
 # Excess over Coulomb's limit, relative to it, that counts as round-off of a point that holds [-]
 SLIP_LIMIT_TOLERANCE = 1e-9
 
@@ -127,6 +131,10 @@ class ContactLaw(NamedTuple):
         by_start = np.where(is_closed(start), fraction - square, square)
         by_end = np.where(is_closed(end), fraction - square, square)
         return np.asarray(self.normal_stiffness * (rates[0] * by_start + rates[1] * by_end))
+
+    def cohesive_gap(self, opening: Any) -> Any:
+        """Return an opening, less that up to which the joint coheres [m]."""
+        return opening - COHESIVE_OPENING * self.cohesion / self.normal_stiffness
 
     def shear_traction(self, slip: Any) -> Any:
         """Return the elastic traction along the joint, t_s = k_s s [Pa]."""

@@ -108,18 +108,24 @@ class NormalLaw(ABC):
     def divide(self, *gaps: Array) -> Places:
         """Return the places of integration, from gaps of the points (p,)."""
 
+    def _divide_cohesion(self, places: Places, *gaps: Array) -> Places:
+        """Return the places of integration of the area that coheres; without cohesion, as given."""
+        contact = self.points.contact
+        coheres = np.any(contact.cohesion)
+        return self.divide(*map(contact.cohesive_gap, gaps)) if coheres else places
+
     def forces(self, opening: Array) -> Array:
         """Return the normal forces at the points, positive where they pull (p,) [N]."""
         return self.forces_and_area(opening)[0]
 
     def forces_and_area(self, opening: Array) -> tuple[Array, Array]:
-        """Return `forces`, and the closed area distributed to the points (p,) [N, m²]."""
+        """Return `forces`, and the area that coheres, distributed to the points (p,) [N, m²]."""
         places = self.divide(opening)
-        traction, closed = self.contact.normal_traction(*places.gaps), is_closed(*places.gaps)
-        forces = places.integrate(traction)
+        closed = self._divide_cohesion(places, opening)
+        forces = places.integrate(self.contact.normal_traction(*places.gaps))
         if self.points.stiffens:
             forces = forces + self._excess(opening, opening, (1.0, 1.0))[0]
-        return forces, places.integrate(closed.astype(float))
+        return forces, closed.integrate(is_closed(*closed.gaps).astype(float))
 
     def stiffness(self, opening: Array) -> Array:
         """Return the derivative of `forces` for each of `coupling_pairs` (m,) [N/m]."""
@@ -160,7 +166,8 @@ class NormalLaw(ABC):
         forces = places.integrate(traction)
         if self.points.stiffens:
             forces = forces + self._excess(start, end, (lag, 1.0 + lag))[0]
-        return forces, places.integrate(contact_fraction(*places.gaps))
+        closed = self._divide_cohesion(places, start, end)
+        return forces, closed.integrate(contact_fraction(*closed.gaps))
 
     def mean_stiffness(self, start: Array, end: Array, rates: tuple[float, float]) -> Array:
         """Return the derivative of the mean force by a parameter, as `stiffness` (m,) [N/m]."""
@@ -171,7 +178,7 @@ class NormalLaw(ABC):
 
     def mean_area_rate(self, start: Array, end: Array, rates: tuple[float, float]) -> Array:
         """Return the derivative of the mean area by a parameter (m,) [m]."""
-        places = self.divide(start, end)
+        places = self._divide_cohesion(self.divide(start, end), start, end)
         before, after = places.gaps
         return places.integrate_products(contact_fraction_rate(before, after, rates))
 
@@ -222,7 +229,8 @@ class Facets(NormalLaw):
 
     def contact_area_rate(self, opening: Array) -> Array:
         """Return the derivative of the closed area for each of `coupling_pairs` (2 p,) [m]."""
-        a, b = opening[0::2], opening[1::2]
+        gap = self.points.contact.cohesive_gap(opening)
+        a, b = gap[0::2], gap[1::2]
         # the zero z = a / (a - b) ends the closed part, or begins it; φ at z divides the area
         zero, inverse = _divide_by_change(a, a, b), _divide_by_change(1.0, a, b)
         scale = np.where(is_closed(a), self.area, -self.area) * inverse**2

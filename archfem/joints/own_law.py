@@ -97,7 +97,8 @@ class DryJoint:
 
     def respond(self, opening: Array, slip: Array, memory: Array) -> tuple[Any, Any, Any]:
         """Return tractions, tangent and irreversible slip, as `JointLaw.respond`."""
-        law, closed = ContactLaw.of(self), is_closed(opening)
+        law = ContactLaw.of(self)
+        closed = is_closed(law.cohesive_gap(opening))
         normal, across = law.normal_traction(opening), law.normal_tangent(opening)
         trial, limit = law.shear_traction(slip - memory[0]), law.shear_limit(normal, closed)
         shear = clip_to_friction(trial, limit)

@@ -22,6 +22,7 @@ from archfem._typing import Array
 from archfem.dynamics.solvers.newmark import StepNumbers
 from archfem.joints.contact_law import ContactLaw
 from archfem.joints.large.point_law import (
+    closed_means,
     instant_release,
     joint_means,
     limit_rate,
@@ -52,7 +53,7 @@ POINT_RECORD = _record_type(
     " ".join(["share near far area shear slip lever", *ContactLaw._fields]),
 )
 
-# Forces of a point over a step: mean normal force, positive in tension [N], mean closed area [m²],
+# Forces of a point over a step: mean normal force, positive in tension [N], area that coheres [m²],
 # derivatives of its released force by z at both ends of its segment [N/m], mean shear [N], elastic
 # shear lost by slip [N], derivatives of the mean shear by its elastic change and by Coulomb's limit
 # [-], and energy dissipated along the joint, times its shear stiffness [N²].
@@ -323,10 +324,14 @@ def evaluate_openings(law, gap, segments):  # type: ignore
             a, b = points[first].share, points[first + step - 1].share
             ends = gaps_between(before, after, a, b)
             means = joint_means(points[first], ends, rates[0], rates[1], facets)
+            closed = 0.0, 0.0
+            if points[first].cohesion != 0.0:
+                closed = closed_means(points[first], ends, 0.0, facets)[0]
             for end in range(step):
                 # forces of the points go to the ends of the segment by linear interpolation
                 point, point_state = points[first + end], law.point_states[first + end]
                 _open_point(point, point_state, means, end, (a, b))
+                point_state.area = point.area * closed[end]
                 released, share = point.area * means[1][end], point.share
                 state.near += (1.0 - share) * released
                 state.far += share * released
@@ -337,10 +342,9 @@ def evaluate_openings(law, gap, segments):  # type: ignore
 
 @inlined_kernel
 def _open_point(point, state, means, end, shares):  # type: ignore
-    """Store normal force, closed area and derivatives of a point from the means over its path."""
-    (normal, _, rate, time, _), (a, b), area = means, shares, point.area
+    """Store normal force and derivatives of a point from the means over its path."""
+    (normal, _, rate), (a, b), area = means, shares, point.area
     state.normal = area * normal[end]
-    state.area = area * time[end]
     # chain rule: openings of the facet's ends by those of the segment's ends
     state.near = area * (rate[end] * (1.0 - a) + rate[end + 1] * (1.0 - b))
     state.far = area * (rate[end] * a + rate[end + 1] * b)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from archfem._numba import inlined_kernel, kernel
-from archfem.joints.contact_law import SLIP_LIMIT_TOLERANCE, ContactLaw
+from archfem.joints.contact_law import COHESIVE_OPENING, SLIP_LIMIT_TOLERANCE, ContactLaw
 from archfem.joints.large.closing_law import excess_means, facet_step_excess, point_step_excess
 from archfem.joints.large.lanes import any_lane, greatest, least, select
 from archfem.joints.normal_law import GAUSS_POINTS, GAUSS_WEIGHTS
@@ -34,19 +34,18 @@ def joint_means(contact, ends, first, second, facet):  # type: ignore
     """Return means over a step at a place, or times φ_i along a facet of unit length.
 
     Gaps of the facet's ends move from (a, c) to (b, d) in the step, at the rates `first` and
-    `second`; a place moves from a to b. The means are of the traction, of the release, the rate of
-    that, the fraction closed, and its rate. Rates of a facet are of (1, 1), (1, 2) and (2, 2).
+    `second`; a place moves from a to b. The means are of the traction, of the release, and the rate
+    of that. Rates of a facet are of (1, 1), (1, 2) and (2, 2).
     """
-    means = linear_means(contact, ends, first, second, facet)
+    normal, taken, rates, _, _ = linear_means(contact, ends, first, second, facet)
     if contact.closing_rate == 0.0:
-        return means
+        return normal, taken, rates
     more, k = _step_excess(contact, ends, (first, second), facet)
-    normal, taken, rates, time, moves = means
     normal, taken = (
         (normal[0] - more[0], normal[1] - more[1]),
         (taken[0] + more[0], taken[1] + more[1]),
     )
-    return normal, taken, (rates[0] - k[0], rates[1] - k[1], rates[2] - k[2]), time, moves
+    return normal, taken, (rates[0] - k[0], rates[1] - k[1], rates[2] - k[2])
 
 
 @inlined_kernel
@@ -62,7 +61,7 @@ def _step_excess(contact, ends, rates, facet):  # type: ignore
 
 @inlined_kernel
 def linear_means(contact, ends, first, second, facet):  # type: ignore
-    """Return `joint_means` of the linear law."""
+    """Return `joint_means` of the linear law, the fraction closed, and its rate."""
     if facet:
         return _facet_means(contact, ends, first, second)
     normal, taken, rate, time, moves = _point_means(contact, ends[0], ends[2], first, second)
@@ -274,8 +273,10 @@ def damping_tractions(contact, ends, lag, facet):  # type: ignore
 
 @inlined_kernel
 def closed_means(contact, ends, lag, facet):  # type: ignore
-    """Return means of the closed fraction as `joint_means`, and their derivatives."""
-    a, c, _, _ = ends
+    """Return means of the fraction that coheres as `joint_means`, and their derivatives."""
+    reach = COHESIVE_OPENING * contact.cohesion / contact.normal_stiffness
+    a, c, b, d = ends
+    ends = a - reach, c - reach, b - reach, d - reach
     _, _, _, time, rates = linear_means(contact, ends, lag, 1.0 + lag, facet)
     # at an instant the end of the closed part of a facet moves
     low, high, _ = _zero_crossings(ends)

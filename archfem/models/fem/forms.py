@@ -117,7 +117,7 @@ class ContactFaces:
 
     def _is_closed(self, u: Any) -> Any:
         """Closed part of the joint: one where it is closed, else zero [-]."""
-        return ufl.conditional(ufl.lt(self._gap(u), 0.0), 1.0, 0.0)
+        return ufl.conditional(ufl.lt(self._law.cohesive_gap(self._gap(u)), 0.0), 1.0, 0.0)
 
     def _limit(self, u: Any) -> Any:
         """Coulomb's limit at the normal traction that a displacement causes [Pa]."""
@@ -150,7 +150,8 @@ class ContactFaces:
     def _mean_limit(self, step: Fields, lag: Any) -> Any:
         """Coulomb's limit over a step: that of the mean normal traction [Pa]."""
         path = self._gap_path(step, lag)
-        return self._law.shear_limit(self._law.mean_normal_traction(*path), contact_fraction(*path))
+        closed = contact_fraction(*map(self._law.cohesive_gap, path))
+        return self._law.shear_limit(self._law.mean_normal_traction(*path), closed)
 
     def means(self, step: Fields, lag: Any) -> Fields:
         """Return the means over a step of the tractions across and along the joint [Pa]."""
