@@ -96,15 +96,13 @@ def build_run_sections(data: ReportData) -> list[Section]:
     if data.case.suite is None:
         (name,) = data.runs
         return [Section("Response", _build_response(data, name, 1))]
-    title, shown = "Response: pair by pair", [*data.runs]
+    every = Section("Response: all pairs", [*_build_suite_response(data), *missing])
     if not data.shows_all:
-        title, shown = "Response: the worst pair", [find_worst_run(data)]
-    sections = [
-        Section("Response: all pairs", [*_build_suite_response(data), *missing]),
-        Section(title, []),
-    ]
-    for name in shown:
-        sections.append(Section(name, _build_response(data, name, len(shown)), level=3))
+        worst = find_worst_run(data)
+        return [every, Section(f"The worst: {worst}", _build_response(data, worst, 1), level=3)]
+    sections = [every, Section("Response: pair by pair", [])]
+    for name in data.runs:
+        sections.append(Section(name, _build_response(data, name, len(data.runs)), level=3))
     return sections
 
 
@@ -240,12 +238,12 @@ def build_check_section(data: ReportData) -> Section:
     """Build the section on predicted error, energy balance and model."""
     blocks: list[Any] = [TextBlock(data.deleted, "missing")] if data.deleted else []
     if data.runs:
-        head = ["run", "energy drift", "support reaction", "Newton iterations", "halved steps"]
+        head = ["run", "energy drift", "support reaction", "iterations", "halved steps"]
         head += ["predicted error", "end"]
         rows = [_check_row(data.case, name, run) for name, run in data.runs.items()]
         caption = (
             "Checks of each run. Energy drifts relative to the largest exchanged. Supports react "
-            "under dead load, by joints as built. Iterations are the most between two records"
+            "under dead load, by joints as built. Iterations of Newton are the most between records"
         )
         blocks.append(Grid(head, rows, caption))
     caption = "Speed against error over fidelities, meshes and steps."
@@ -264,7 +262,7 @@ def _check_row(case: Case, name: str, run: History) -> list[str]:
         f"{abs(float(attrs['energy_drift'])):.1e}",
         f"{ratio:.4f} of the weight",
         f"≤ {int(run.dataset['iterations'].max())}",
-        f"{int(attrs['halved_steps'])} steps",
+        f"{int(attrs['halved_steps'])}",
         "–" if predicted is None else f"{float(predicted):.2g} in |e|",
         run.outcome,
     ]

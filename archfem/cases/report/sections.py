@@ -506,8 +506,8 @@ def build_method_section(data: ReportData) -> Section:
     used = [row[1:] for row in _METHODS if not row[0] or data.list_parts(row[0])]
     used = [row for row in used if data.runs or row[0] != "joints, criteria"]
     if find_rule(data) is SELECTION_RULES["EC8"]:
-        without = ("assessment", "EN 1998-1 itself has no such check")
-        used += [without] * ("assessment" in dict(used))
+        without = {"assessment": "; EN 1998-1 itself has no such check"}
+        used = [(name, text + without.get(name, "")) for name, text in used]
     return Section("Norms and methods", [Grid((), [*norm, *spectra, *used])])
 
 
