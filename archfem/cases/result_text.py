@@ -325,7 +325,8 @@ def describe_collapse(
     turns = list_or_count(hinges, CLEAR_TURNS)
     lines += [f"hinges, by the face in contact: {turns}"] if hinges else []
     lines += [f"sliding: {slides}"] if sliding else []
-    lines += [str(collapse.solutions)] if collapse.solutions else []
+    yielding = "if bonds yield: " * bool(collapse.bonded)
+    lines += [f"{yielding}{collapse.solutions}"] if collapse.solutions else []
     if collapse.over_fill:
         unit, name = abs(collapse.push) or 1.0, " g" * bool(collapse.push)
         lines.append(collapse.over_fill.describe_states(unit, name=name))

@@ -162,6 +162,14 @@ class Collapse(ResultDisplay):
         return (self.lower, self.upper) if self.over_fill is None else self.over_fill.ends
 
     @property
+    def bonded(self) -> list[int]:
+        """Failing joints that bonds hold, which break rather than yield."""
+        failing = {*self.sliding, *(joint for joint, _ in self.hinges)}
+        if self.structure is None:
+            return []
+        return sorted(failing.intersection(np.flatnonzero(self.structure.tension > 0.0).tolist()))
+
+    @property
     def push(self) -> float:
         """Horizontal body force that alone grows, at a factor of 1 [g]; else 0."""
         return find_push(self.live)
@@ -407,10 +415,10 @@ def _solve_loads(
         warn_locking(structure, friction, fill)
     if friction is None:
         warn_idle_joints(result)
-    warn_bonds(structure, result)
     actions = (loads,) if isinstance(loads, Settlement) else tuple(loads)
     crushes = check_options(structure, friction, strength)
     result = replace(result, strength=crushes, live=actions, dead=stays, structure=structure)
+    warn_bonds(structure, result)
     if result.outcome is Outcome.BRACKETED:
         logger.warning(
             "%s: the mechanism is of the bound, and dilates; %s; a pushover finds a state of "
@@ -727,9 +735,8 @@ def warn_idle_joints(result: Collapse) -> None:
 
 
 def warn_bonds(structure: Structure, result: Collapse) -> None:
-    """Warn of failing joints that are held by bonds, which break rather than yield."""
-    failing = {*result.sliding, *(joint for joint, _ in result.hinges)}
-    if bonded := sorted(number for number in failing if structure.tension[number] > 0.0):
+    """Warn of failing joints that are held by bonds."""
+    if bonded := result.bonded:
         logger.warning(
             "%d joints such as '%s' fail by bonds that yield, up to %.3g Pa in tension: bonds are "
             "brittle and break one after the other, so that the factor %.4g is an upper estimate; "

@@ -213,18 +213,18 @@ def evaluate_limit(case: Case) -> Findings:
     }
     if collapse.outcome is Outcome.BRACKETED:
         findings["factor_at_most"] = float(collapse.upper)
-    searched = [bool(each.solutions and each.solutions.may_be_less) for each in senses]
-    bounds = ["factor"] * searched[0]
+    searched = [x.bonded or (x.solutions and x.solutions.may_be_less) for x in senses]
+    bounds = ["factor"] * bool(searched[0])
     if push := abs(collapse.push):
         factors = [x.factor if x.over_fill is None else x.range[0] for x in senses]
         least, site = push * float(np.min(factors)), result_text.site_acceleration(case)
-        findings |= {"push": push * float(collapse.factor), "least_push": least}
-        findings |= {"least_push_over_site": least / site} if site > 0.0 else {}
+        leasts = {"least_push": least}
+        leasts |= {"least_push_over_site": least / site} if site > 0.0 else {}
         over = FillRange.least_of([x.over_fill for x in senses if x.over_fill]).values
         backed = [push * value for key, value in over.items() if key.backing == BACKED]
-        findings |= {"least_push_on_backing": min(backed)} if backed else {}
-        least_of = "least_push", "least_push_over_site", "least_push_on_backing"
-        bounds += ["push"] * searched[0] + [x for x in least_of if x in findings and any(searched)]
+        leasts |= {"least_push_on_backing": min(backed)} if backed else {}
+        bounds += ["push"] * len(bounds) + [*leasts] * any(searched)
+        findings = leasts | findings | {"push": push * float(collapse.factor)}
     return findings | _name_bounds(bounds) | _state_doubts(doubts)
 
 

@@ -20,8 +20,9 @@ from study_tables import equal_tables
 import archfem as af
 from archfem.cases import provenance
 from archfem.cases.report.study_findings import collect_findings, tabulate_study
+from archfem.cases.result_text import describe_collapse
 from archfem.studies import parameter_axes, process_pool, result_store
-from archfem.studies.evaluators import Evaluator, evaluate_rating
+from archfem.studies.evaluators import Evaluator, evaluate_limit, evaluate_rating
 from archfem.studies.parameter_space import group_by_model
 from archfem.studies.result_store import Store
 from archfem.studies.shared_results import compute_once, share_results
@@ -717,6 +718,27 @@ def test_what_is_not_proved_least_is_marked(tmp_path, capsys):
     assert f"; 'bond', at ≤ {bond:.3g} of it" in text
     found = collect_findings("", "", table)
     assert [row[1] for row in tabulate_study(found).rows] == [f"{stack:.3g}", f"≤ {bond:.3g}"]
+
+
+def test_bonds_that_yield_prove_no_least_push(tmp_path):
+    """A mortared block on its bed, in the words of its limit analysis; the least stands first."""
+    path = tmp_path / "bonded.toml"
+    path.write_text(
+        '[structure]\nshape = "column"\nbreadth = 1.0\nheights = [2.0]\ncontact = "mortar"\n'
+        '[contacts.mortar]\nnormal_stiffness = "1 MPa/mm"\nshear_stiffness = "1 MPa/mm"\n'
+        'friction = 0.6\ntension = "50 kPa"\ncohesion = "60 kPa"\n'
+        '[limit]\nhorizontal = 1.0\nfriction = "nonassociated"\n'
+    )
+    case = af.Case.read(path)
+    found = evaluate_limit(case)
+    assert [*found][:2] == ["least_push", "factor"]
+    assert {*found["upper_bounds"].split(", ")} == {"factor", "push", "least_push"}
+    text = describe_collapse(case.structure, case.limit.solve(case.structure), case.limit)
+    assert "\nif bonds yield: proved the least" in text
+    dry = af.Case.read(path, ["contacts.mortar.tension=0", "contacts.mortar.cohesion=0"])
+    assert "upper_bounds" not in evaluate_limit(dry)
+    text = describe_collapse(dry.structure, dry.limit.solve(dry.structure), dry.limit)
+    assert "\nproved the least" in text
 
 
 def test_a_case_above_the_tables_is_that_of_those_that_name_none(tmp_path):
