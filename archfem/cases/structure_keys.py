@@ -35,7 +35,14 @@ from archfem.masonry.joint_closing import (
     usual_law,
     with_finish,
 )
-from archfem.masonry.materials import CONTACT_PRESETS, MATERIAL_PRESETS, STONE, Contact, Material
+from archfem.masonry.materials import (
+    CONTACT_PRESETS,
+    MATERIAL_PRESETS,
+    STONE,
+    Contact,
+    Material,
+    StatedWeight,
+)
 from archfem.masonry.shapes import bridges, rings, walls
 from archfem.masonry.shapes.bridge_parts import Arch, Backfill, Paving, Pier, Sidewall
 from archfem.masonry.standing import StandingBody, carrying
@@ -356,6 +363,8 @@ def _resolve_preset(settings: Table, section: str, name: str) -> Any:
     if "finish" in given:
         values |= _read_finish(given, place)
     values |= given
+    if isinstance(tables.get(name, {}).get("unit_weight"), str):
+        values["unit_weight"] = StatedWeight(given["unit_weight"])
     if values.get("law") is not None:
         values["law"] = _joint_law(values["law"], f"{section}.{name}.law")
     return _call(cls, f"{section}.{name}", **{**values, "name": given.get("name", name)})
@@ -466,6 +475,8 @@ def _list_fields(item: Material | Contact) -> dict[str, Any]:
     """Return the fields of a material or contact that are not None, as a table."""
     table = {each.name: getattr(item, each.name) for each in fields(item)}
     table = {name: value for name, value in table.items() if value is not None}
+    if isinstance(weight := table.get("unit_weight"), StatedWeight):
+        table["unit_weight"] = f"{float(weight)!r} N/m**3"
     if table.get("friction") == inf:
         table["friction"] = "none"
     if "law" in table:

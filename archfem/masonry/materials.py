@@ -27,6 +27,10 @@ def _check_range(item: Any, key: str, low: float, high: float, remedy: str) -> N
     check_between(getattr(item, key), name, low, high, ends="[]", remedy=remedy)
 
 
+class StatedWeight(float):
+    """Unit weight that was given with its unit, so that none is guessed [N/m³]."""
+
+
 @dataclass(frozen=True)
 class Material:
     """A linear elastic, isotropic block material in plane stress.
@@ -63,7 +67,8 @@ class Material:
         _check_range(self, "unit_weight", 1e-3, heaviest, heavy)
         # no building material weighs as little in N/m³ as soils and stones do in these units
         for low, high, unit, factor in ((1e3, 4e3, "kg/m³", G), (5.0, 50.0, "kN/m³", kN)):
-            if self.stands_for is None and low <= self.unit_weight <= high:
+            is_stated = self.stands_for is not None or isinstance(self.unit_weight, StatedWeight)
+            if low <= self.unit_weight <= high and not is_stated:
                 number = f"{self.unit_weight:.4g}"
                 raise InvalidInput(
                     f"unit_weight {number} N/m³ of '{self.name}' looks like {unit}: give it in "

@@ -343,3 +343,20 @@ def test_a_finish_is_read_and_written():
 def test_a_finish_is_refused_beside_what_follows_from_it(contact, says):
     with pytest.raises(af.InvalidInput, match=says):
         build_structure({**RING_OF_20_MPA, "contacts": {"stone to stone": contact}})
+
+
+@pytest.mark.parametrize("weight", [3200.0, 20.0])
+def test_a_unit_weight_with_its_unit_is_taken_as_it_stands(weight):
+    """3.2 kN/m³ are those of a timber, and look like the kg/m³ of a stone."""
+    table = {"young": 1e10, "poisson": 0.3, "unit_weight": f"{1e-3 * weight} kN/m³"}
+    shape = {"shape": "column", "breadth": 1.0, "heights": [1.0], "material": "timber"}
+    built = build_structure({"structure": shape, "materials": {"timber": table}})
+    assert built.blocks[1].material.unit_weight == weight
+    assert replace(built.blocks[1].material, young=2e10).unit_weight == weight
+    assert build_structure(tomllib.loads(format_tables(write_structure(built)))) == built
+    table["unit_weight"] = weight
+    with pytest.raises(af.InvalidInput, match="looks like"):
+        build_structure({"structure": shape, "materials": {"timber": table}})
+    table["unit_weight"] = "1e-7 kN/m³"
+    with pytest.raises(af.InvalidInput, match="give a weight, not a density"):
+        build_structure({"structure": shape, "materials": {"timber": table}})
