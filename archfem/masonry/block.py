@@ -365,21 +365,24 @@ def check_overlaps(
         return
     deepest = [k for k in np.argsort(-depth).tolist() if depth[k] > near]
     middles = [(common[k].centroid.x, common[k].centroid.y) for k in deepest]
-    both, (first, second) = common[deepest[0]], pairs[deepest[0]]
-    one, other, where = names[first], names[second], place(middles[0])
-    areas = [measure_polygon(outlines[k])[0] for k in (first, second)]
+    both, (one, other) = common[deepest[0]], (names[k] for k in pairs[deepest[0]])
+    where, sizes = place(middles[0]), np.array([measure_polygon(each)[0] for each in outlines])
+    areas = sizes[pairs[deepest]].T
+    same = np.array([common[k].area for k in deepest]) > (1.0 - 1e-6) * areas.max(axis=0)
     found = [
         ("overlap", names[pairs[k][0]], names[pairs[k][1]], middle)
         for k, middle in zip(deepest, middles, strict=True)
     ]
     others = say_others("the deepest", found, place)
-    if both.area > (1.0 - 1e-6) * max(areas):
-        same = f"'{one}' and '{other}' at {where} are the same{others}: leave one out"
-        raise InvalidStructure(same, found)
+    if same[0]:
+        rest = "" if same.all() else "; correct the outlines of those that only overlap"
+        words = f"'{one}' and '{other}' at {where} are the same{others}: leave one out{rest}"
+        raise InvalidStructure(words, found)
+    is_twice = same.any() or both.area > 0.5 * areas[:, 0].min()
     raise InvalidStructure(
         f"'{one}' and '{other}' overlap by {1e4 * both.area:.3g} cm², about "
         f"{1e3 * depth[deepest[0]]:.3g} mm deep at {where}{others}: correct their outlines"
-        f"{', or leave out the one drawn twice' if both.area > 0.5 * min(areas) else ''}",
+        f"{', or leave out the one drawn twice' if is_twice else ''}",
         found,
     )
 

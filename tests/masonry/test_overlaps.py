@@ -42,6 +42,19 @@ def test_the_deepest_of_several_overlaps_is_reported_and_most_of_a_block_may_be_
         check_overlaps(outlines, [*NAMES, "c"])
 
 
+def test_each_kind_of_overlap_has_its_remedy():
+    """Two pairs, of which the deepest is one drawn twice, or is no such pair."""
+    twice, crossed = [box(0.0, 0.0)] * 2, [box(5.0, 0.0), box(5.98, 0.0)]
+    larger = [box(5.0, 0.0, 9.0, 9.0), box(12.0, 0.0, 9.0, 9.0)]  # by 2 m
+    for outlines, words in (
+        (twice + [box(each, 3.0) for each in (0.0, 0.0)], "overlaps .*: leave one out$"),
+        (twice + crossed, ": leave one out; correct the outlines of those that only overlap$"),
+        (twice + larger, ": correct their outlines, or leave out the one drawn twice$"),
+    ):
+        with pytest.raises(af.errors.InvalidStructure, match=words):
+            check_overlaps(outlines, [*NAMES, "c", "d"])
+
+
 def test_overlaps_of_small_blocks_are_refused_too():
     """Centimetres of one and a half: the overlap is 1 mm by 1 cm, 2 A / P = 0.909 mm deep."""
     with pytest.raises(af.errors.InvalidStructure, match=r"by 0.1 cm², about 0.909 mm deep"):
