@@ -7,7 +7,7 @@ import numpy as np
 from archfem.cases.answers import RESULTS
 from archfem.cases.report.doubts import MAX_RATIO_OF_PEAKS, peak_of_ground, read_spectrum
 from archfem.cases.report.report_data import ReportData
-from archfem.cases.result_text import peak_of_spectrum
+from archfem.cases.result_text import peak_of_spectrum, site_acceleration
 from archfem.masonry.structure import join_words
 from archfem.units import STANDARD_GRAVITY, Ends
 from archfem.view.pages.document import Grid
@@ -47,8 +47,10 @@ def tabulate_demands(data: ReportData) -> list[Grid]:
     return [Grid(head, rows, caption, "words")] if rows[1:] or text else []
 
 
-def find_largest_demand(data: ReportData) -> float:
-    """Return the largest peak acceleration of all demands [g]; 0 without any."""
+def find_demand(data: ReportData) -> float:
+    """Return the site's acceleration [g], or the largest peak of the motions; 0 without any."""
+    if np.isfinite(site := site_acceleration(data.case)):
+        return site
     return max((ends[-1] for _, ends, *_ in list_demands(data)), default=0.0)
 
 

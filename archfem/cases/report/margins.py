@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from archfem.cases.answers import Ratios, compare_checks, read_numbers
-from archfem.cases.report.demands import find_largest_demand, name_spectrum
+from archfem.cases.report.demands import find_demand, name_spectrum
 from archfem.cases.report.doubts import list_checks, object_to_motions, peak_of_ground
 from archfem.cases.report.outcomes import find_worst, sentence
 from archfem.cases.report.report_data import ReportData
@@ -36,7 +36,7 @@ def find_unchecked_push(data: ReportData) -> tuple[float, float] | None:
     """
     if data.across[0] or not _leaves_plane_across(data):
         return None
-    return data.transverse_push, find_largest_demand(data)
+    return data.transverse_push, find_demand(data)
 
 
 def _leaves_plane_across(data: ReportData) -> bool:
@@ -104,11 +104,9 @@ def build_transverse(data: ReportData) -> list[TextBlock]:
     if not _leaves_plane_across(data):
         return []
     text = describe_transverse_push(data.case.structure)
-    push, demand = data.transverse_push, find_largest_demand(data)
+    push, demand = data.transverse_push, find_demand(data)
     if push < demand:
-        text += (
-            f"; the largest demand, {demand:.3g} g, exceeds it ({format_ratio(demand / push)} ×)"
-        )
+        text += f"; the demand, {demand:.3g} g, exceeds it ({format_ratio(demand / push)} ×)"
     # the head says that it was not checked
     text = text.removeprefix(f"{UNCHECKED_ACROSS}: ") + data.across[1]
     manner = "doubt" if push < demand else "plain"
