@@ -150,9 +150,9 @@ def _say_plainly(data: ReportData, doubtful: Sequence[str]) -> Iterator[tuple[st
     assessed = [f"by the kinematic assessment {words}" for words in found]
     unchecked, overturns = _say_unchecked(data)
     answer, margin, depends, left = HEAD
+    less = [(bool(data.runs) and x < 1.0, words) for x, words, _ in margins.say_less(data)]
     if data.runs:
-        less = [words for least, words, _ in margins.say_less(data) if least < 1.0]
-        failing = [*assessed * bool(failed), *unchecked * overturns, *less]
+        failing = [*assessed * bool(failed), *unchecked * overturns]
         yield from ((answer, x) for x in _say_survival(data, doubtful, failing))
         yield from ((margin, x) for x in [*_say_first_failures(data), *say_fragile(data)])
         yield from ((depends, x) for x in _say_conditions(data))
@@ -166,7 +166,7 @@ def _say_plainly(data: ReportData, doubtful: Sequence[str]) -> Iterator[tuple[st
             for row in stated.rows[:1]:
                 times = f", at {row.factor} times {row.demand}" * (row.factor != "-")
                 yield answer, f"{row.result}: {row.outcome}{times * (name != 'risk')}"
-    yield from ((margin, x) for _, x, _ in margins.say_less(data) if not data.runs)
+    yield from ((answer if fails else margin, x) for fails, x in less if fails or not data.runs)
     yield from [] if data.runs and overturns else ((left, x) for x in unchecked)
 
 

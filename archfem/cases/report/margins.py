@@ -115,7 +115,7 @@ def build_transverse(data: ReportData) -> list[TextBlock]:
 
 def describe_margin(data: ReportData) -> Iterator[str]:
     """Yield the factors on the demands of an earthquake, the least first, maybe as ranges."""
-    for k, (_, is_ranked, texts) in enumerate(rank_margins(data)):
+    for k, (least, is_ranked, texts) in enumerate(rank_margins(data)):
         rank = ("the least margin is ", "the next is ", "then follows ")[min(k, 2)] * is_ranked
         stated = least < np.inf and (not data.runs or least < 1.0)  # a push or study, in the head
         if not (k or is_ranked) and stated:
