@@ -37,9 +37,10 @@ def columns_across(wall: Structure, *, above: Metres | None = None) -> dict[str,
     length to the next or, without any, one at each bed of a stone. A course of the whole weighs as
     much as that of the wall, less its openings; its joints are as long as the stones of the lowest
     course. A course of less than a fifth of the median weight, as the tip of a gable, is one block
-    with the course below it. The strip has a mean metre of the wall, its openings filled with stones of the course.
-    What stones stand for besides themselves, such as a floor, weighs on all, and is named there. On
-    the strip that of a sloping crown is at the top, by its mean over the length of the wall.
+    with the course below it. The strip has a mean metre of the wall, its openings filled with
+    stones of the course. What stones stand for besides themselves, such as a floor, weighs on all,
+    and is named there. On the strip that of a sloping crown is at the top, by its mean over the
+    length of the wall.
 
     The pier is that which overturns first of those beside openings, also at an end of the wall. It
     carries the wall up to the middle of the openings beside it, but what is below their heads.
