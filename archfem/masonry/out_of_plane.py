@@ -37,7 +37,8 @@ def columns_across(wall: Structure, *, above: Metres | None = None) -> dict[str,
     length to the next or, without any, one at each bed of a stone. A course of the whole weighs as
     much as that of the wall, less its openings; its joints are as long as the stones of the lowest
     course. A course of less than a fifth of the median weight, as the tip of a gable, is one block
-    with the course below it. The strip has a mean metre of the wall, its openings filled with
+    with the course below it. One whose centre is above its middle, as that of a ring, is two blocks
+    with that centre. The strip has a mean metre of the wall, its openings filled with
     stones of the course. What stones stand for besides themselves, such as a floor, weighs on all,
     and is named there. On the strip that of a sloping crown is at the top, by its mean over the
     length of the wall.
@@ -93,16 +94,41 @@ def columns_across(wall: Structure, *, above: Metres | None = None) -> dict[str,
         return replace(stack, blocks=tuple(stones), width=width, name=f"{wall.name}, {piece}")
 
     sides = np.array([[block.points[:, 0].min(), block.points[:, 0].max()] for block in blocks])
-    length, weights = float(np.ptp(sides)), unit_weights @ areas
-    carried = (weights - solid * areas.sum(axis=0)) / length
+    length, foot = float(np.ptp(sides)), float(areas[:, 0].sum() / (levels[1] - levels[0]))
+    carried = (unit_weights @ areas - solid * areas.sum(axis=0)) / length
     spans = np.array([np.ptp(sides[each > 0.0]) for each in areas.T])
     columns = {
         "strip": build("strip", 1.0, *_fill_strip(levels, solid, carried, areas, spans)),
-        "whole": build("whole", float(areas[:, 0].sum() / (levels[1] - levels[0])), weights, areas),
+        "whole": build("whole", foot, *_split_high(blocks, levels, shares, areas)),
     }
     if pier := _find_worst_pier(wall, levels, shares, unit_weights):
         columns["pier"] = build(*pier)
     return columns
+
+
+def _split_high(
+    blocks: Sequence[Block], levels: Array, shares: Array, areas: Array
+) -> tuple[Array, Array, Array]:
+    """Return weights, areas and levels with courses of high centre as two blocks with that centre.
+
+    Those of low centre stay one block, on the safe side: its centre is higher.
+    """
+    ends = np.array([[block.points[:, 1].min(), block.points[:, 1].max()] for block in blocks])
+    low, high = (np.clip(ends[:, [k]], levels[:-1], levels[1:]) for k in (0, 1))
+    middles = 0.5 * (low + high)
+    # the shares of a stone together have its centroid
+    own = np.array([block.centroid[1] for block in blocks])
+    higher = shares.sum(axis=1) * own - (shares * middles).sum(axis=1)
+    unit_weights = np.array([block.material.unit_weight for block in blocks])
+    weights = unit_weights @ areas
+    centres = unit_weights @ (areas * (middles + higher[:, None])) / weights
+    up = (centres - levels[:-1]) / np.diff(levels)
+    for k in np.flatnonzero(up > 0.51)[::-1]:
+        # cut at the centre, of which both halves are half a height away
+        levels, areas = np.insert(levels, k + 1, centres[k]), np.insert(areas, k, areas[:, k], 1)
+        weights = np.insert(weights, k, (1.0 - up[k]) * weights[k])
+        weights[k + 1] *= up[k]
+    return weights, areas, levels
 
 
 def _fill_strip(
@@ -156,16 +182,17 @@ def _find_worst_pier(
     wall: Structure, levels: Array, shares: Array, unit_weights: Array
 ) -> tuple[str, float, Array, Array, Array] | None:
     """Return the pier of highest centre: name, breadth, weights, areas and levels of courses."""
-    found = []
+    found, stones = [], [wall.blocks[number] for number in wall.free]
     for left, right, met in _find_piers(wall, float(levels[0])):
         beds = np.flatnonzero(met @ shares > 0.0)[-1] + 1  # a slope may end below the ridge
         own, of_courses = _merge_light(
             levels[: beds + 1], shares[:, :beds].copy(), met * unit_weights
         )
         areas = met[:, None] * of_courses
-        arm = np.average(0.5 * (own[1:] + own[:-1]), weights=unit_weights @ areas)
+        weights, areas, own = _split_high(stones, own, of_courses, areas)
+        arm = np.average(0.5 * (own[1:] + own[:-1]), weights=weights)
         name = f"pier at x = {0.5 * (left + right):.3g} m"
-        found.append((arm, (name, right - left, unit_weights @ areas, areas, own)))
+        found.append((arm, (name, right - left, weights, areas, own)))
     return max(found, key=lambda each: each[0])[1] if found else None
 
 

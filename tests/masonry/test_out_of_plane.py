@@ -238,6 +238,22 @@ def test_a_portal_on_feet_of_uneven_height_turns_across_the_plane_from_the_groun
     assert merge_levels(ends).tolist() == ends.tolist()
 
 
+def test_a_ring_on_piers_has_its_own_centre_across_the_plane():
+    """Of a half ring of radius 2 m, 0.5 m thick, on piers 3 m high and 0.8 m broad."""
+    given = {"radius": 2.0, "thickness": 0.5, "voussoirs": 41, "width": 0.6}
+    ring = af.arch_on_piers(**given, pier_breadth=0.8, courses=[1.0, 1.0, 1.0])
+    outer, inner = 2.25, 1.75
+    area = 0.5 * np.pi * (outer**2 - inner**2)
+    centre = 4.0 / 3.0 / np.pi * (outer**3 - inner**3) / (outer**2 - inner**2)
+    centre = (2.0 * 0.8 * 3.0 * 1.5 + area * (3.0 + centre)) / (2.0 * 0.8 * 3.0 + area)
+    by_hand = 0.3 / centre
+    assert find_transverse_push(ring)[0] == pytest.approx(by_hand, rel=2e-3)
+    whole = af.masonry.columns_across(ring)["whole"]
+    assert (whole.weight, whole.width) == (pytest.approx(ring.weight), pytest.approx(1.6))
+    push = af.collapse_factor(whole, live=af.BodyForce(1.0), friction=None).factor
+    assert push == pytest.approx(find_transverse_push(ring)[0], rel=1e-6)
+
+
 def gable_with_a_roof(roof):
     """A front 4 m broad with its ridge at 4 m, eaves at 3 m, a door of 1 m, and a roof [N/m]."""
     door = af.shapes.Opening(left=-0.5, breadth=1.0, head=2.0, name="door")
