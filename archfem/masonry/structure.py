@@ -673,14 +673,16 @@ def describe_piers(structure: Structure) -> dict[str, str]:
         own = [bed for bed in own if bed.middle[1] < max(on, default=np.inf)]
         if not own:
             continue
-        base, parts = min(joint.intrados[1] for joint in own), structure.blocks
+        parts = structure.blocks
+        ends = [x.points[:, 1] for x in parts if x.part == part and not x.fixed]
+        # a stone that rests on nothing has no bed below it
+        base = min(*(joint.intrados[1] for joint in own), *map(min, ends), np.inf)
         clear = [
             joint.intrados[1] - base
             for joint in rings
             if part in {parts[number].part for number in joint.blocks}
         ]
-        tops = [block.points[:, 1].max() for block in parts if block.part == part]
-        broad, tall = min(joint.depth for joint in own), max(tops, default=np.inf) - base
+        broad, tall = min(joint.depth for joint in own), max(map(max, ends), default=np.inf) - base
         high = f", more than {tall:.3g} m high" * bool(broad > tall)
         high = f" and {min(clear):.3g} m high to the ring" if clear else high
         piers[part] = f"{broad:.4g} m broad{high}"

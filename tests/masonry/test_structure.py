@@ -217,6 +217,23 @@ def test_a_column_broader_than_high_is_said_to_be_so(breadth, said):
     assert describe_spans(strip) == f"no ring; 'column' {breadth:g} m broad{said}"
 
 
+def test_a_column_that_hangs_from_its_top_is_as_high_as_its_stones():
+    outlines = {"low": (0.0, 0.0, 65.0), "high": (0.0, 3.4, 65.0), "rock": (0.0, 6.8, 65.0)}
+    blocks = [
+        af.Block(
+            ((left, low), (right, low), (right, low + 3.4), (left, low + 3.4)),
+            af.STONE,
+            name,
+            fixed=name == "rock",
+            part="rock" if name == "rock" else "column",
+            role="other" if name == "rock" else "pier",
+        )
+        for name, (left, low, right) in outlines.items()
+    ]
+    made = af.masonry.assembled(blocks, af.Contact(1e9, 4e8))
+    assert "'column' 65 m broad, more than 6.8 m high" in describe_spans(made)
+
+
 def test_chords_of_one_face_have_one_name():
     """A stone on a back of two chords, and one beside it on a bed."""
     ring = af.Block(((0, 0), (2, 0), (2, 1), (1, 1.5), (0, 1)), af.STONE, "ring", fixed=True)
