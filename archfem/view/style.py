@@ -215,6 +215,7 @@ def style_axes(axes: Axes, x: str = "", y: str = "", size: float = Size.LABEL) -
 def style_length_axes(axes: Axes) -> None:
     """Style axes that show lengths [m] true to scale."""
     style_axes(axes, "x [m]", "y [m]")
+    axes.ticklabel_format(style="plain", useOffset=False)  # of a survey, to be found in a drawing
     # below the title, for which a layout leaves room at the top of the place of the axes
     axes.set_aspect("equal", anchor="N")
 

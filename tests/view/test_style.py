@@ -32,6 +32,18 @@ def test_a_figure_is_saved_whole(ring, low_resolution, tmp_path, suffix, start):
     assert [each.name for each in path.parent.iterdir()] == [path.name]
 
 
+def test_coordinates_of_a_survey_are_shown_whole():
+    outlines = (((45230.0 + x, y) for x, y in ((0, z), (2, z), (2, z + 1), (0, z + 1)))
+                for z in (237.0, 238.0))  # fmt: skip
+    rock, stone = (af.Block(tuple(x), af.STONE, n) for x, n in zip(outlines, "ab", strict=True))
+    made = af.masonry.assembled([replace(rock, fixed=True), stone], af.Contact(1e9, 4e8))
+    figure = af.view.draw_structure(made)
+    figure.draw_without_rendering()
+    axis = figure.axes[0].xaxis
+    assert axis.get_major_formatter().get_offset() == ""
+    assert "45231" in " ".join(each.get_text() for each in axis.get_ticklabels())
+
+
 def test_an_unknown_suffix_is_refused(ring, tmp_path):
     with pytest.raises(af.InvalidInput, match=r"suffix '\.xyz': use one of .*'png'"):
         save(af.view.draw_structure(ring), tmp_path / "ring.xyz")
