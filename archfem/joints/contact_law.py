@@ -42,7 +42,7 @@ LARGEST_CLOSING = 0.98
 
 # Opening up to which joints cohere, over c / k_n [-]. Joints that nothing presses rest at zero
 # opening, within 1e-8 m: if cohesion ended there, shear would jump, and no iteration converge.
-COHESIVE_OPENING = 1e-3
+COHESIVE_OPENING = 1e-4
 
 # Excess over Coulomb's limit, relative to it, that counts as round-off of a point that holds [-]
 SLIP_LIMIT_TOLERANCE = 1e-9

@@ -171,7 +171,7 @@ def below(x):
 def test_a_step_of_springs_is_the_mean_along_its_path(late):
     """Written anew through integrals of <g>_- and of the stop; the area is the time closed.
 
-    Up to c / 1000 k_n a joint coheres.
+    Up to 1e-4 c / k_n a joint coheres.
     """
     model, first, last = places(ring(), 4)
     operator, passage = model.operator, model.begin_step(first, late)
@@ -185,7 +185,7 @@ def test_a_step_of_springs_is_the_mean_along_its_path(late):
         * (below(end) - below(start))
         / (end - start)
     )
-    reach = 1e-3 * points.contact.cohesion / points.contact.normal_stiffness
+    reach = 1e-4 * points.contact.cohesion / points.contact.normal_stiffness
     closed = (np.minimum(end, reach) - np.minimum(start, reach)) / (end - start)
     limit = -points.contact.friction * normal + points.contact.cohesion * points.weight * closed
     elastic = operator.trial_shear(first), operator.trial_shear(last)
