@@ -161,6 +161,10 @@ def format_ratio(ratio: float, digits: int = 3) -> str:
     return next(x for x in texts if (float(x) > 1.0, float(x) < 1.0) == (ratio > 1.0, ratio < 1.0))
 
 
+class StatedWeight(float):
+    """Unit weight that was given with its unit, so that none is guessed [N/m³]."""
+
+
 class Ends(tuple[float, ...]):
     """Least and largest of a number, of one format; "mm" is that of lengths, "ratio" of ratios."""
 

@@ -35,20 +35,14 @@ from archfem.masonry.joint_closing import (
     usual_law,
     with_finish,
 )
-from archfem.masonry.materials import (
-    CONTACT_PRESETS,
-    MATERIAL_PRESETS,
-    STONE,
-    Contact,
-    Material,
-    StatedWeight,
-)
+from archfem.masonry.materials import CONTACT_PRESETS, MATERIAL_PRESETS, STONE, Contact, Material
 from archfem.masonry.shapes import bridges, rings, walls
 from archfem.masonry.shapes.bridge_parts import Arch, Backfill, Paving, Pier, Sidewall
 from archfem.masonry.standing import StandingBody, carrying
 from archfem.masonry.structure import Joint, Structure, join_names, suggest_name
 from archfem.masonry.survey.layers import Layer
 from archfem.masonry.survey.outlines import Survey, read_outlines, surveyed
+from archfem.units import StatedWeight
 
 Described = TypeVar("Described")
 

@@ -15,7 +15,7 @@ from archfem._typing import (
 )
 from archfem._validation import check_between, check_number, check_words, is_one_of
 from archfem.errors import InvalidInput
-from archfem.units import G, GPa, MPa, kN
+from archfem.units import G, GPa, MPa, StatedWeight, kN
 
 # Largest closing of a joint [m]: those measured are below 1 mm, so that more is in millimetres
 MAX_CLOSURE = 0.02
@@ -25,10 +25,6 @@ def _check_range(item: Any, key: str, low: float, high: float, remedy: str) -> N
     """Check that a field is a number between two values."""
     name = f"{key} of '{item.name}'"
     check_between(getattr(item, key), name, low, high, ends="[]", remedy=remedy)
-
-
-class StatedWeight(float):
-    """Unit weight that was given with its unit, so that none is guessed [N/m³]."""
 
 
 @dataclass(frozen=True)
