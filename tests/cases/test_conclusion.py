@@ -18,7 +18,7 @@ from archfem.cases import answers
 from archfem.cases.report import conclusion, demands, doubts, margins, report_data, sections
 from archfem.cases.report.outcomes import sentence
 from archfem.cases.report.report import _collect_data
-from archfem.cases.report.report_data import ReportData
+from archfem.cases.report.report_data import ReportData, label_parts
 from archfem.cases.report.scales import find_first_failures
 from archfem.cases.report.study_findings import collect_findings
 from archfem.cases.result_text import UPPER_BOUNDS, PushFactors, site_acceleration
@@ -704,13 +704,33 @@ def test_the_verdict_of_several_cases_is_the_worst_and_names_its_case(case):
     assert order[:4] == ["fallen 2.0", "stands 0.9", "mechanism 2.0", "dislocated 2.0"]
     assert order[4:] == ["stands 1.4", "stands 1.5", "stands None"]
     facts = conclusion.list_joint_facts(parts)
-    assert facts[0][1].startswith("The worst of 7 cases is 'fallen 2.0': It does not survive: ")
-    assert facts[1][0] == "margin"
-    assert facts[1][1].startswith(
-        "The least margins are 0.9 of 'stands 0.9', 1.4 of 'stands 1.4', "
-    )
-    assert facts[1][1].endswith(" and not known of 'stands None'.")
-    assert [key for key, _ in facts[2:]] == [name for name in parts if name != "fallen 2.0"]
+    assert facts[1][1].startswith("The worst of 7 cases is fallen 2.0: It does not survive: ")
+    assert facts[2][0] == "margin"
+    assert facts[2][1].startswith("The least margins are 0.9 of stands 0.9, 1.4 of stands 1.4, ")
+    assert facts[2][1].endswith(" and not known of stands None.")
+    assert [key for key, _ in facts[3:]] == [name for name in parts if name != "fallen 2.0"]
+
+
+@pytest.mark.parametrize(("breadth", "across"), [(0.5, True), (0.45, False)])
+def test_a_stack_as_broad_as_another_case_is_wide_is_its_plane_across(case, breadth, across):
+    """An arch on piers, which a push across its plane may overturn."""
+    lengths = {"radius": 1.5, "thickness": 0.4, "voussoirs": 9, "courses": [1.0]}
+    lengths |= {"shape": "arch_on_piers", "pier_breadth": 1.0, "width": 0.5}
+    stack = {"shape": "column", "breadth": breadth, "heights": [1.0, 1.0], "width": 4.0}
+    settings = [{**case.settings, "structure": each} for each in (lengths, stack)]
+    cases = [data_of(af.Case.of(each), a=verdict_of()) for each in settings]
+    parts = label_parts(cases)
+    facts = dict(conclusion.list_joint_facts(parts))
+    assert facts["cases"] == "A: stack (None); B: stack (None)"
+    said = f"{facts['verdict']} {facts.get('A', facts.get('B'))}"
+    assert ("it was not checked" in said) is not across
+    assert (said.count("Across its plane: ") == 2) is across
+    (block,) = margins.build_transverse(parts["A"])
+    assert (block.text == "It is that of case B.") is across
+    assert ("across the plane" in str(margins.rank_margins(parts["A"]))) is not across
+    assert (margins.find_unchecked_push(parts["A"]) is None) is across
+    still = ReportData(cases[1].case, {})  # one without results checks nothing
+    assert label_parts([cases[0], still])["A"].across_in == ""
 
 
 def test_of_unequal_outcomes_the_worst_is_the_first(case):

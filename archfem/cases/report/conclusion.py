@@ -120,8 +120,9 @@ def list_joint_facts(parts: Mapping[str, ReportData]) -> list[tuple[str, str]]:
     ranks = {name: _rank_verdict(data) for name, data in parts.items()}
     worst, listed = min(ranks, key=ranks.__getitem__), list[str]()
     for name, (_, least) in sorted(ranks.items(), key=lambda each: each[1][1]):
-        listed.append(f"{format_ratio(least) if least < np.inf else 'not known'} of '{name}'")
-    facts = [(answer, f"The worst of {len(parts)} cases is '{worst}': {said.pop(worst)}")]
+        listed.append(f"{format_ratio(least) if least < np.inf else 'not known'} of {name}")
+    facts = [("cases", "; ".join(data.name for data in parts.values()))]
+    facts.append((answer, f"The worst of {len(parts)} cases is {worst}: {said.pop(worst)}"))
     facts.append((margin, f"The least margins are {join_words(listed)}."))
     return [*signed, *facts, *said.items()]
 
@@ -168,6 +169,7 @@ def _say_plainly(data: ReportData, doubtful: Sequence[str]) -> Iterator[tuple[st
                 yield answer, f"{row.result}: {row.outcome}{times * (name != 'risk')}"
     yield from ((answer if fails else margin, x) for fails, x in less if fails or not data.runs)
     yield from [] if data.runs and overturns else ((left, x) for x in unchecked)
+    yield from [(answer, f"across its plane: {data.across_in}")] * bool(data.across_in)
 
 
 def _say_unchecked(data: ReportData) -> tuple[list[str], bool]:
@@ -350,7 +352,7 @@ def build_conclusion(data: ReportData) -> Section:
         factors = f". Factors are multiples of the demand: {'; '.join(named)}" * bool(named)
         blocks.append(Grid(head, rows, f"Demand and capacity{factors}", "words"))
     blocks += map(TextBlock, _list_outdated(data))
-    blocks += [] if data.is_part else [build_signatures(data.case.report)]
+    blocks += [] if data.label else [build_signatures(data.case.report)]
     return Section("Conclusion", blocks)
 
 

@@ -14,6 +14,7 @@ from archfem.cases.result_text import OF_GIVEN_FILL
 from archfem.dynamics.collapse_state import COLLAPSE_STATES, FALLEN_STATES, RANGE_REMEDY
 from archfem.dynamics.history import History
 from archfem.dynamics.verdict_range import MAX_RATIO_OF_DISPLACEMENTS, VerdictRange, property_text
+from archfem.masonry.out_of_plane import UNCHECKED_ACROSS
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import join_words
 from archfem.models.model import Doubt, group_doubts, merge_doubts
@@ -176,8 +177,9 @@ def list_notes(data: ReportData) -> dict[str, list[str]]:
     notes = {
         RESULTS[name]: own
         for name, each in data.statements.items()
-        # what is not about the least factor of a push stands in its text alone
-        if (own := [note for note in each.notes if not note.startswith(OF_GIVEN_FILL)])
+        # what is not about the least factor of a push stands in its text alone, and a paragraph
+        # has what is not checked across
+        if (own := [x for x in each.notes if not x.startswith((OF_GIVEN_FILL, UNCHECKED_ACROSS))])
     }
     notes |= {HISTORIES: missed} if (missed := note_checks(data)) else {}
     return notes

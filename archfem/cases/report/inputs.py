@@ -108,19 +108,19 @@ def tabulate_inputs(data: ReportData) -> Grid:
     return Grid((), rows, _CAPTION)
 
 
-def compare_inputs(parts: Mapping[str, ReportData]) -> Grid:
-    """Tabulate the inputs of several cases, once where they are the same, with their marks."""
-    tables = {name: tabulate_inputs(data).rows for name, data in parts.items()}
-    joined = list[Sequence[str]]()
-    for quantity in dict.fromkeys(row[0] for rows in tables.values() for row in rows):
-        own = {name: tuple(x for x in rows if x[0] == quantity) for name, rows in tables.items()}
-        if len({*own.values()}) == 1:
-            joined += next(iter(own.values()))
+def compare_inputs(parts: Mapping[str, ReportData]) -> list[Grid]:
+    """Tabulate inputs of several cases that are the same, and others with a column for each."""
+    tables = [tabulate_inputs(data).rows for data in parts.values()]
+    same, differing = list[Sequence[str]](), list[Sequence[str]]()
+    for quantity in dict.fromkeys(row[0] for rows in tables for row in rows):
+        own = [tuple(x for x in rows if x[0] == quantity) for rows in tables]
+        if len({*own}) == 1:
+            same += own[0]
             continue
-        texts = {k: ", ".join(f"{x[1]} ({x[2]})" for x in found) for k, found in own.items()}
-        differing = "; ".join(f"{name}: {text or 'none'}" for name, text in texts.items())
-        joined.append((quantity, differing, "differs"))
-    return Grid((), joined, _CAPTION)
+        texts = (", ".join(f"{x[1]} ({x[2]})" for x in found) for found in own)
+        differing.append((quantity, *(text or "-" for text in texts)))
+    table = Grid(("", *parts), differing, "Inputs that differ between the cases", "words")
+    return [Grid((), same, _CAPTION), *[table] * bool(differing)]
 
 
 def _mark(given: bool) -> str:

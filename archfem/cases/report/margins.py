@@ -34,15 +34,14 @@ def find_unchecked_push(data: ReportData) -> tuple[float, float] | None:
 
     The push is NaN where it is unknown, as of a single stack [g].
     """
-    if data.across[0] or not _leaves_plane_across(data):
+    if data.across[0] or data.across_in or not _leaves_plane_across(data):
         return None
     return data.transverse_push, find_demand(data)
 
 
 def _leaves_plane_across(data: ReportData) -> bool:
     """Return whether results of earthquakes are in the plane alone, and not of a wall across it."""
-    shaken = data.runs or data.statements.keys() - {"rating"}
-    return bool(shaken) and data.case.structure.above is None
+    return data.is_shaken and data.case.structure.above is None
 
 
 def say_less(data: ReportData) -> Iterator[tuple[float, str, str]]:
@@ -103,6 +102,8 @@ def build_transverse(data: ReportData) -> list[TextBlock]:
     """Build the paragraph on what is not checked across the plane, for results of earthquakes."""
     if not _leaves_plane_across(data):
         return []
+    if data.across_in:
+        return [TextBlock(f"It is that of case {data.across_in}.", lead="Across its plane?")]
     text = describe_transverse_push(data.case.structure)
     push, demand = data.transverse_push, find_demand(data)
     if push < demand:

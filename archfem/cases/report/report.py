@@ -1,14 +1,18 @@
 """Reports of cases, result folders and single histories."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 from hashlib import sha256
 from importlib import import_module
 from pathlib import Path
 
 from archfem.cases.case import Case
 from archfem.cases.report.conclusion import list_facts, list_joint_facts
-from archfem.cases.report.report_data import ReportData, build_live_page, build_player
+from archfem.cases.report.report_data import (
+    ReportData,
+    build_live_page,
+    build_player,
+    label_parts,
+)
 from archfem.cases.report.sections import build_joint_sections, build_sections, number_captions
 from archfem.cases.result_folder import ResultFolder
 from archfem.cases.run import Run
@@ -33,8 +37,7 @@ def write_report(data: ReportData, path: str | Path, *others: ReportData) -> Pat
         footer += " On paper a player shows the instant and the joint that it showed on the screen."
     digest = sha256("".join(each.case.text() for each in cases).encode()).hexdigest()[:12]
     origin = f"report of archfem {import_module('archfem').__version__} · case {digest}"
-    # cases of one title differ in their folders
-    parts = {f"{x.case.title} ({x.folder})": replace(x, is_part=True) for x in cases}
+    parts = label_parts(cases)
     with limit_width(FIGURE_WIDTH):
         facts = list_joint_facts(parts) if others else list_facts(data)
         sections = build_joint_sections(parts) if others else build_sections(data)

@@ -7,6 +7,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import xarray as xr
 
 from archfem._display import DOUBT_MARK
@@ -30,6 +31,7 @@ from archfem.dynamics.verdict_range import VerdictRange
 from archfem.dynamics.walls_across import find_falls_across
 from archfem.errors import ArchfemError
 from archfem.masonry.out_of_plane import find_transverse_push
+from archfem.masonry.structure import join_names
 from archfem.models.builder import build
 from archfem.models.discretisation import Discretisation
 from archfem.models.model import Model
@@ -55,7 +57,8 @@ class ReportData:
     folder: Path | None = None
     missing: tuple[str, ...] = ()  # names of the pairs of the suite without a run
     study_folders: Sequence[Path] = ()  # without any, that of the results, which may have one
-    is_part: bool = False  # of a report of several cases, with inputs and signatures of all
+    label: str = ""  # in a report of several cases, with inputs and signatures of all
+    across_in: str = ""  # label of the case that has the plane across this one
 
     @cached_property
     def studies(self) -> list[StudyFindings]:
@@ -67,6 +70,18 @@ class ReportData:
         # a case in a folder of results has the blocks of its drawing
         given = hash_value(case.structure), case.hash_sections(STRUCTURE_SECTIONS)
         return [read_study(place, given) for place in folders]
+
+    @property
+    def name(self) -> str:
+        """Label and title of the case, its folder, and what stands on the structure."""
+        standing = join_names([*self.case.settings["structure"].get("standing", {})])
+        on = f", with {standing} on it" * bool(standing)
+        return f"{self.label}: {self.case.title} ({self.folder}){on}"
+
+    @property
+    def is_shaken(self) -> bool:
+        """Whether it has results of earthquakes."""
+        return bool(self.runs or self.statements.keys() - {"rating"})
 
     @property
     def own_studies(self) -> list[StudyFindings]:
@@ -209,6 +224,21 @@ def _join_statements(by_pair: Mapping[str, Statement]) -> Statement:
         [replace(x, place=pair) for pair, each in by_pair.items() for x in each.doubts],
         [f"{under}{note}" for under, each in named for note in each.notes],
     )
+
+
+def label_parts(cases: Sequence[ReportData]) -> dict[str, ReportData]:
+    """Label cases A, B and so on; a stack as broad as another case is wide is the plane across."""
+    labels = [chr(ord("A") + k % 26) * (k // 26 + 1) for k in range(len(cases))]
+    parts = {label: replace(x, label=label) for label, x in zip(labels, cases, strict=True)}
+    for label, stack in parts.items():
+        ends = np.concatenate([x.points[:, 0] for x in stack.case.structure.blocks if not x.fixed])
+        for other, each in parts.items():
+            broad = np.isclose(np.ptp(ends), each.case.structure.width, rtol=0.01)
+            alone = np.isnan(stack.transverse_push) > np.isnan(each.transverse_push)
+            if broad and alone and stack.is_shaken:
+                parts[label] = replace(parts[label], across_in=other)
+                parts[other] = replace(parts[other], across_in=label)
+    return parts
 
 
 def read_motion(run: History, name: str) -> Motion:

@@ -84,10 +84,10 @@ _METHODS = (
 def build_joint_sections(parts: Mapping[str, ReportData]) -> list[Section]:
     """Build the sections of a report of several cases: signatures, inputs, and each case."""
     report = next(iter(parts.values())).case.report
-    sections = [Section("Inputs of all cases", [build_signatures(report), compare_inputs(parts)])]
-    for name, data in parts.items():
+    sections = [Section("Inputs of all cases", [build_signatures(report), *compare_inputs(parts)])]
+    for data in parts.values():
         own = [replace(each, level=each.level + 1) for each in build_sections(data)]
-        sections += [Section(name, [Grid((), list_facts(data))]), *own]
+        sections += [Section(data.name, [Grid((), list_facts(data))]), *own]
     return sections
 
 
@@ -166,7 +166,7 @@ def build_input_section(data: ReportData) -> Section:
         words = "elastic in histories: it carries tension, and neither yields nor slides inside"
         assumptions.insert(2, ("fill", f"{words}; its E ({', '.join(fill)}) is among the inputs"))
     table = Grid((), assumptions, "Assumptions, units and signs")
-    inputs = [] if data.is_part else [tabulate_inputs(data)]
+    inputs = [] if data.label else [tabulate_inputs(data)]
     return Section("Inputs and assumptions", [*inputs, table])
 
 
