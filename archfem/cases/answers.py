@@ -198,6 +198,7 @@ def state_scale(
     held = found.held
     scales = Scales(motion.name, pga, held, found.states, found.interrupted)
     if isinstance(found, CollapseScale):
+        scales = scales._replace(held=(held := found.held_by_all))
         files["scale.csv"] = ResultTable(*found.rows()).csv
         ends = found.first_falls[1], found.as_one.scale if found.as_one else np.inf
         reached = [scale if scale < np.inf else None for scale in ends]

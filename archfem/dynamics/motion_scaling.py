@@ -347,6 +347,15 @@ class CollapseScale:
         return max(at for at in self._stood if at < find_tension(self._runs))
 
     @property
+    def held_by_all(self) -> float:
+        """Largest such scale by every time step, also of a search that Ctrl-C ended; 0 for none."""
+        least = held = self.held
+        for search in self.searches.values() if self.interrupted else ():
+            stood = (x.scale for x in search.runs if x.fall and x.fall.kind == "stands")
+            least = min(least, max((scale for scale in stood if scale <= held), default=0.0))
+        return least
+
+    @property
     def _stood(self) -> list[float]:
         """Scales at which it stood below any at which it did not, whatever its fill, or 0 [-]."""
         held, end = self._list_held(), self.dislocated

@@ -652,6 +652,12 @@ def test_a_margin_rests_on_finished_steps():
     assert str(found).startswith(
         "stands at 1.25 × the motion, search unfinished, falls at 1.30 × the motion; stands at "
     )
+    # the margin of a report is that of both steps
+    motion = af.Motion(np.ones(9), 0.01, name="a")
+    for each, held in ((found, 0.7), (CollapseScale({0.005: whole}), 1.25)):
+        stated = answers.Statement.read(answers.state_scale(each, motion, [])["scale.json"])
+        assert answers.read_numbers(answers.Scales, stated)[0].held == held
+        assert stated.rows[0].factor == f"{held:#.3g}"
     (doubt,) = found.doubts
     words = "by 2.5 ms: the search was interrupted after 2 runs; the same command continues it"
     assert str(doubt) == words
