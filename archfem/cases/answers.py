@@ -311,11 +311,17 @@ def find_margin(found: Iterable[KinematicAssessment]) -> float:
 
 
 def compare_checks(checks: Sequence[Ratios]) -> str:
-    """Say by which checks an assessment passes and by which it fails; empty where none differ."""
+    """Say by which checks an assessment passes and by which not; empty where none differ."""
     moved = {way for check in checks if not check.linear for way in check.directions}
     last = [x for x in checks if not (x.linear and moved.issuperset(x.directions))]
-    if not last or min(last, key=lambda x: x.decisive).bounded:  # which shows no passing
+    if not last:
         return ""
+    if (least := min(last, key=lambda x: x.decisive)).bounded:  # which shows no passing
+        linear = min((x.decisive for x in checks if x.linear), default=0.0)
+        return (
+            f"passes the linear check ({format_ratio(linear)}), and is not shown to pass by "
+            f"displacements, as their ratio, {format_ratio(least.decisive)}, is an upper bound"
+        ) * (linear >= 1.0 <= least.decisive)
     apart = (x.decisive if x.linear else x.least for x in last)
     ratios = (x.decisive for x in last), apart, (x.decisive for x in checks if x.linear)
     return describe_difference(*(min(each, default=np.inf) for each in ratios))

@@ -637,6 +637,18 @@ def test_a_matched_suite_is_the_test_of_an_upper_bound_on_its_spectrum(change, o
     assert said.endswith(", an upper bound")
     says = sentence(says)[:-1]
     assert f" is an upper bound. {says}" in head_of(conclusion.list_facts(data))
+    # one sentence has a linear check that passes too, as on the screen
+    linear = answers.Ratios("linear", ["right"], 1.37, 1.37, linear=True)
+    vars(data)["statements"] = {"assessment": state("assessment", linear, ratios)}
+    both = (
+        "passes the linear check (1.37), and is not shown to pass by displacements, as their "
+        "ratio, 1.5, is an upper bound"
+    )
+    assert answers.compare_checks([linear, ratios]) == both
+    assert f"of PGA {0.2 if 'ag' not in change else 0.25} g it {both}. {says}" in head_of(
+        conclusion.list_facts(data)
+    )
+    assert answers.compare_checks([linear._replace(least=0.9), ratios]) == ""
     # with e* = 1, less than 1 or not, it is the ratio in doubt
     for floor in (1.2, 0.8):
         stated = {"assessment": state("assessment", ratios._replace(floor=floor))}

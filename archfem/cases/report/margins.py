@@ -78,8 +78,8 @@ def judge_check(data: ReportData, check: Ratios) -> tuple[str, str]:
     if check.bounded:
         least = min(each.decisive for each in list_checks(data) if each.bounded)
         bound = f"its ratio, {format_ratio(least)}, is an upper bound"
-        words = f"it is not shown to withstand {of}, as {bound}. {_say_test(data)}"
-        return words, ", an upper bound"
+        words = differs or f"it is not shown to withstand {of}, as {bound}"
+        return f"{words}. {_say_test(data)}", ", an upper bound"
     if check.moved and _say_motion(data, check.least, peak_of_spectrum(data.case)):
         return f"it withstands at rest alone, and moves in the runs, {of}", ""
     return differs or f"it withstands {of}", ""
