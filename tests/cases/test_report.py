@@ -1136,10 +1136,16 @@ def test_the_modulus_of_a_fill_in_pieces_is_stated_as_given():
     """Pieces are a thousand times stiffer, and their joints have the compliance."""
     text = BRIDGE + '[structure.fill]\nlaw = "jointed"\nfriction_angle = 35.0\npiece_size = 1.0\n'
     text += '[materials]\nbackfill = { young = "20 MPa" }\n'
-    data = report_data.ReportData(af.Case.of(tomllib.loads(text)), {})
-    rows = {row[0]: row[1:] for row in tabulate_inputs(data).rows}
-    assert rows["backfill: E"] == ("20 MPa", "given")
-    assert rows["backfill: E of its pieces"] == ("20 GPa", "inferred")
+    text = text.replace("= 1.0\n", '= 1.0\ncohesion = "5 kPa"\n')
+    own = f"{af.masonry.BACKFILL.young / 1e6:g} MPa", "default"
+    for given, young in ((text, ("20 MPa", "given")), (text.replace("young", "poisson"), own)):
+        given = given.replace('poisson = "20 MPa"', "poisson = 0.2")
+        data = report_data.ReportData(af.Case.of(tomllib.loads(given)), {})
+        rows = {row[0]: row[1:] for row in tabulate_inputs(data).rows}
+        assert rows["backfill: E"] == young
+        pieces = young[0].replace("MPa", "GPa")
+        assert rows["backfill: E of its pieces"][0].startswith(pieces)
+        assert rows["fill: cohesion"] == ("5 kPa", "inferred")
 
 
 def test_of_a_pier_the_foundation_is_fixed():

@@ -23,6 +23,7 @@ from archfem.cases.motion_keys import MADE, find_matched_band
 from archfem.cases.report.report_data import STATIC_RESULTS, ReportData
 from archfem.cases.structure_keys import (
     PARTS_BY_NAME,
+    PRESETS,
     find_table,
     keys_of_part,
     list_shapes,
@@ -270,10 +271,13 @@ def _property_rows(data: ReportData) -> Iterator[Row]:
 
 def _list_given(data: ReportData, item: Material | Contact) -> Iterator[Row]:
     """Yield the values of a material or contact; stiffer ones of pieces of fill are inferred."""
-    _, given = find_table(data.case.settings, item)
+    key, given = find_table(data.case.settings, item)
+    known = PRESETS["materials"].get(given.get("preset", key))
     for word, text, mark in _list_properties(data, item):
-        if word == _YOUNG and mark == "given":
-            own = value_text("materials", "young", in_unit(given["young"], "Pa", "young"))
+        young = given.get("young", getattr(known, "young", None))
+        if word == _YOUNG and mark != "default" and young is not None:
+            own = value_text("materials", "young", in_unit(young, "Pa", "young"))
+            mark = _mark("young" in given)
             if own != text:  # the compliance of pieces is in their joints
                 yield word, own, mark
                 word, mark = f"{word} of its pieces", "inferred"
@@ -305,7 +309,10 @@ def _list_properties(data: ReportData, item: Material | Contact) -> Iterator[Row
         yield from _finish_rows(data, item, given["finish"])
     for key, (word, unit, name) in _FURTHER_PROPERTIES.items():
         if (key in given or getattr(item, key, None)) and key not in unused:
-            yield word, f"{getattr(item, key) / unit:g}{name}", _mark(key in given)
+            preset = PRESETS[section].get(given.get("preset", item.name), type(item))
+            derived = key not in given and getattr(item, key) != getattr(preset, key, None)
+            mark = "inferred" if derived else _mark(key in given)
+            yield word, f"{getattr(item, key) / unit:g}{name}", mark
     if isinstance(item, Contact) and item.law is not None:
         yield "law", str(item.law), "given"
 
