@@ -304,13 +304,10 @@ def find_least(
     """
     rows = list[tuple[float, tuple[str, str], str, str]]()
     for found in (each for each in studies if name in each.names):
-        worst = found.worst.to_dict("records")
-        below = sum(row.get(name, np.nan) < 1.0 for row in worst)
-        count = f"; {below} of {len(worst)} cases are below it" * (name == OVER_SITE and below > 1)
-        for row in worst:
+        for row in found.worst.to_dict("records"):
             push = row.get("least_push", np.nan) if name == OVER_SITE else np.nan
             words = f", {push:.3g} g," * (push == push), mark_bound(row, name, f"{row[name]:.3g}")
-            rows.append((row[name], words, f"{found.label(row)}{count}", found.name))
+            rows.append((row[name], words, found.label(row), found.name))
     return min((row for row in rows if row[0] == row[0]), default=(np.inf, ("", ""), "", ""))
 
 
