@@ -530,7 +530,11 @@ def test_a_report_shows_the_range(tmp_path, undrawn, calls):
     assert "Range over uncertain properties" not in words
     assert af.commands.main(["verdict", str(path), "--out", str(out), "--samples", "2"]) == 0
     words = " ".join(read_page(report(out)).words)
-    assert af.dynamics.VerdictRange.read(out / "verdict_range.nc").sentence[1:] in words
+    found = af.dynamics.VerdictRange.read(out / "verdict_range.nc")
+    assert found.sentence.startswith(f"{found.count}; {found.groups}, under 'synthetic 1'")
+    assert found.count == "falls in none of 16 variations"
+    said = f"Under 'synthetic 1' it {found.count}. By groups: {found.groups}."
+    assert said in " ".join(words.split())
     assert "falls with none of 13 single changes" in words
 
 
