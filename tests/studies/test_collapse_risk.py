@@ -570,8 +570,8 @@ alternatives.slenderer = { weight = 1.0, set = ["structure.breadth=0.22"] }
     report = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     assert "Annual rate of collapse</h2>" in report
     concluded = report.partition("Inputs and assumptions</h2>")[0]
-    median = f"from {found.fragility().median:.3g} m/s² of PGA; hazard of the site: a test."
-    assert f"The structure falls at {found.rate()}; in half of the cases {median}" in concluded
+    median = f"from {found.fragility().median:.3g} m/s² of PGA. Hazard of the site: a test."
+    assert f"The structure falls at {found.rate()}. In half of the cases {median}" in concluded
     assert "\nhazard of the site: a test\n" in printed
     assert "dispersion 0" not in concluded  # statistics are in their section
     assert "Cornell et al." in report
