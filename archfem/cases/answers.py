@@ -361,19 +361,19 @@ def note_across(structure: Structure, found: Iterable[KinematicAssessment]) -> l
 
 
 def note_ties(case: Case) -> list[str]:
-    """Return notes on the force of ties with which a sense just passes the linear check."""
+    """Return notes on the force of ties with which a sense just passes every check."""
     settings, notes = case.assessment, list[str]()
     loads = settings.options.get("loads", ())
     ties = [load for load in loads if load.passive]
 
     @cache  # ends of the search are tried before it
     def exceed(scale: float, sense: float) -> float:
-        """Return the linear ratio above 1 with a multiple of the forces of all ties [-]."""
+        """Return the least ratio above 1 with a multiple of the forces of all ties [-]."""
         tied = [replace(x, force=(scale * x.force[0], scale * x.force[1])) for x in ties if scale]
         options = {**settings.options, "loads": [x for x in loads if not x.passive] + tied}
         own = replace(settings, directions=(sense,), options=options)
         (found,) = own.solve(case.structure, case.demand).values()
-        return min(found.linear.decisive, MOST_TIED) - 1.0
+        return min(MOST_TIED, *(check.decisive for check in found.checks)) - 1.0
 
     for sense in settings.directions if ties else ():
         with suppress(InvalidInput):  # without its ties it may not stand
@@ -385,7 +385,7 @@ def note_ties(case: Case) -> list[str]:
                     of = f"{size:.3g} kN of the tie at {ties[0].block}"
                 side = name_side(sense)
                 of += f", for {case.structure.width:g} m of width, without a factor on the tie"
-                text = f"pushed to the {side}, the linear check is just passed with {of}"
+                text = f"pushed to the {side}, all its checks are just passed with {of}"
                 notes.append(f"{NOTE_MARK}{text}")
     return notes
 

@@ -293,6 +293,7 @@ def describe_dead_load(result: DeadLoadResult, *, explain: bool = False) -> str:
     ]
     if has_backing(result.case.limit.fill):
         lines.append(f"{NOTE_MARK}the backing of [limit] is fill here, in dead load and runs")
+    lines += note_ties_left_out(result.case)
     across = describe_transverse_push(structure)
     if result.case.has_motion and structure.heads.any():
         across = across.replace(UNCHECKED_ACROSS, CHECKED_ACROSS)
@@ -468,8 +469,15 @@ def describe_limit(
         others.append(f"in the other sense: {opposite.sentence} ({rank})")
     others += filter(None, [defaults.describe_fill_defaults(case)])
     others += [f"it begins to move at {site} times {site.site}"] if site else []
+    others += note_ties_left_out(case)
     text = describe_collapse(case.structure, found, case.limit, case.parapets)
     return found, "\n".join([text, *others]), site
+
+
+def note_ties_left_out(case: Case) -> list[str]:
+    """Return a note that results have no ties, if the case has any."""
+    ties = any(load.passive for load in case.assessment.options.get("loads", ()))
+    return [f"{NOTE_MARK}without the ties of [assessment], which limits and runs leave out"] * ties
 
 
 def _order_senses(found: Collapse) -> tuple[float, ...]:

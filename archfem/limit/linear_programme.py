@@ -93,6 +93,8 @@ def solve_linear(
         feasibility = (f"{side}_feasibility_tolerance" for side in ("primal", "dual"))
         options = {"output_flag": False, **dict.fromkeys(feasibility, tolerance)}
         options |= {"time_limit": np.inf if np.any(cost) else STALLED_AFTER}
+        # one or two iterations for each row and unknown are usual; where it cycles, the next way
+        options["simplex_iteration_limit"] = 3 * sum(matrix.shape)
         for name, value in (options | {"solver": way, "presolve": presolve}).items():
             highs.setOptionValue(name, value)
         highs.passModel(*programme)

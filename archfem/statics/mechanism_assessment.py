@@ -169,9 +169,13 @@ class KinematicAssessment(ResultDisplay):
         """Whether the displacement check passes, or without it the linear one.
 
         It must pass under every assumption on a fill, `checks[-1].over_fill` having the range, and
-        with one weight for each body, and, where alpha_0 is searched, with e* = 1.
+        with one weight for each body, and, where alpha_0 is searched, with e* = 1. Where its ratio
+        is an upper bound, which passes none, the linear check must pass.
         """
-        return self.checks[-1].passes
+        last = self.checks[-1]
+        return last.passes and not (
+            last.bounded and (self.linear.bounded or not self.linear.passes)
+        )
 
     def demand(self, periods: Array) -> tuple[Array, Array]:
         """Return spectral displacements [m] and accelerations [m/s²] of the demand.

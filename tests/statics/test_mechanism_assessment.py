@@ -21,6 +21,7 @@ from archfem.cases.answers import (
 )
 from archfem.cases.report.conclusion import list_facts
 from archfem.cases.report.report_data import ReportData
+from archfem.cases.result_text import note_ties_left_out
 from archfem.cases.toml_file import read_object
 from archfem.statics import LIMIT_STATES, AssessmentCheck, LimitState, mechanism_assessment
 from archfem.statics.assessment_checks import (
@@ -326,8 +327,12 @@ def test_a_check_that_alone_fails_is_in_every_headline_with_the_force_of_a_tie()
     other = f"; pushed to the right {ratios[0]:.3g} by the same check"
     assert margin.endswith(f", pushed to the left: {says}{other}")
     needed = 160.0 * (1.35 * pga / 2.0 - 0.125)
+    assert note_ties_left_out(case) == [
+        "note: without the ties of [assessment], which limits and runs leave out"
+    ]
+    assert note_ties_left_out(af.Case.of({"structure": column})) == []
     assert note_ties(case) == [
-        "note: pushed to the right, the linear check is just passed with "
+        "note: pushed to the right, all its checks are just passed with "
         f"{needed:.3g} kN of the tie at block 1, for 1 m of width, without a factor on the tie"
     ]
     bounded = replace(free, displacement=replace(free.displacement, bounded=True))
