@@ -86,6 +86,7 @@ def _evaluate_step(system, step, states, ground, results, memory):
             moved = states[1, 0, 0] - states[0, 0, 0]
             resultants[0, 0] = system.mass * GRAVITY
             resultants[0, 1] = system.work[0]
+            resultants[0, 2] = 0.0
             energy[1] = system.stored
             energy[0] = 0.5 * system.mass * states[1, 1, 0] ** 2
             energy[2] = -system.mass * ground[0] * moved

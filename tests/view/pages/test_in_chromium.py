@@ -157,7 +157,7 @@ return [...document.querySelectorAll(".player-ground, .player-joint svg")].map(s
 def test_motions_are_whole_on_paper_and_labels_lie_beside_the_plots(small, tmp_path):
     """Also where type is larger, in the small panels of several motions."""
     folder, report = tmp_path / "out", tmp_path / "report.html"
-    case = af.Case.read(small)
+    case = af.Case.read(small, ["report.pairs=all"])
     with replace_run(case, folder) as draft:
         list(carry_out(case, draft))
     af.cases.open_results(folder).report(report)
