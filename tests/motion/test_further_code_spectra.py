@@ -117,6 +117,7 @@ def test_spectra_that_codes_do_not_define_are_refused(build, message):
         build()
 
 
+@pytest.mark.slow
 def test_a_floor_amplifies_the_ground_as_an_oscillator_does(verified):
     """A storey at 1.2 times the first mode, T_1 = 0.25 s, under motions matched to the ground."""
     ground = af.motion.Ntc2018(ag=0.17, f0=2.45, tc_star=0.32, site="B")
