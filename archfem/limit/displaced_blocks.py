@@ -99,8 +99,8 @@ class PlacedBlocks:
     ) -> "PlacedBlocks":
         """Return the blocks of a structure at rest."""
         still = np.zeros((len(structure.blocks), 3))
-        placed = cls(structure, still, find_corners(structure), tuple(loads), direction, fill)
-        return replace(placed, setback=np.zeros(len(structure.joints)))
+        given = structure, still, find_corners(structure), tuple(loads), direction, fill
+        return cls(*given, setback=np.zeros(len(structure.joints)))
 
     def moved(self, displacement: Array) -> "PlacedBlocks":
         """Return the blocks at other displacements from rest."""

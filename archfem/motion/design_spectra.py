@@ -553,6 +553,9 @@ class FloorSpectrum:
             storeys 3 n / (2 n + 1) times the height over that of the building.
         building_damping: ξ_1 [-].
 
+    Raises:
+        InvalidInput: a value is out of range; or the spectrum of the ground ends before a period.
+
     References:
         Circolare 7/2019, C7.2.3, and Degli Abbati, Cattari and Lagomarsino (2018), both from
         memory: check them before you sign.
@@ -575,10 +578,9 @@ class FloorSpectrum:
             periods: natural periods, of any shape [s].
         """
         ratio, resonance = np.asarray(periods) / self.period, 1.1 / np.sqrt(self.building_damping)
-        level = damping_correction(self.building_damping) * self.ground_spectrum.horizontal(
-            self.period
-        )
-        level = level * self.amplification * np.sqrt(1.0 + 4.0 * self.building_damping**2)
+        level = self.amplification * np.sqrt(1.0 + 4.0 * self.building_damping**2)
+        level *= damping_correction(self.building_damping)
+        level = level * self.ground_spectrum.horizontal(self.period)
         below, beyond = np.maximum(1.0 - ratio / 0.8, 0.0), np.maximum(ratio / 1.1 - 1.0, 0.0)
         reduction = 1.0 + (resonance - 1.0) * (below**1.6 + beyond**1.2)
         return np.asarray(
