@@ -1079,6 +1079,7 @@ def wall_in_bond(**section):
     return af.Case.of({"structure": structure, **section})
 
 
+@pytest.mark.slow
 def test_a_report_of_a_wall_has_its_falls_across_the_plane_as_one_rigid_body(monkeypatch):
     """The least half sine of frequency p that overturns it, integrated from impact to impact."""
     edge = 0.33033
@@ -1267,7 +1268,7 @@ def test_a_wall_that_slides_before_it_rocks_is_not_checked_across_its_plane(capl
     assert "the wall was not checked against the motions across its plane: " in caplog.text
 
 
-@pytest.mark.parametrize("demand", [None, "0.2 g"])
+@pytest.mark.parametrize("demand", [pytest.param(None, marks=pytest.mark.slow), "0.2 g"])
 def test_a_push_is_compared_with_a_demand_in_numbers_and_words_are_not_read(demand, tmp_path):
     """A stone 0.5 m broad and 1 m high, which a push of 0.5 g overturns."""
     tables = {
@@ -1435,6 +1436,7 @@ def test_sentences_are_short_of_a_ring_that_stands_is_scaled_and_has_a_study():
     assert long_sentences(data) == []
 
 
+@pytest.mark.slow
 def test_sentences_are_short_of_a_bridge_that_is_rated_and_shaken(kept_bridge):
     """All captions, too, of one motion and the rating of a lorry."""
     chapters = sections.number_captions(sections.build_sections(kept_bridge))

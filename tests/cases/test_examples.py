@@ -109,6 +109,7 @@ def test_the_ring_of_the_paper_has_its_geometry_and_rayleigh_damping():
     assert (case.analysis.fidelity, case.analysis.discretisation.displacements) == ("full", "small")
 
 
+@pytest.mark.slow
 def test_the_ring_by_fenicsx_alone_has_the_history_of_the_compiled_path():
     case = af.Case.read(list_examples()["ring_fenicsx"], ["model.cells=[2, 2]"])
     slow, motion = case.analysis, case.ground_motion().cut(2.0, 2.3)

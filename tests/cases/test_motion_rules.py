@@ -54,6 +54,7 @@ def test_rules_are_met_by_matched_motions_of_thirty_seconds():
     assert grid.rows[1][2].endswith("from 0.02 to 0.2 s")  # of the mode with the largest mass
 
 
+@pytest.mark.slow
 def test_the_periods_of_rocking_beyond_the_rule_are_compared():
     """The motion that is farthest from the target, above or below, with its period."""
     data = data_of()

@@ -85,6 +85,7 @@ def kept(carried_out, undrawn, tmp_path):
     return Path(shutil.copytree(carried_out, tmp_path / "out"))
 
 
+@pytest.mark.slow
 def test_a_suite_has_a_report_with_a_player_for_each_pair(kept, capsys):
     with replace_results(kept, "modes", read_file_list(kept)["run"].inputs) as draft:
         (draft / "modes.txt").write_text("mode 1 at 3.14 Hz")
@@ -538,6 +539,7 @@ def test_captions_are_numbered_without_a_gap(carried_out, unplotted, tmp_path):
         assert len(numbers) > 3
 
 
+@pytest.mark.slow
 def test_a_report_for_word_has_the_sections_of_the_page(
     carried_out, tmp_path, capsys, unplotted, monkeypatch
 ):

@@ -242,6 +242,7 @@ def break_off(case, motion, *given):
     raise af.DidNotConverge("no equilibrium", history=history)
 
 
+@pytest.mark.slow
 def test_results_of_a_case_with_another_title_are_replaced_with_a_warning(tmp_path, caplog):
     for title, scale in (("Bell tower", 1.0), ("Bell tower", 0.5), ("Gate", 1.0)):
         assert caplog.text == ""
@@ -281,6 +282,7 @@ def test_in_python_too_a_run_replaces_another_as_a_whole(two_runs):
     assert list(opened.runs) == ["synthetic 0"]
 
 
+@pytest.mark.slow
 def test_results_that_are_read_in_python_keep_their_pictures(two_runs):
     """Pairs are reused, and one that was swapped is computed anew: then the old pictures go."""
     folder, other = two_runs
@@ -310,6 +312,7 @@ def test_in_python_too_a_folder_has_one_run_at_a_time(tmp_path):
     assert run_one(tmp_path, 1.0).path.is_file()
 
 
+@pytest.mark.slow
 def test_no_pair_of_another_case_stays_among_those_of_a_suite(two_runs):
     folder, _ = two_runs
     case = af.Case.read(folder / "case.toml", ["suite.scale=3"])

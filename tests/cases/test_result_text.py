@@ -133,7 +133,7 @@ DEFAULTS = (
 DEFAULTS += "degree, lever 0"
 
 
-@pytest.mark.parametrize("foot", ["buttressed", "on piers"])
+@pytest.mark.parametrize("foot", ["buttressed", pytest.param("on piers", marks=pytest.mark.slow)])
 def test_a_hinge_of_a_pier_is_named_by_its_left_or_right_face(foot):
     """Pushed to the right, a pier turns about its right face, whichever side is its intrados."""
     if foot == "on piers":

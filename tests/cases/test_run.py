@@ -150,6 +150,7 @@ def test_warnings_name_case_and_motion(caplog):
     ]
 
 
+@pytest.mark.slow
 def test_a_fidelity_is_doubted_where_the_next_finer_one_disagrees():
     """Stones barely stiffer than their joints: rigid ones err from the dead load on."""
     ring = {"shape": "circular_arch", "radius": 2.95, "thickness": 0.55, "embrace": 159.0}

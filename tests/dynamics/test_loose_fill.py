@@ -303,6 +303,7 @@ def test_pieces_that_fell_out_of_the_ends_of_the_fill_are_in_doubt_by_end(footbr
         assert f"free end at x = {end:.4g} m, {count} of {len(fill)}; retain" in text
 
 
+@pytest.mark.slow
 def test_no_scale_is_searched_where_the_fill_bears_tension_at_rest(footbridge):
     """In proportion to its weight: twice as heavy it bears twice the tension."""
     analysis = af.Analysis(

@@ -448,7 +448,7 @@ def test_the_second_step_begins_near_the_fall_of_the_first(monkeypatch):
     assert " apart, and none between was run; varied were the scale and the " in str(found)
 
 
-@pytest.mark.parametrize("threshold", [2.0, 2.2])
+@pytest.mark.parametrize("threshold", [2.0, pytest.param(2.2, marks=pytest.mark.slow)])
 def test_the_smallest_fall_alone_is_followed_to_its_end(monkeypatch, threshold):
     """From 1.2 on blocks are loose; from 2 on one is lost, to a threshold not with shorter steps.
 

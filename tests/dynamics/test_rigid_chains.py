@@ -131,6 +131,7 @@ def test_coupling_of_stones_is_the_derivative_of_their_forces(each_way):
                 assert found == pytest.approx(expected, abs=1e-4 * scale), (joint, side, k)
 
 
+@pytest.mark.slow
 def test_tree_of_rings_on_a_pier_is_eliminated_from_its_leaves():
     piers = {"heights": (0.8, 1.2, 0.8), "breadths": (0.8, 0.6, 0.8)}
     structure = af.shapes.arcade(

@@ -78,6 +78,7 @@ def test_a_pivot_that_vanishes_is_reported(grid):
     assert not factorise(panels, places, added)
 
 
+@pytest.mark.slow
 def test_a_bridge_with_a_fill_has_the_history_of_snes(caplog):
     """N to 1e-7 of the largest, slips and rotations to 1e-8 m and rad."""
     caplog.set_level(logging.ERROR)

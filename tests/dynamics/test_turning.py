@@ -158,6 +158,7 @@ def test_a_ring_stands_or_falls_as_reported(tmp_path):
     assert read.fall == falls.fall
 
 
+@pytest.mark.slow
 def test_stones_whose_joints_never_slide_rub_once_they_are_loose():
     falls = af.time_history(model(friction=None), PULSE, dt=0.005, damping=DAMPED)
     assert falls.fall.kind == "fallen"

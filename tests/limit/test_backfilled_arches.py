@@ -270,6 +270,7 @@ def test_more_cover_carries_more():
     assert (np.diff(factors) > 0.0).all()
 
 
+@pytest.mark.slow
 def test_width_cancels():
     """Widths cancel: weights and earth pressure grow equally."""
     expected = af.collapse_factor(arch_bridge(), live=SIDEWAYS, fill=GRAVEL).factor
@@ -363,6 +364,7 @@ def test_an_arch_too_thin_for_its_fill_does_not_stand():
     assert af.stands(thin, fill=ALL)
 
 
+@pytest.mark.slow
 def test_a_fill_that_slides_first_is_warned_of(caplog):
     structure = arch_bridge(thickness=0.6)
     with caplog.at_level("WARNING", "archfem"):

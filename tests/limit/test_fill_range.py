@@ -112,7 +112,9 @@ def test_a_stone_turns_into_a_fill_at_a_factor_by_each_assumption(verified):
     assert down.over_fill is None
 
 
-@pytest.mark.parametrize(("angle", "doubtful"), [(35.0, False), (25.0, True)])
+@pytest.mark.parametrize(
+    ("angle", "doubtful"), [pytest.param(35.0, False, marks=pytest.mark.slow), (25.0, True)]
+)
 def test_what_happens_at_the_upper_end_of_a_range_alone_is_a_note(angle, doubtful, caplog):
     """Fill of 35° slides at tan φ = 0.7, between the ends, and one of 25° below both."""
     fill, live = af.limit.Fill(friction_angle=angle), af.BodyForce(1.0)
@@ -138,6 +140,7 @@ def test_what_happens_at_the_upper_end_of_a_range_alone_is_a_note(angle, doubtfu
     assert all(x.startswith(slides.format(y)) for x, y in zip(said, least, strict=True))
 
 
+@pytest.mark.slow
 def test_a_stone_turns_into_a_fill_with_and_without_its_backing(verified):
     """Backing holds its part of the face by its strength alone; without it the fill is as ever."""
     strength, level, passive = 1e5, HEIGHT / 2.0, 3.0
@@ -238,6 +241,7 @@ def test_an_assessment_passes_only_with_what_it_needs():
     ]
 
 
+@pytest.mark.slow
 def test_what_does_not_stand_without_pressure_says_so():
     """Two stones that lean to the right against the fill, which alone holds them."""
     parts = [

@@ -398,6 +398,7 @@ def test_a_block_under_a_press_is_pushed_over(verified):
     )
 
 
+@pytest.mark.slow
 def test_multiples_of_the_weight_stay_and_grow():
     """With twice the weight α is 2 tan(β - θ), however it grows."""
     block, dead = af.column(breadth=0.6, heights=[1.2, 1.2]), [af.BodyForce(0.0, -1.0)]

@@ -95,6 +95,7 @@ def test_cohesion_of_less_deep_joints_is_less():
     assert found == pytest.approx(2.0, rel=2e-3)  # of sliding: 2.5 of turning
 
 
+@pytest.mark.slow
 def test_the_geometric_factor_of_a_ring_is_that_of_its_thickness():
     """The two weigh a little otherwise, as the corners of a thinner ring are cut less."""
     ring = af.circular_arch(radius=1.0, thickness=0.2, embrace=180.0, voussoirs=10)

@@ -621,7 +621,9 @@ def test_states_of_a_surveyed_gateway_are_found(push):
 
 
 @pytest.mark.usefixtures("few_starts")
-@pytest.mark.parametrize("solved", [pytest.param(0, marks=pytest.mark.slow), 3, None])
+@pytest.mark.parametrize(
+    "solved", [*(pytest.param(n, marks=pytest.mark.slow) for n in (0, 3)), None]
+)
 def test_an_interrupted_search_leaves_the_least_factor_so_far(monkeypatch, caplog, solved):
     """Each solution is an upper bound; without any it is the factor with dilatancy."""
     structure, find, made = wall(HALVES, 0.5), nonassociated.find_solution, []
@@ -698,6 +700,7 @@ def test_a_least_factor_found_by_chance_is_doubted(caplog, agreeing, lower, word
     assert str(closed).startswith("proved the least, also without dilatancy: equilibrium and ")
 
 
+@pytest.mark.slow
 def test_where_dilatancy_locks_a_strut_the_answer_is_the_proven_bound():
     """Its own load presses three stones between walls; nothing is known of the largest factor."""
     dry = af.Contact(1e9, 3e8, 0.6)

@@ -50,6 +50,7 @@ def lorry_rating(few_places):
         return af.rate(bridge, lorry, width=2.0, dead=1.1, fill=GRAVEL)
 
 
+@pytest.mark.slow
 def test_the_factor_is_that_of_point_loads_at_the_worst_place(lorry_rating):
     """Factored axles by hand: live factor, the share of the width, and heavier materials."""
     found = lorry_rating
@@ -101,6 +102,7 @@ def column_under_axle(width=1.0, overhang=1.0):
     )
 
 
+@pytest.mark.slow
 def test_an_axle_on_an_overhang_by_hand():
     """It turns about the toe (1, 0) when Q (x - 1) is the moment of the weight about it.
 
@@ -374,6 +376,7 @@ def test_a_vehicle_spreads_over_its_wheels_and_the_fill_up_to_a_lane():
     )
 
 
+@pytest.mark.slow
 def test_the_depth_of_fill_is_found_beside_its_ends_too():
     """The fill ends above a corner of the ring, which rounding may put outside it."""
     for number in range(0, 60, 4):
@@ -739,7 +742,7 @@ def test_a_rating_with_backing_has_the_factor_without_it(monkeypatch):
         pytest.param("own", {"live": 1.1, "impact": 1.0}, "", marks=pytest.mark.slow),
         pytest.param("alone", {}, "", marks=pytest.mark.slow),
         pytest.param("by span", {"live": 1.45}, "impact", marks=pytest.mark.slow),
-        ("LM2", {}, ""),
+        pytest.param("LM2", {}, "", marks=pytest.mark.slow),
     ],
 )
 def test_a_vehicle_without_factors_passes_on_a_condition(vehicle, given, missing):
@@ -757,6 +760,7 @@ def test_a_vehicle_without_factors_passes_on_a_condition(vehicle, given, missing
     assert ("(none" in impact) == ("impact" in missing)
 
 
+@pytest.mark.slow
 def test_bare_axles_have_multiples_of_their_factor_by_eurocodes():
     stone, lorry = column_under_axle(width=2.0), Vehicle("lorry", (50e3, 40e3), (0.3,))
     factors = {"live": 1.1, "impact": 1.0}

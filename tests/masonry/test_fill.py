@@ -201,6 +201,7 @@ def test_between_fixed_walls_pieces_that_dilate_bear_any_load(caplog):
     assert not caplog.text
 
 
+@pytest.mark.slow
 def test_of_a_vehicle_on_given_fill_no_pieces_lock_whether_it_is_cut_or_not(caplog):
     """Both have the same factors, infinite where no axle reaches a stone that moves."""
     bridge = arch_bridge()

@@ -237,6 +237,7 @@ def push(structure, lever, sense=1.0):
     return af.collapse_factor(structure, **given).factor
 
 
+@pytest.mark.slow
 def test_parapets_as_a_body_along_the_bridge_weigh_and_are_pushed():
     """13.8 kN/m, their centre 0.5 m above the road; answers of the programme of `mill_bridge`."""
     bridge = mill_bridge()
@@ -267,7 +268,7 @@ SHORT = {"x": 6.6, "axles": (60e3, 115e3), "spacings": (4.0,), "centre_of_gravit
 @pytest.mark.parametrize(
     ("lorry", "lever", "right", "left"),
     [
-        (LONG, 0.0, 0.5482, 0.8152),
+        pytest.param(LONG, 0.0, 0.5482, 0.8152, marks=pytest.mark.slow),
         pytest.param(LONG, 1.0, 0.3918, 0.5537, marks=pytest.mark.slow),
         pytest.param(SHORT, 0.0, 0.6568, 0.6065, marks=pytest.mark.slow),
         (SHORT, 1.0, 0.4357, 0.3924),
@@ -289,6 +290,7 @@ def test_axles_do_not_drive_over_a_body_nor_is_it_plastic_fill():
         af.collapse_factor(loaded, live=af.BodyForce(1.0), fill=plastic)
 
 
+@pytest.mark.slow
 def test_a_body_that_slides_has_a_line_of_its_own_and_the_structure_stands():
     """Closed form: pushed by a on friction μ it slides by (a - μ g) t² / 2."""
     push, friction, time = 2.0, 0.1, 0.5
@@ -337,6 +339,7 @@ def test_an_axle_beyond_the_end_of_a_bridge_is_named_with_its_place():
         carrying(bridge, [single])
 
 
+@pytest.mark.slow
 def test_a_body_on_many_stones_of_a_wall_in_bond_is_a_doubt():
     """It ties them together: cut into pieces, the same weight falls at less."""
     wall = af.shapes.wall(breadth=3.0, height=1.5, width=0.5, course=0.25, stone=0.5)

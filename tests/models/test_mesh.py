@@ -380,7 +380,7 @@ def test_an_outline_that_crosses_itself():
         af.masonry.assembled([ground, bow], af.masonry.STONE_TO_STONE)
 
 
-@pytest.mark.parametrize("cells", [8, 16])
+@pytest.mark.parametrize("cells", [8, pytest.param(16, marks=pytest.mark.slow)])
 def test_cells_of_outlines_refine_their_inside_too(cells):
     """The first mode of a clamped beam of eight stones, 84.90 Hz by elements of a program apart."""
     places = [-1.0, *np.linspace(0.0, 4.0, 9), 5.0]

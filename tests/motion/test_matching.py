@@ -95,6 +95,7 @@ def test_a_table_that_begins_above_zero_is_accepted(shaking):
     assert matched(shaking.with_vertical(None), table).misfit["horizontal"] < 0.05
 
 
+@pytest.mark.slow
 def test_motions_and_bands_that_cannot_be_matched_are_refused(shaking):
     with pytest.raises(af.errors.InvalidInput, match="shorter than 20 s"):
         matched(shaking, CASE_STUDY, band=(0.05, 10.0))

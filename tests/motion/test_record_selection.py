@@ -201,6 +201,7 @@ def test_where_all_records_are_too_strong_the_set_nearest_to_the_upper_bound_is_
     ]
 
 
+@pytest.mark.slow
 def test_pairs_are_selected_by_the_median_of_directions(tmp_path):
     for seed in range(3):
         for direction in (0, 90):

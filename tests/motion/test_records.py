@@ -556,6 +556,7 @@ def test_shipped_samples_of_all_formats_are_read(write, form):
         assert channel.samples == pytest.approx(DAMAGE["WAVE"], abs=2e-4)
 
 
+@pytest.mark.slow
 def test_damaged_files_raise_no_foreign_error(tmp_path):
     path = tmp_path / "damaged.txt"
     refused = 0

@@ -636,6 +636,7 @@ NOTHING = {"joint_rule": "exact", "sign": "as given", "dt": "as given"}
 WALLS = {"length": 2.0, "height": 2.0, "above": 2.0, "course": 0.5, "state": "fixed"}
 
 
+@pytest.mark.slow
 def test_fill_that_only_tension_holds_is_a_doubt_with_its_free_ends():
     (doubt,) = fill_doubts(arch_bridge())
     assert "as soil of 30° and 5 kPa it does not stand under its own weight" in doubt.cause
@@ -775,6 +776,7 @@ def test_the_part_of_its_weight_that_soft_joints_carry_is_found():
         gate(1e10 / (part + 1.0 / 64.0))
 
 
+@pytest.mark.slow
 def test_with_cohesion_no_needed_stiffness_is_stated():
     contact = af.Contact(1e11, 0.2e11, 0.6, cohesion=0.05)
     ring = thin_ring(1e11).structure

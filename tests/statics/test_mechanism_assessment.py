@@ -966,6 +966,7 @@ def test_a_check_is_passed_from_a_ratio_of_one_on(ratio, passes, at_rest):
     assert (check.passes, check.at_rest) == (passes, at_rest)
 
 
+@pytest.mark.slow
 def test_a_fill_rests_on_the_stone_below_it():
     """Stone and fill turn together about the stone's corner; what rests on rock does not move."""
     soil = ((0.0, 0.5), (0.5, 0.5), (0.5, 0.0), (1.0, 0.0), (1.0, 1.5), (0.0, 1.5))
@@ -1042,6 +1043,7 @@ def test_a_check_of_one_code_on_a_spectrum_of_another_is_in_doubt(limit_state, c
         assert not af.kinematic_assessment(column, spectrum, **given).doubts
 
 
+@pytest.mark.slow
 def test_courses_that_move_as_one_raise_both_ratios(verified):
     """n equal courses that turn about the base have e* = 3 n² / (4 n² - 1)."""
     whole, split = (

@@ -195,6 +195,7 @@ def test_a_load_without_a_limit_has_no_extrapolation():
     assert found.hinges == ()
 
 
+@pytest.mark.slow
 def test_other_rules_stop_a_pushover():
     by_hinges = pushover(rigid(RING), af.BodyForce(1.0), stop=Stop(hinges=2))
     assert 2 <= len(by_hinges.hinges) < 4

@@ -120,6 +120,7 @@ def test_a_support_spreads_under_fill_in_pieces(bridge):
     assert found.factor < 0.9 * float(found.curve["factor"][0])
 
 
+@pytest.mark.slow
 def test_a_load_on_fill_in_pieces_continues_by_creep(bridge):
     """Each state is in balance and none beyond Coulomb; loads that cannot be borne add none."""
     fill = af.masonry.jointed_fill(bridge, 0.8, friction_angle=35.0, cohesion=10e3)

@@ -90,6 +90,7 @@ def test_a_column_presses_with_the_weight_above():
     assert use["use"].values == pytest.approx(use["compression"].values / (56.0 * af.units.MPa))
 
 
+@pytest.mark.slow
 def test_corners_have_the_peak_where_centres_miss_it(ring, ring_model, dead):
     """Against 16 × 16 cells, 4 × 4 centres are 13 % short of the peak, corners 3 %."""
     fine = af.build(ring, fidelity="full", cells=(16, 16))
@@ -216,6 +217,7 @@ def test_near_a_hinge_the_edge_stress_is_nearer_than_a_coarse_field(ring):
     assert fields[0] / fields[1] == pytest.approx(0.82, abs=0.02)
 
 
+@pytest.mark.slow
 def test_where_edges_of_joints_slide_the_field_tends_to_the_same_share_of_the_edge_stress(ring):
     """It converges by the first order of the cells' size only: 4 × 4 are 21 % below."""
     coarse, field, fine = (pushed_sideways(ring, n, 0.399) for n in (4, 8, 16))

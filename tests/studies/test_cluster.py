@@ -62,6 +62,7 @@ def cluster(folder, workers=2, preload=None):
             process.wait()
 
 
+@pytest.mark.slow
 def test_a_client_gives_the_rows_that_processes_give(study_file, tmp_path, client):
     study = af.Study.read(study_file, own_code=True)
     found = study.run(tmp_path / "out", client=client)

@@ -577,6 +577,7 @@ alternatives.slenderer = { weight = 1.0, set = ["structure.breadth=0.22"] }
     assert "Cornell et al." in report
 
 
+@pytest.mark.slow
 def test_a_risk_without_a_rate_is_reported_with_the_reason(tmp_path, capsys, monkeypatch):
     path = tmp_path / "block.toml"
     path.write_text(

@@ -145,6 +145,7 @@ def test_the_keys_of_a_case_are_changed_one_property_at_a_time(tmp_path, key):
         assert own == (values if name == "abutments free" else pytest.approx(values)), name
 
 
+@pytest.mark.slow
 def test_fill_in_pieces_and_joints_that_hardly_slide_are_varied_by_their_friction(tmp_path):
     """Joints that never slide are not, nor those of a rating without sliding."""
     path = tmp_path / "case.toml"

@@ -97,6 +97,7 @@ def test_a_circle_through_the_joints_has_the_rise_of_the_ring(answers):
     assert answers["rises"] == ["so", f"{rise:.2f} m", f"{rise:.2f} m"]
 
 
+@pytest.mark.slow
 def test_dead_load_is_that_of_the_analysis(answers, folder):
     dead = af.Case.read(folder / "shaken.toml").analysis.dead_load()
     joints, depth = dead.joints, 0.3

@@ -265,6 +265,7 @@ def test_a_full_disk_is_named_and_finished_points_stay(study_file, tmp_path, mon
     )
 
 
+@pytest.mark.slow
 def test_a_changed_title_or_picture_recomputes_nothing(ring_file, tmp_path, monkeypatch):
     over, folder = {"structure.thickness": [0.5, 0.6]}, tmp_path / "out"
 
@@ -455,6 +456,7 @@ def test_cases_with_a_suite_are_computed_under_each_pair(small, tmp_path):
     assert all(len(finding.runs) == 2 for finding in study.findings(table).values())
 
 
+@pytest.mark.slow
 def test_status_states_the_progress_of_a_study(study_file, tmp_path, capsys):
     folder = tmp_path / "out"
     command = ["study", "--own-code", str(study_file), "--out", str(folder), "--workers", "1"]
@@ -668,6 +670,7 @@ def test_values_may_be_an_array(small_ring):
     assert [dict(point.changes)["structure.thickness"] for point in study.points] == [0.5, 0.6]
 
 
+@pytest.mark.slow
 def test_a_state_that_was_not_found_is_no_number(ring_file, tmp_path, capsys, monkeypatch):
     """Its factor is undefined and its bound known: the associated factor of the static theorem."""
     monkeypatch.setattr("archfem.limit.nonassociated.find_solution", lambda *_, **__: None)
@@ -690,6 +693,7 @@ def test_a_state_that_was_not_found_is_no_number(ring_file, tmp_path, capsys, mo
     assert table["factor_at_most"].values[0] == pytest.approx(bound)
 
 
+@pytest.mark.slow
 def test_what_is_not_proved_least_is_marked(tmp_path, capsys):
     """As the command marks each case: a stack of stones is proved, a bond is not."""
     limit = '[limit]\nhorizontal = 1.0\nfriction = "nonassociated"\ndemand = "1 g"\n'

@@ -65,6 +65,7 @@ def test_a_case_is_compared_as_its_structure_is(case, compared):
     assert found.reference_error == pytest.approx(known.reference_error, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_settings_that_ran_are_not_run_again(case, compared, monkeypatch):
     first, folder = compared
     monkeypatch.setattr("archfem.studies.convergence.time_run", None)

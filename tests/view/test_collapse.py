@@ -313,6 +313,7 @@ def test_several_vehicles_are_drawn_each_at_its_worst_place(coarse_ring, few_pla
     assert "distributed load" in [text.get_text() for text in below.get_texts()]
 
 
+@pytest.mark.slow
 def test_backing_is_hatched_up_to_its_level():
     structure, load = arch_bridge(voussoirs=9), af.BodyForce(1.0)
     for level in (None, 0.5):

@@ -1,6 +1,7 @@
 """A structure where its blocks have gone."""
 
 import numpy as np
+import pytest
 
 import archfem as af
 from archfem.view.pages.player_data import Scene
@@ -106,6 +107,7 @@ def test_a_run_that_ends_in_a_fall_is_drawn_at_its_collapse(column, toppled):
     assert len(draw_critical(column.structure, toppled, column).axes) == 1
 
 
+@pytest.mark.slow
 def test_a_stack_that_rocks_on_after_its_record_is_drawn_like_one_that_has_come_back():
     """A record ends at 0.75 s, in rocking, so that stones are followed as loose: none falls."""
     stones, swing = af.column(breadth=0.4, heights=[0.8, 0.8]), 4.5 * np.sin(np.pi * TIMES)

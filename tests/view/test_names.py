@@ -46,7 +46,9 @@ def test_every_third_judged_joint_of_a_bridge_is_named(bridge):
     assert places == pytest.approx(np.array([joint.intrados for joint in named]))
 
 
-@pytest.mark.parametrize("voussoirs", [9, pytest.param(17, marks=pytest.mark.slow), 60])
+@pytest.mark.parametrize(
+    "voussoirs", [9, *(pytest.param(n, marks=pytest.mark.slow) for n in (17, 60))]
+)
 def test_names_of_a_ring_are_legible(voussoirs):
     """Each is upright, as a turned 6 may be a 9, and on no other; none is below 7 points."""
     ring = af.circular_arch(radius=2.95, thickness=0.3, embrace=159.0, voussoirs=voussoirs)
@@ -116,6 +118,7 @@ PIERS = af.Case.of(
 ).structure
 
 
+@pytest.mark.slow
 def test_long_names_are_numbered_and_the_name_of_a_ring_keeps_off_a_deck(bridge):
     """Two posts and a lintel: names of both stones would be written over each other."""
     rows = (("left upper drum", 0.0, 0.6, 0.0, 2.4), ("right upper drum", 2.2, 2.8, 0.0, 2.4))
@@ -176,6 +179,7 @@ def test_stones_of_a_wall_in_bond_are_numbered():
     assert "numbers of stones" in title.replace("\n", " ")
 
 
+@pytest.mark.slow
 def test_numbers_of_stones_beside_those_of_joints_are_marked():
     """A column beside a wall in bond, whose joints are named 0, 1 and so on."""
     wall = bonded()

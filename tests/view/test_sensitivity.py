@@ -17,6 +17,7 @@ def test_the_most_important_property_is_at_the_top():
     assert [patch.get_width() for patch in one_side] == pytest.approx([0.4, 0.1])
 
 
+@pytest.mark.slow
 def test_a_sensitivity_is_drawn_as_it_is():
     case = af.Case.of(
         {

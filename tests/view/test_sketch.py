@@ -114,6 +114,7 @@ right = { part = "wall", role = "pier" }
 """
 
 
+@pytest.mark.slow
 def test_a_failed_check_says_where_the_picture_is(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     draw(tmp_path / "two.dxf", {"left": (0.0, 1.0), "right": (0.9, 2.0)})

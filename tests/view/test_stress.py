@@ -38,6 +38,7 @@ def test_the_map_shows_compression_at_corners_with_thrust_line_and_crosses(ring_
     assert np.median(radial / apart) < 0.2  # compression follows the ring
 
 
+@pytest.mark.slow
 def test_the_map_of_one_part_has_its_own_scale(backfilled):
     """Soil is left out unless it is requested; there stresses are kPa."""
     model = af.build(backfilled, fidelity="full", cells=(2, 2))
@@ -51,6 +52,7 @@ def test_the_map_of_one_part_has_its_own_scale(backfilled):
         draw_stress(model, q, parts=["deck"])
 
 
+@pytest.mark.slow
 def test_under_rigid_stones_the_soil_is_shaded(backfilled):
     """Rigid stones have no stress, and a map of none would have a scale without meaning."""
     model = af.build(backfilled, fidelity={"backfill": "full", "rest": "rigid"}, cells=(2, 2))

@@ -223,6 +223,7 @@ def test_lines_differ_in_grey_and_without_any_of_the_cones():
         assert min(apart) >= 20.0, sight
 
 
+@pytest.mark.slow
 def test_panels_have_letters_in_their_order_and_a_single_one_has_none():
     figure = new_figure(6.0, 4.0)
     (first, second), (third, hidden) = figure.subplots(2, 2)
@@ -243,6 +244,7 @@ def test_panels_have_letters_in_their_order_and_a_single_one_has_none():
     assert not any(text.get_text().startswith("(") for text in alone.findobj(Text))
 
 
+@pytest.mark.slow
 def test_a_title_has_room_for_the_letter_of_its_panel():
     """A first line with its letter is no longer than the other lines may be."""
     title = "NTC-2018 SLV: passes by an upper bound alone, 1.01 with one weight a body"

@@ -80,6 +80,7 @@ def test_frames_of_a_run_that_chose_its_steps(model, tmp_path):
     assert len(imageio.mimread(path)) == 3
 
 
+@pytest.mark.slow
 def test_a_picture_has_the_memory_of_joints_or_warns_that_it_has_not(coarse, caplog):
     """An equilibrium has its own memory; coordinates alone are warned of."""
     dead = af.dead_load(coarse)
@@ -94,6 +95,7 @@ def test_a_picture_has_the_memory_of_joints_or_warns_that_it_has_not(coarse, cap
         picture(coarse, dead, joints=dead.joints.isel(joint=slice(3)), size=SIZE)
 
 
+@pytest.mark.slow
 def test_a_mechanism_is_outlined_from_its_instant_on(model, run, tmp_path):
     """Four hinges that alternate, as if found at 0.2 s: green lines in the later frames alone."""
     resultants = np.zeros((18, 3))
@@ -123,6 +125,7 @@ def test_hinges_are_red_where_there_are_some(model, run):
     assert 0.5 * count[last] * one < many < 1.5 * count[last] * one
 
 
+@pytest.mark.slow
 def test_magnified_blocks_move_and_supports_do_not(model, run):
     q = run.dataset["q"].values[-1]
     small, large = (picture(model, q, magnification=by, size=SIZE) for by in (1.0, 20.0))

@@ -94,6 +94,7 @@ def colour_ranges(page):
     return {tuple(json.loads(each)) for each in found}
 
 
+@pytest.mark.slow
 def test_a_page_has_its_instants_in_one_scene_with_one_scale(shaken, tmp_path):
     pytest.importorskip("trame", reason="the extra for notebooks is not installed")
     model, run = shaken
