@@ -423,7 +423,7 @@ def find_mechanism(
         return None
     factor, velocity, forces = solution
     if flat:
-        factor, velocity = _solve_flat(bodies, contacts, coefficient, forces[: len(contacts)])
+        factor, velocity = _solve_flat(*given, factor, forces[: len(contacts)])
     motion = bodies.spread(velocity)
     speed = blocks.largest_speed(motion)
     dilates = np.zeros(len(contacts)) if flat else coefficient
@@ -463,9 +463,12 @@ def _select_bodies(
 
 
 def _solve_flat(
-    bodies: Bodies, contacts: Sequence[Contact], coefficient: Array, forces: Array
+    bodies: Bodies, contacts: Sequence[Contact], coefficient: Array, bound: float, forces: Array
 ) -> tuple[float, Array]:
-    """Return factor and velocities of sliding without dilatancy, from first normal forces."""
+    """Return factor and velocities of sliding without dilatancy, from first normal forces.
+
+    The factor with dilatancy is its bound.
+    """
     before = np.inf
     for _ in range(40):
         solution = None
@@ -474,7 +477,8 @@ def _solve_flat(
         if solution is None:
             break
         factor, velocity, found = solution
-        if abs(factor - before) <= 1e-7 * abs(factor):
+        # one that repeats beyond its bound is of forces that still change
+        if abs(factor - before) <= 1e-7 * abs(factor) and factor <= bound + 1e-6 * abs(bound):
             return factor, velocity
         # half steps: whole ones may alternate between two states
         before, forces = factor, 0.5 * (forces + found[: len(contacts)])
