@@ -397,16 +397,24 @@ class Bodies:
             further = sparse.vstack([further, self.tie_forces], format="csr")
         return least, further
 
-    def dead_forces(self, velocity: Array | None = None) -> Array:
+    def find_held_ties(self, velocity: Array) -> Numbers:
+        """Return the ties that a velocity neither stretches nor slackens, between two bodies."""
+        far, near = self.tied_bodies.T
+        sizes = np.array([np.hypot(*tie.force) for tie in self.blocks.ties])
+        return np.flatnonzero((np.abs(self.tie_forces @ velocity) <= STILL * sizes) & (far != near))
+
+    def dead_forces(self, velocity: Array | None = None, held: Numbers | None = None) -> Array:
         """Return the generalised forces that do not grow (3 n_bodies,).
 
         The fill presses actively, and passively where a velocity moves a stone into it. A tie that
-        it stretches pulls with all of its force.
+        it stretches pulls with all of its force, and those that are held are left out.
         """
         least, further = self.bounded_forces
         dead = self.generalised(self.blocks.dead) + least.sum(axis=0).A1
         if velocity is not None:
-            dead += further.T @ (further @ velocity < 0.0)
+            acts = further @ velocity < 0.0
+            acts[further.shape[0] - len(self.blocks.ties) :][held] = held is None
+            dead += further.T @ acts
         return np.asarray(dead)
 
 

@@ -6,9 +6,10 @@ slips: hinges are pins at corners, and a sliding corner stays on the face that i
 place along the path, α is the factor at which the growing forces balance the weights, by
 virtual work on the velocities there.
 
-Three events change the mechanism: a joint that closes again, a contact that would need tension,
-and a corner that slides off its face. There, limit analysis is repeated on the displaced blocks,
-with friction at the contacts that remain, and its mechanism is followed from then on.
+These events change the mechanism: a joint that closes again, a contact that would need tension, a
+corner that slides off its face, and a tie that slackens or yields. There, limit analysis is
+repeated on the displaced blocks, with friction at the contacts that remain, and its mechanism is
+followed from then on.
 
 Faces slide flat: sliding in limit analysis dilates by μ (associated flow), the finite motion does
 not. Where a joint slides and others hinge, α at rest can therefore be below the collapse factor.
@@ -23,7 +24,7 @@ import xarray as xr
 from scipy.optimize import brentq, linprog
 
 from archfem._display import ExplainedWord
-from archfem._typing import Array, Flags
+from archfem._typing import Array, Flags, Numbers
 from archfem._validation import check_choice, validate_arguments
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.limit.collapse import Outcome, collapse_factor
@@ -53,7 +54,6 @@ class PathEnd(ExplainedWord):
     COLLIDES = "collides", "at the end it runs into blocks that it has no joint with"
     ENDURES = "endures", "it still needs a force where the path is cut off"
     UNRESOLVED = "unresolved", "at the end no mechanism was found whose faces slide flat"
-    HELD = "held", "at the end a tie holds its point, and the motion is followed no further"
     SLIDES = "slides", "it slides without turning, up to the ends of the faces as drawn"
 
 
@@ -84,6 +84,11 @@ class Linkage:
     def first_velocity(self) -> Array:
         """Velocities of the bodies at the start (3 n_bodies,)."""
         return Bodies(self.start, self.mechanism.body).gather(self.mechanism.motion)
+
+    @cached_property
+    def held(self) -> Numbers:
+        """Numbers of the ties that keep their length."""
+        return Bodies(self.start, self.mechanism.body).find_held_ties(self.first_velocity)
 
     def place(self, blocks: PlacedBlocks, motion: Array) -> "LinkageState":
         """Return the state after a finite motion of the bodies from other places of the blocks."""
@@ -129,7 +134,28 @@ class LinkageState:
             gaps.append(contact.normal @ jump)
             if not contact.slip:
                 slips.append(tangent(contact.normal) @ jump)
-        return np.array(gaps + slips)
+        return np.array([*gaps, *slips, *self.shortenings])
+
+    @property
+    def shortenings(self) -> list[float]:
+        """By how much shorter than at the start each held tie is [m]."""
+        found = []
+        for k in self.linkage.held:
+            start, tie = self.linkage.start.ties[k], self.blocks.ties[k]
+            moved = (tie.place - start.place) @ start.force / np.hypot(*start.force)
+            found.append(float(moved if tie.anchor is None else start.length - tie.length))
+        return found
+
+    @cached_property
+    def held_sizes(self) -> Array:
+        """Largest forces of the held ties (n_held,) [N]."""
+        return np.array([np.hypot(*self.blocks.ties[k].force) for k in self.linkage.held])
+
+    @cached_property
+    def shortening_rates(self) -> Array:
+        """Rates at which the held ties become shorter (n_held, 3 n_bodies)."""
+        forces = self.bodies.tie_forces[self.linkage.held].toarray()
+        return np.asarray(forces / self.held_sizes[:, None])
 
     @cached_property
     def rates(self) -> Array:
@@ -145,7 +171,8 @@ class LinkageState:
     def jacobian(self) -> Array:
         """Rates of the constraints with scaled velocities (n_constraints, 3 n_bodies)."""
         normal, along = self.rates
-        return np.vstack([normal, along[self.sticks]]) * self.bodies.units
+        rows = np.vstack([normal, along[self.sticks], self.shortening_rates])
+        return rows * self.bodies.units
 
     def velocity(self, previous: Array) -> Array | None:
         """Return the velocities of the bodies that are nearest to previous ones, or None."""
@@ -159,13 +186,6 @@ class LinkageState:
         if speed <= STILL * self.blocks.largest_speed(self.bodies.spread(previous)):
             return None
         return velocity / speed
-
-    def is_tied(self, velocity: Array) -> bool:
-        """Return whether a tie joins bodies that move apart, and is neither stretched nor slack."""
-        far, near = self.bodies.tied_bodies.T
-        sizes = np.array([np.hypot(*tie.force) for tie in self.blocks.ties])
-        held = np.abs(self.bodies.tie_forces @ velocity) <= STILL * sizes
-        return bool((held & (far != near)).any())
 
     def corrected(self, iterations: int = 12) -> "LinkageState | None":
         """Return the nearest state that fulfils the constraints, by Newton's method."""
@@ -189,12 +209,13 @@ class LinkageState:
         return end, after
 
     def balance(self, velocity: Array, friction: Array) -> tuple[float, Array]:
-        """Return the factor α in equilibrium, and the normal forces (n_contacts,) [N].
+        """Return the factor α in equilibrium, and the forces (n_contacts + n_held,) [N].
 
-        Normal forces that equilibrium does not determine are undefined (NaN).
+        They are normal forces and those of held ties. Those that equilibrium does not determine
+        are undefined (NaN).
         """
         normal, along = self.rates
-        dead = self.bodies.dead_forces(velocity)
+        dead = self.bodies.dead_forces(velocity, self.linkage.held)
         live = self.bodies.generalised(self.blocks.live)
         slipping = np.flatnonzero(~self.sticks)
         coefficient = friction[[contact.joint for contact in self.contacts]]
@@ -202,26 +223,28 @@ class LinkageState:
         senses = np.sign(along[slipping] @ velocity)
         # friction opposes the slip
         forces[slipping] -= (coefficient[slipping] * senses)[:, None] * along[slipping]
-        # unknown: normal forces, shear of sticking contacts, factor
+        # unknown: these, forces of held ties, shear of sticking contacts, factor
+        forces = np.vstack([forces, self.shortening_rates])
         columns = np.vstack([forces, along[self.sticks], live]).T * self.bodies.units[:, None]
         solution, _, rank, _ = np.linalg.lstsq(columns, -self.bodies.units * dead, rcond=1e-10)
         determined = rank == columns.shape[1]
         if not determined and len(slipping):
             solution = self._least_factor(columns, -self.bodies.units * dead, solution)
         # Virtual work on the velocity, with the work of friction.
-        normal_forces = solution[: len(forces)]
-        work = dead @ velocity + normal_forces @ (forces @ velocity)
+        found = solution[: len(forces)]
+        work = dead @ velocity + found @ (forces @ velocity)
         factor = -work / (live @ velocity)
-        return float(factor), normal_forces if determined else np.full(len(forces), np.nan)
+        return float(factor), found if determined else np.full(len(forces), np.nan)
 
     def _least_factor(self, columns: Array, loads: Array, fallback: Array) -> Array:
         """Return the forces of least factor where friction makes it indeterminate."""
         unit = np.abs(loads).max()
-        free = [(None, None)] * (columns.shape[1] - len(self.contacts))
+        pressed = len(self.contacts) + len(self.linkage.held)
+        free = [(None, None)] * (columns.shape[1] - pressed)
         objective = np.append(np.zeros(columns.shape[1] - 1), 1.0)
         scaled = columns.copy()
         scaled[:, -1] /= unit
-        bounds = [(0.0, None)] * len(self.contacts) + free
+        bounds = [(0.0, None)] * pressed + free
         equations = {"A_eq": scaled, "b_eq": loads / unit}
         result = linprog(objective, **equations, bounds=bounds, method="highs")
         if result.status != 0:
@@ -437,9 +460,6 @@ class PathFollower:
             velocity = state.velocity(state.linkage.first_velocity)
             if velocity is None or not self._opens_joints(state, velocity):
                 continue
-            if state.is_tied(velocity):
-                self._record(blocks, trial.factor)
-                raise _Stop(PathEnd.HELD)
             if trial.is_flat or self._presses(state, velocity):
                 return trial, state, velocity
         self._record(blocks, mechanism.factor)
@@ -573,19 +593,22 @@ class PathFollower:
         balance: tuple[float, Array] | None = None,
     ) -> Array:
         """Return how far a state is from each event; one without a positive margin has happened."""
-        factor, normal_forces = balance or state.balance(velocity, self.friction)
+        factor, forces = balance or state.balance(velocity, self.friction)
         blocks, size = state.blocks, self.blocks.structure.size
         body, pairs, near = state.bodies.body, blocks.structure.pairs, TOUCHING * size
         apart = (body[pairs[:, 0]] != body[pairs[:, 1]])[:, None]
         # deeper than a step reaches, a corner is behind the face and not in it
         gaps = np.where(apart & (blocks.gaps > -4.0 * step - near), blocks.gaps, np.inf)
         # well above the tolerance of the programme that follows; undetermined forces are NaN
-        forces = np.nan_to_num(normal_forces + 1e-5 * self._force_unit, nan=np.inf)
+        near_zero, pulls = 1e-5 * self._force_unit, forces[len(state.contacts) :]
+        left = np.concatenate([forces, state.held_sizes - pulls]) + near_zero
+        pressed, of_ties = np.split(np.nan_to_num(left, nan=np.inf), [len(state.contacts)])
         ways = [self._way_to_end(blocks, each) if each.slip else np.inf for each in state.contacts]
         crushed = pairs[np.flatnonzero(blocks.setback)]
         room = 1e-5 * size - largest_overlap(blocks.outlines, body, crushed)
         edges = np.array(ways) + 2.0 * near
-        return np.concatenate([[factor], gaps.ravel() + 0.5 * near, forces, edges, [room]])
+        met = gaps.ravel() + 0.5 * near
+        return np.concatenate([[factor], met, pressed, edges, of_ties, [room]])
 
     @staticmethod
     def _way_to_end(blocks: PlacedBlocks, contact: Contact) -> float:
@@ -605,7 +628,12 @@ class PathFollower:
         closes = happened[1 : 4 * len(names) + 1].reshape(2, -1, 2).any(axis=(0, 2))
         if closes.any():
             return f"{join_joint_names([names[k] for k in np.flatnonzero(closes)])} closes"
-        changes = happened[4 * len(names) + 1 : -1].reshape(2, -1)
+        others = happened[4 * len(names) + 1 : -1]
+        of_contacts, of_ties = np.split(others, [2 * len(state.contacts)])
+        for way, changed in zip(("slackens", "yields"), of_ties.reshape(2, -1), strict=True):
+            for number in state.linkage.held[changed]:
+                return f"the tie at {state.blocks.ties[number].name} {way}"
+        changes = of_contacts.reshape(2, -1)
         for contact, opens, is_off in zip(state.contacts, *changes, strict=True):
             if opens:
                 return f"a contact of {names[contact.joint]} opens"

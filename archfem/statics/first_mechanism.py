@@ -218,7 +218,7 @@ def find_stretches(
             away = (tie.place - places) @ tie.force / np.hypot(*tie.force)
         size = float(np.interp(share * moved[-1], np.maximum.accumulate(moved), away))
         # a hundredth of a millimetre is round-off
-        found.append((tie.name, max(round(size, 5), 0.0)))
+        found.append((tie.name, max(0.0, round(size, 5))))
     return found
 
 
@@ -271,7 +271,8 @@ def describe_loads(
         at = ", ".join(f"{format_mm(size)} at {name}" for name, size in stretches)
         found.append(
             f"{ties}; along the motion a tie pulls with all of its force where it is stretched"
-            f"{f', at the capacity by {at},' * bool(at)} and else with none: verify bar and anchor"
+            f"{f', at the capacity by {at},' * bool(at)} with what equilibrium needs where it "
+            "keeps its length, and else with none: verify bar and anchor"
         )
     if forces := [load.force for load in loads if any(load.force) and not load.passive]:
         pushes = any(force[0] * placed.direction > 0.0 for force in forces)

@@ -566,8 +566,7 @@ class _Oscillator:
                 "and faces slide flat here"
             )
         if len(self.path.factors) == 1:
-            holds = ", or a tie that holds its point," * bool(self.ties)
-            why = f"this mechanism begins, and its contacts{holds} permit no finite motion"
+            why = "this mechanism begins, and its contacts permit no finite motion"
             if self.path.end is PathEnd.SLIDES:
                 why = (
                     "this mechanism slides without turning and alpha does not fall as it moves; "

@@ -23,6 +23,7 @@ from archfem.cases.report.conclusion import list_facts
 from archfem.cases.report.report_data import ReportData
 from archfem.cases.result_text import note_ties_left_out
 from archfem.cases.toml_file import read_object
+from archfem.limit.finite_mechanism import PathEnd
 from archfem.statics import LIMIT_STATES, AssessmentCheck, LimitState, mechanism_assessment
 from archfem.statics.assessment_checks import (
     BY_MECHANISM,
@@ -368,13 +369,34 @@ def test_a_difference_of_checks_is_one_of_passing_and_failing(ratios, words):
     assert bool(said) is bool(words)
 
 
-def test_a_tie_that_holds_its_point_has_no_displacement_check():
-    """Tied at 4 m the halves turn against each other: α 20 (1 + 1) = 20 (0.25 + 0.75), t = 7.5."""
+def fold(turn):
+    """Σ x and Σ y of the centroids of two halves that fold to the right, their top held [m].
+
+    The lower one turns about its right toe, the upper one back about its left lower corner.
+    """
+    low = np.array([[cos(turn), sin(turn)], [-sin(turn), cos(turn)]])
+    knee = low @ (-0.5, 2.0) + (0.25, 0.0)
+    back = brentq(lambda t: knee[0] + 0.25 * cos(t) - 2.0 * sin(t), -0.1, 1.0)
+    high = np.array([[cos(back), -sin(back)], [sin(back), cos(back)]])
+    return low @ (-0.25, 1.0) + knee + high @ (0.25, 1.0)
+
+
+def test_a_tie_holds_its_point_along_the_motion():
+    """Tied at 4 m the halves turn against each other: α 20 (1 + 1) = 20 (0.25 + 0.75), t = 7.5.
+
+    Along the motion α = Σ dy / Σ dx, by virtual work: the tie does none.
+    """
     found = assess_tied(4.0, 2e4)
     assert found.alpha_0 == pytest.approx(0.5, rel=1e-4)
     assert found.notes[0].startswith("pushed to the right, alpha_0 needs 7.5 of the 20 kN")
-    assert found.displacement is None
-    assert "or a tie that holds its point, permit no finite motion: there is no" in found.notes[1]
+    assert "with what equilibrium needs where it keeps its length" in found.notes[0]
+    turns, step = -found.path.displacements[:, 1, 2], 1e-5
+    for turn, factor in zip(turns, found.path.factors, strict=True):
+        dx, dy = fold(turn + step) - fold(turn - step)
+        # at the last place, where the tie has slackened, it falls
+        assert factor == pytest.approx(dy / dx, abs=1e-4 if factor else 2e-3)
+    assert found.path.end is PathEnd.FALLS
+    assert turns[-1] > 0.1
     assert assess_tied(4.0, 5e3).alpha_0 == pytest.approx((10.0 + 5.0 * 4.0) / 80.0, rel=1e-4)
 
 
