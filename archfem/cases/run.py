@@ -7,7 +7,7 @@ an earlier call are reused if case, input files, program and ground motion are t
 import logging
 import os
 import shutil
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -67,9 +67,6 @@ HISTORY_FILE = "history.nc"
 
 # Whole motion of a run in its history: accelerations (sample, axis), and its step as attribute
 MOTION_VARIABLE = "whole_motion"
-
-# Integrates a motion of a case from its dead load, with damping, as `run_time_history` does.
-RunMotion = Callable[[Case, Motion, Equilibrium, Viscous | None], History]
 
 
 class CaseResult:
@@ -257,7 +254,6 @@ def run_case(
     folder: str | Path | None = None,
     *,
     pairs: Collection[str] | None = None,
-    run_motion: RunMotion | None = None,
 ) -> Iterator[Result]:
     """Carry out a case, and yield each result as soon as it is computed.
 
@@ -272,7 +268,6 @@ def run_case(
         case: the case.
         folder: folder of the histories; None saves none.
         pairs: names of the pairs of the suite to run; None runs all.
-        run_motion: function that integrates one motion; by default `run_time_history`.
 
     Yields:
         The `DeadLoadResult`; a `Pushover` if the case has one; the `Suite` if there is one; a `Run`
@@ -285,13 +280,13 @@ def run_case(
             matched, or the first step of a run failed.
     """
     if folder is None:
-        yield from carry_out(case, None, pairs=pairs, run_motion=run_motion)
+        yield from carry_out(case, None, pairs=pairs)
         return
     folder, inputs = Path(folder), case.hash_inputs()
     with _files.lock_folder(folder):
         draft, kept = _start_draft(case, folder, inputs), False
         try:
-            for result in carry_out(case, draft, pairs=pairs, run_motion=run_motion):
+            for result in carry_out(case, draft, pairs=pairs):
                 if isinstance(result, Run):
                     result = _publish_run(result, folder, draft, inputs)
                     kept = result.path is not None and result.path.is_relative_to(draft)
@@ -304,14 +299,9 @@ def run_case(
 
 
 def carry_out(
-    case: Case,
-    folder: Path | None,
-    *,
-    pairs: Collection[str] | None = None,
-    run_motion: RunMotion | None = None,
+    case: Case, folder: Path | None, *, pairs: Collection[str] | None = None
 ) -> Iterator[Result]:
     """Yield the results of `run_case`, with histories in a draft of a result folder."""
-    run_motion = run_motion or run_time_history
     # Unreadable records are errors before the dead load is computed.
     selected = case if pairs is None else case.alone(*pairs)
     selected.check_ground()
@@ -326,13 +316,13 @@ def carry_out(
         suite = selected.ground_suite()  # spectral matching takes a second a pair
         yield suite
         for motion in suite.motions:
-            run = _run_pair(at_rest, motion, folder, run_motion)
+            run = _run_pair(at_rest, motion, folder)
             yield run
             if run.history.ending is Ending.INTERRUPTED:  # by Ctrl-C, or SIGTERM
                 return
     elif case.motion is not None:
         path = None if folder is None else folder / HISTORY_FILE
-        run = _run_motion(case, case.ground_motion(), at_rest, path, run_motion)
+        run = _run_motion(case, case.ground_motion(), at_rest, path)
         yield run
         if run.history.ending is Ending.INTERRUPTED:
             return
@@ -434,9 +424,7 @@ def log_prefix(*names: str) -> AbstractContextManager[None]:
     return filter_log(add_prefix)
 
 
-def _run_pair(
-    at_rest: DeadLoadResult, motion: Motion, folder: Path | None, run_motion: RunMotion
-) -> Run:
+def _run_pair(at_rest: DeadLoadResult, motion: Motion, folder: Path | None) -> Run:
     """Run a pair of a suite, or reuse the history of an earlier call."""
     case = at_rest.case.alone(motion.name)
     path = None if folder is None else folder / motion.name / HISTORY_FILE
@@ -445,16 +433,14 @@ def _run_pair(
         prediction = at_rest.dead.model.prediction
         if prediction is None or history.dataset.attrs.get("predicted_error") == prediction.error:
             return Run(case, motion, history, path, reused=True)
-    return _run_motion(case, motion, at_rest, path, run_motion)
+    return _run_motion(case, motion, at_rest, path)
 
 
-def _run_motion(
-    case: Case, motion: Motion, at_rest: DeadLoadResult, path: Path | None, run_motion: RunMotion
-) -> Run:
+def _run_motion(case: Case, motion: Motion, at_rest: DeadLoadResult, path: Path | None) -> Run:
     """Run a motion and save its history, also if a step fails."""
     start, failure = perf_counter(), None
     try:
-        history = run_motion(case, motion, at_rest.dead, at_rest.damping[0])
+        history = run_time_history(case, motion, at_rest.dead, at_rest.damping[0])
     except DidNotConverge as error:
         history, failure = partial_history(error), error
     seconds = perf_counter() - start

@@ -11,7 +11,8 @@ import xarray as xr
 import archfem as af
 from archfem._files import read_file_list, replace_results, write_sealed_json
 from archfem.cases import result_folder as results
-from archfem.cases.run import carry_out, link_file, replace_run
+from archfem.cases import run as run_module
+from archfem.cases.run import carry_out, link_file, replace_run, run_time_history
 
 
 def test_more_pairs_than_colours_share_several_pictures(small):
@@ -228,16 +229,16 @@ COLUMN = {
 }
 
 
-def run_one(folder, scale, **options):
+def run_one(folder, scale):
     """Run one motion in Python."""
     tables = {**COLUMN, "motion": {**COLUMN["motion"], "scale": scale}}
-    *_, run = af.cases.run_case(af.Case.of(tables), folder, **options)
+    *_, run = af.cases.run_case(af.Case.of(tables), folder)
     return run
 
 
 def break_off(case, motion, *given):
     """Integrate a motion as if a step failed."""
-    history = af.cases.run_time_history(case, motion, *given)
+    history = run_time_history(case, motion, *given)
     history.dataset.attrs["ended"] = "failed"
     raise af.DidNotConverge("no equilibrium", history=history)
 
@@ -265,11 +266,13 @@ def test_a_run_replaces_no_file_that_archfem_did_not_write(name, small, tmp_path
     assert [path.name for path in mine.parent.iterdir()] == [name]
 
 
-def test_in_python_too_a_run_replaces_another_as_a_whole(two_runs):
+def test_in_python_too_a_run_replaces_another_as_a_whole(two_runs, monkeypatch):
     """Files of the suite that was there vanish with it; a run that fails replaces none."""
     folder, _ = two_runs
     before = {name: (folder / name).read_bytes() for name in files_below(folder)}
-    failed = run_one(folder, 1.0, run_motion=break_off)
+    with monkeypatch.context() as patch:
+        patch.setattr(run_module, "run_time_history", break_off)
+        failed = run_one(folder, 1.0)
     assert failed.path.is_relative_to(folder / ".unfinished-run")
     after = {name: (folder / name).read_bytes() for name in before}
     assert after == before
@@ -336,18 +339,19 @@ def test_pairs_are_reused_as_others_join_the_suite(two_runs):
     }
 
 
-def test_a_pair_that_is_interrupted_joins_those_that_are_finished(two_runs):
+def test_a_pair_that_is_interrupted_joins_those_that_are_finished(two_runs, monkeypatch):
     """It replaces nothing, as no earlier run has it."""
     folder, _ = two_runs
     case = af.Case.read(folder / "case.toml", ["suite.scale=3"])
     list(af.cases.run_case(case, folder, pairs=["second"]))
 
     def interrupted(*given):
-        history = af.cases.run_time_history(*given)
+        history = run_time_history(*given)
         history.dataset.attrs["ended"] = "interrupted"
         return history
 
-    *_, run = af.cases.run_case(case, folder, run_motion=interrupted)
+    monkeypatch.setattr(run_module, "run_time_history", interrupted)
+    *_, run = af.cases.run_case(case, folder)
     assert run.path == folder / "first" / "history.nc"
     assert set(af.cases.open_results(folder).runs) == {"first", "second"}
 

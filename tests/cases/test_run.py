@@ -11,7 +11,7 @@ import pytest
 import archfem as af
 from archfem.cases import provenance
 from archfem.cases import run as run_module
-from archfem.cases.run import load_finished_run, log_prefix
+from archfem.cases.run import load_finished_run, log_prefix, run_time_history
 
 
 def names(results):
@@ -58,30 +58,33 @@ def test_one_motion_has_its_history_in_the_folder_itself(small, tmp_path, undoub
     assert len(list(af.cases.run_case(af.Case.of(tables), tmp_path / "out"))) == 2
 
 
-def test_ctrl_c_ends_the_suite_after_the_run_it_met(small, tmp_path, undoubted):
+def test_ctrl_c_ends_the_suite_after_the_run_it_met(small, tmp_path, undoubted, monkeypatch):
     def interrupted(case, motion, *given):
-        history = af.cases.run_time_history(case, motion, *given)
+        history = run_time_history(case, motion, *given)
         history.dataset.attrs["ended"] = "interrupted"
         return history
 
     case = af.Case.read(small)
-    results = list(af.cases.run_case(case, tmp_path / "out", run_motion=interrupted))
+    with monkeypatch.context() as patch:
+        patch.setattr(run_module, "run_time_history", interrupted)
+        results = list(af.cases.run_case(case, tmp_path / "out"))
     assert names(results) == ["DeadLoadResult", "Suite", "Run"]
     assert not any(
         run.reused for run in af.cases.run_case(case, tmp_path / "out") if "Run" in names([run])
     )
 
 
-def test_a_step_that_fails_ends_its_run_only(small, tmp_path, undoubted):
+def test_a_step_that_fails_ends_its_run_only(small, tmp_path, undoubted, monkeypatch):
     def failing(case, motion, *given):
-        history = af.cases.run_time_history(case, motion, *given)
+        history = run_time_history(case, motion, *given)
         if motion.name == "first":
             history.dataset.attrs["ended"] = "failed"
             raise af.DidNotConverge("no equilibrium", history=history)
         return history
 
     case = af.Case.read(small)
-    *_, first, second = af.cases.run_case(case, tmp_path / "out", run_motion=failing)
+    monkeypatch.setattr(run_module, "run_time_history", failing)
+    *_, first, second = af.cases.run_case(case, tmp_path / "out")
     assert "no equilibrium" in str(first.error)
     assert second.error is None
     alone = case.alone("first")
@@ -91,8 +94,9 @@ def test_a_step_that_fails_ends_its_run_only(small, tmp_path, undoubted):
     def never_begun(*_):
         raise af.DidNotConverge("no equilibrium")
 
+    monkeypatch.setattr(run_module, "run_time_history", never_begun)
     with pytest.raises(af.DidNotConverge, match="no equilibrium"):
-        list(af.cases.run_case(case, run_motion=never_begun))
+        list(af.cases.run_case(case))
 
 
 def test_pairs_are_run_again_where_their_files_have_changed(small, tmp_path, at2):

@@ -17,8 +17,9 @@ from backfilled import slender_bridge
 from pages import read_page
 
 import archfem as af
+from archfem.cases import run as run_module
 from archfem.cases.result_text import ResultTable, record_doubts
-from archfem.cases.run import carry_out
+from archfem.cases.run import carry_out, run_time_history
 from archfem.commands import margin
 from archfem.commands.run import print_results
 from archfem.dynamics import fall, motion_scaling, time_history
@@ -196,10 +197,12 @@ def test_pairs_that_workers_have_run_were_not_finished_before(
     assert "first: finished before" not in said
 
 
-def run_with(small, shake):
+def run_with(small, shake, monkeypatch):
     """Carry out a case as `archfem run` does, with another function that runs a motion."""
     case, out = af.Case.read(small), small.parent / "out"
-    print_results(case, carry_out(case, out, run_motion=shake), out)
+    with monkeypatch.context() as patch:
+        patch.setattr(run_module, "run_time_history", shake)
+        print_results(case, carry_out(case, out), out)
 
 
 @pytest.mark.slow
@@ -482,16 +485,16 @@ def test_kept_runs_keep_the_larger_mechanism():
 
 
 @pytest.mark.slow
-def test_an_interrupted_suite_continues_with_the_motions_left(small, undrawn, capsys):
+def test_an_interrupted_suite_continues_with_the_motions_left(small, undrawn, capsys, monkeypatch):
     def broken_off(case, motion, *given):
-        history = af.cases.run_time_history(case, motion, *given)
+        history = run_time_history(case, motion, *given)
         history = history.with_doubts([Doubt("energy drifts")])
         if motion.name == "second":
             history.dataset.attrs["ended"] = "interrupted"
         return history
 
     with pytest.raises(KeyboardInterrupt):
-        run_with(small, broken_off)
+        run_with(small, broken_off, monkeypatch)
     assert "run the same command again" in capsys.readouterr().err
     assert run(small) == 3  # kept results keep their doubts
     summary = (small.parent / "out" / "first" / "summary.txt").read_text()
@@ -503,9 +506,9 @@ def test_an_interrupted_suite_continues_with_the_motions_left(small, undrawn, ca
     assert "second: finished before" not in said
 
 
-def test_a_pair_that_fails_does_not_end_the_suite(small, unplotted, undoubted, capsys):
+def test_a_pair_that_fails_does_not_end_the_suite(small, unplotted, undoubted, capsys, monkeypatch):
     def failing(case, motion, *given):
-        history = af.cases.run_time_history(case, motion, *given)
+        history = run_time_history(case, motion, *given)
         if motion.name == "first":
             history.dataset.attrs["ended"] = "failed"
             raise af.DidNotConverge("no equilibrium", history=history)
@@ -514,7 +517,7 @@ def test_a_pair_that_fails_does_not_end_the_suite(small, unplotted, undoubted, c
     with pytest.raises(
         af.DidNotConverge, match="1 of 2 pairs have no equilibrium at some step: first"
     ):
-        run_with(small, failing)
+        run_with(small, failing, monkeypatch)
     path = small.parent / "out" / "first" / "history.nc"
     said = capsys.readouterr().err
     assert "archfem: first: no equilibrium" in said
@@ -524,15 +527,17 @@ def test_a_pair_that_fails_does_not_end_the_suite(small, unplotted, undoubted, c
     assert af.History.read(path).ending is af.dynamics.Ending.FAILED
 
 
-def test_a_motion_that_fails_is_kept_and_ends_the_command(small, unplotted, undoubted, capsys):
+def test_a_motion_that_fails_is_kept_and_ends_the_command(
+    small, unplotted, undoubted, capsys, monkeypatch
+):
     small.write_text(small.read_text().split("[suite]")[0] + "[motion]\nsynthetic = { seed = 1 }")
 
     def failing(case, motion, *given):
-        history = af.cases.run_time_history(case, motion.cut(0.0, 0.5), *given)
+        history = run_time_history(case, motion.cut(0.0, 0.5), *given)
         raise af.DidNotConverge("no equilibrium at 0.5 s", history=history)
 
     with pytest.raises(af.DidNotConverge, match=r"no equilibrium at 0.5 s"):
-        run_with(small, failing)
+        run_with(small, failing, monkeypatch)
     path = small.parent / "out" / "history.nc"
     assert af.History.read(path).time[-1] == pytest.approx(0.5)
     assert not path.with_name("summary.txt").exists()
