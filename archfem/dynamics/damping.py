@@ -80,27 +80,6 @@ class EffectiveModeRange:
         )
 
 
-@dataclass(frozen=True, eq=False)
-class FirstEffectiveMode:
-    """First mode effective along x."""
-
-    modes: Modes  # all modes computed
-    number: int  # of the mode, counted from 1
-
-    @property
-    def text(self) -> str:
-        """Number of the mode and its share of the mass."""
-        share = 100.0 * self.modes.mass_ratios[self.number - 1, 0]
-        return f"mode {self.number}, the first effective along x, has {share:.1f} % of the mass"
-
-
-def first_effective_mode(model: Model, start: Start = None) -> FirstEffectiveMode:
-    """Find the first mode effective along x."""
-    computed, shares = _modes_with_share(model, start, FIRST_MASS_SHARE)
-    number = int(np.searchsorted(shares, FIRST_MASS_SHARE)) + 1
-    return FirstEffectiveMode(computed, min(number, len(shares)))
-
-
 def effective_mode_range(
     model: Model,
     start: Start = None,
@@ -239,9 +218,12 @@ def _find_frequencies(damping: EffectiveDamping, model: Model, start: Start) -> 
     if damping.kind == "rayleigh":
         both = effective_mode_range(model, start, mass_share=damping.mass_share)
         return Rayleigh(damping.ratio, both.frequencies, damping.joints), f"; {both.text}"
-    first = first_effective_mode(model, start)
-    frequency = float(first.modes.frequencies[first.number - 1])
-    return StiffnessDamping(damping.ratio, frequency, damping.joints), f"; {first.text}"
+    computed, shares = _modes_with_share(model, start, FIRST_MASS_SHARE)
+    first = min(int(np.searchsorted(shares, FIRST_MASS_SHARE)), len(shares) - 1)
+    mass = f"has {100.0 * computed.mass_ratios[first, 0]:.1f} % of the mass"
+    frequency = float(computed.frequencies[first])
+    text = f"; mode {first + 1}, the first effective along x, {mass}"
+    return StiffnessDamping(damping.ratio, frequency, damping.joints), text
 
 
 @dataclass(frozen=True)
