@@ -391,6 +391,8 @@ class AssessmentSettings:
                 found |= {f"{name or 'part'}, {side}": result for name, result in each.items()}
             else:
                 found[side] = kinematic_assessment(structure, spectrum, **options)
+                if above := found[side].above:
+                    found[f"{side}, {above.mechanism_name}"] = above
         return {name: result.least or result for name, result in found.items()}
 
 

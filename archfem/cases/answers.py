@@ -26,6 +26,7 @@ from archfem.models.model import Doubt, read_doubts, write_doubts
 from archfem.motion.hazard import DESIGN_PERIOD, MEASURES
 from archfem.motion.motion import Motion
 from archfem.statics.assessment_checks import AssessmentCheck, describe_difference
+from archfem.statics.first_mechanism import describe_tied_length
 from archfem.statics.mechanism_assessment import KinematicAssessment
 from archfem.units import STANDARD_GRAVITY, Ends, format_ratio, kN
 
@@ -367,26 +368,38 @@ def note_ties(case: Case) -> list[str]:
     ties = [load for load in loads if load.passive]
 
     @cache  # ends of the search are tried before it
-    def exceed(scale: float, sense: float) -> float:
-        """Return the least ratio above 1 with a multiple of the forces of all ties [-]."""
+    def solve(scale: float, sense: float) -> tuple[float, str]:
+        """Return the least ratio with a multiple of the forces of all ties, and its mechanism."""
         tied = [replace(x, force=(scale * x.force[0], scale * x.force[1])) for x in ties if scale]
         options = {**settings.options, "loads": [x for x in loads if not x.passive] + tied}
         own = replace(settings, directions=(sense,), options=options)
-        (found,) = own.solve(case.structure, case.demand).values()
-        return min(MOST_TIED, *(check.decisive for check in found.checks)) - 1.0
+        found = own.solve(case.structure, case.demand).values()
+        least = min(found, key=lambda each: find_margin([each]))
+        return min(MOST_TIED, find_margin([least])), least.mechanism_name
+
+    def exceed(scale: float, sense: float) -> float:
+        """Return the least ratio above 1 [-]."""
+        return solve(scale, sense)[0] - 1.0
 
     for sense in settings.directions if ties else ():
         with suppress(InvalidInput):  # without its ties it may not stand
-            if exceed(0.0, sense) < 0.0 < exceed(MOST_TIED, sense):
+            if exceed(0.0, sense) >= 0.0:
+                continue
+            most, mechanism = solve(MOST_TIED, sense)
+            if most > 1.0:
                 scale = brentq(exceed, 0.0, MOST_TIED, (sense,), xtol=1e-3)
                 of = f"{scale:.3g} times the forces of the ties"
                 if len(ties) == 1:
                     size = scale * float(np.hypot(*ties[0].force)) / kN
                     of = f"{size:.3g} kN of the tie at {ties[0].block}"
-                side = name_side(sense)
-                of += f", for {case.structure.width:g} m of width, without a factor on the tie"
-                text = f"pushed to the {side}, all its checks are just passed with {of}"
-                notes.append(f"{NOTE_MARK}{text}")
+                text = f"all its checks are just passed with {of} "
+                text += describe_tied_length(case.structure)
+            elif any(sense * tie.force[0] < 0.0 for tie in ties):
+                text = f"not even {MOST_TIED:g} times the forces of the ties suffice: {mechanism} "
+                text += f"has a ratio of {format_ratio(most)}"
+            else:
+                continue
+            notes.append(f"{NOTE_MARK}pushed to the {name_side(sense)}, {text}")
     return notes
 
 

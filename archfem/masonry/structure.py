@@ -687,3 +687,18 @@ def describe_piers(structure: Structure) -> dict[str, str]:
         high = f" and {min(clear):.3g} m high to the ring" if clear else high
         piers[part] = f"{broad:.4g} m broad{high}"
     return piers
+
+
+def list_stack(structure: Structure) -> list[tuple[int, int]] | None:
+    """Return joint and block of each course from the ground on; None unless there is one stack."""
+    stack, block = list[tuple[int, int]](), None
+    beside: dict[int, list[tuple[int, int]]] = {}
+    for number, (a, b) in enumerate(structure.pairs.tolist()):
+        beside.setdefault(a, []).append((number, b))
+        beside.setdefault(b, []).append((number, a))
+    onward = [x for k, each in beside.items() if structure.blocks[k].fixed for x in each]
+    while len(onward) == 1:
+        stack += onward
+        joint, block = onward[0]
+        onward = [each for each in beside[block] if each[0] != joint]
+    return stack if not onward and 2 <= len(stack) == len(structure.free) else None

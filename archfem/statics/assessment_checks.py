@@ -80,7 +80,7 @@ class LimitState:
 
         Args:
             spectrum: spectrum of the demand; a table and a motion are of no code.
-            above: height of the foot of what is checked above the ground, if it is a column [m].
+            above: height of the foot of what moves above the ground, if it is of a column [m].
         """
         kinds = {type(spectrum), type(getattr(spectrum, "ground_spectrum", None))}
         codes = [name for name, kind in registered_spectra.items() if kind in kinds]
@@ -90,11 +90,34 @@ class LimitState:
             remedy = "give limit_state with the rules of its code, or a spectrum of NTC-2018"
             found.append(Doubt(words, remedy))
         if above and codes and not {*codes} & {"table", "floor"}:
-            words = "the spectrum is that of the ground, and {:.3g} m above it, at the foot of this"
-            words += " column, it is larger: each ratio is {}"
+            words = "the spectrum is that of the ground, and {:.3g} m above it, at the foot of what"
+            words += " moves, it is larger: each ratio is {}"
             remedy = 'give that of the height, by code = "floor" or a table'
             found.append(Doubt(words, remedy, (above, UPPER_BOUND)))
         return found
+
+    def check(
+        self, spectrum: DesignSpectrum | Motion, confidence: float, moved: Array, curve: Array
+    ) -> "AssessmentCheck":
+        """Check the displacement of a capacity curve against a spectrum.
+
+        Args:
+            spectrum: spectrum of the demand.
+            confidence: FC, which reduces the accelerations [-].
+            moved: spectral displacements (n,) [m].
+            curve: accelerations there (n,) [m/s²].
+        """
+        capacity = self.share * float(moved[-1])
+        secant = secant_period(moved, curve, self.secant_share * capacity)
+        period = float(self.period_factor / 2.0 * np.sqrt(confidence) * secant)
+        # The largest spectral displacement up to the period; code spectra grow with it.
+        periods = period * np.linspace(0.0, 1.0, 41)[1:]
+        acceleration = spectral_acceleration(spectrum, periods, self.damping)
+        demand = float((acceleration * (periods / (2.0 * np.pi)) ** 2).max())
+        # nor does it fail where the ground does not set it in motion
+        begins = float(curve[0]) / confidence / peak_acceleration(spectrum)
+        ratio = max(capacity / demand, begins)
+        return AssessmentCheck(self.name, capacity, demand, "m", ratio, period, self.source)
 
 
 # Sources of displacement checks; the 2019 values were read in a transcription of the Circolare.
@@ -249,6 +272,17 @@ def spectral_acceleration(
     held = np.minimum(periods, longest)
     beyond = np.where(periods > longest, longest / np.maximum(periods, 1e-9), 1.0)
     return np.asarray(factor * spectrum.horizontal(held) * beyond**2)
+
+
+def peak_acceleration(spectrum: DesignSpectrum | Motion) -> float:
+    """Return the acceleration of the ground [m/s²]."""
+    return float(spectral_acceleration(spectrum, np.zeros(1), 0.05)[0])
+
+
+def secant_period(moved: Array, curve: Array, displacement: float) -> float:
+    """Return the secant period of a capacity curve at a displacement [s]."""
+    acceleration = float(np.interp(displacement, np.maximum.accumulate(moved), curve))
+    return float(2.0 * np.pi * np.sqrt(displacement / acceleration)) if acceleration else np.inf
 
 
 def check_assessable(

@@ -3,7 +3,7 @@
 A fill becomes weights that are attached to the stones below, and pressures on their faces.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import combinations
 
@@ -28,9 +28,9 @@ from archfem.limit.mechanism_kinematics import find_rigid_regions
 from archfem.limit.self_weight import joint_strengths
 from archfem.masonry.loads import AttachedLoad, BodyForce, name_side
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
-from archfem.masonry.structure import Structure, join_names
+from archfem.masonry.structure import Structure, join_names, list_stack
 from archfem.models.model import Doubt
-from archfem.statics.assessment_checks import UPPER_BOUND, measure_blocks
+from archfem.statics.assessment_checks import UPPER_BOUND, AssessmentCheck, measure_blocks
 from archfem.units import MPa, format_mm, kN
 
 # Stretch from which a tie is doubted, as its free length is not known: 2 % of 2 m [m]
@@ -100,6 +100,36 @@ def select_joints(
     else:
         chosen = set(structure.free)
     return [k for k, pair in enumerate(structure.pairs.tolist()) if chosen & set(pair)]
+
+
+def find_weakest_body(
+    structure: Structure,
+    loads: Sequence[AttachedLoad],
+    direction: float,
+    check: Callable[[Array, Array], AssessmentCheck],
+) -> tuple[int, list[int]] | None:
+    """Return bed and blocks of the part of a stack of stones above a bed that has the least ratio.
+
+    It turns about the toe of the bed as one body: a*(d*) is straight from α₀ g to an arm, that of
+    its weight, with the moment of forces and ties over the weight. None unless it is a stack.
+    """
+    stack = None if find_yielding_blocks(structure) else list_stack(structure)
+    placed, found = PlacedBlocks.at_rest(structure, loads, direction), []
+    for k, (bed, _) in enumerate(stack := stack or []):
+        own = [block for _, block in stack[k:]]
+        toe = max(structure.ends[bed], key=lambda end: direction * end[0])
+        masses = [
+            (weight, *(place - toe)) for block, place, weight in placed.masses if block in own
+        ]
+        weight, x, y = np.array(masses).T
+        moment = -direction * (weight @ x)
+        for block, place, load in placed.attached:
+            (right, up), force = place - toe, load.force
+            resists = direction * (force[1] * right - force[0] * up) * (block in own)
+            moment += max(resists, 0.0) if load.passive else resists
+        curve = [0.0, moment / weight.sum()], [structure.gravity * moment / (weight @ y), 0.0]
+        found.append((check(*map(np.array, curve)).ratio, bed, own))
+    return min(found, key=lambda each: each[0])[1:] if found else None
 
 
 def find_first_mechanism(
@@ -200,8 +230,22 @@ def describe_ties(
         need = f"{share * size:.4g}" if share > 1e-4 else "none"
         needs.append(f"{need} of the {size:.4g} kN of the tie at {tie.name}")
     side, listed = name_side(placed.direction), join_names(needs)
-    width = f"for {placed.structure.width:g} m of width, without a factor on the tie"
-    return f"pushed to the {side}, alpha_0 needs {listed}, {width}"
+    return f"pushed to the {side}, alpha_0 needs {listed}, {describe_tied_length(placed.structure)}"
+
+
+def describe_tied_length(structure: Structure) -> str:
+    """Say for which length of a wall the forces of ties are, and that they are without a factor."""
+    of = "width" if structure.above is None else "wall at its foot"
+    return f"in all for {structure.width:g} m of {of}, without a factor on the tie"
+
+
+def find_foot(placed: PlacedBlocks, path: MechanismPath | None) -> float | None:
+    """Return the height above the ground of a column of a wall, or of what moves above its ties."""
+    above = placed.structure.above
+    if above is None or path is None or not placed.ties:
+        return above
+    low = min(contact.point[1] for contact in path.mechanisms[0].contacts)
+    return above + round(float(low - placed.structure.ends[..., 1].min()), 3)
 
 
 def find_stretches(

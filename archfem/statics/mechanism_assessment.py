@@ -20,7 +20,7 @@ References:
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -65,6 +65,8 @@ from archfem.statics.assessment_checks import (
     add_fill_ranges,
     check_assessable,
     describe_difference,
+    peak_acceleration,
+    secant_period,
     spectral_acceleration,
 )
 from archfem.statics.first_mechanism import (
@@ -74,7 +76,9 @@ from archfem.statics.first_mechanism import (
     doubt_opposed_ties,
     doubt_stretches,
     find_first_mechanism,
+    find_foot,
     find_stretches,
+    find_weakest_body,
     press_stones,
     search_flat,
     select_joints,
@@ -116,6 +120,8 @@ class KinematicAssessment(ResultDisplay):
         least: that under the assumption on a fill that has the least ratio; None without a fill.
         of_bodies: the same with one weight for each body that moves as one, at its centroid, which
             raises e* and lowers both ratios; None of an assessment with such weights.
+        above: that of what is above a bed of a stack, if it has a lower ratio than the mechanism of
+            least α₀, as above a tie; it must pass too.
     """
 
     structure: Structure
@@ -139,6 +145,12 @@ class KinematicAssessment(ResultDisplay):
     doubts: tuple[Doubt, ...]
     of_bodies: "KinematicAssessment | None" = None
     least: "KinematicAssessment | None" = None
+    above: "KinematicAssessment | None" = None
+
+    @property
+    def mechanism_name(self) -> str:
+        """The mechanism in words; "" where nothing moves."""
+        return name_mechanism(self.structure, self.path.velocity) if self.path else ""
 
     @property
     def hinges(self) -> tuple[tuple[int, str], ...]:
@@ -170,12 +182,11 @@ class KinematicAssessment(ResultDisplay):
 
         It must pass under every assumption on a fill, `checks[-1].over_fill` having the range, and
         with one weight for each body, and, where alpha_0 is searched, with e* = 1. Where its ratio
-        is an upper bound, which passes none, the linear check must pass.
+        is an upper bound, which passes none, the linear check must pass. `above` must pass too.
         """
         last = self.checks[-1]
-        return last.passes and not (
-            last.bounded and (self.linear.bounded or not self.linear.passes)
-        )
+        bounded = last.bounded and (self.linear.bounded or not self.linear.passes)
+        return last.passes and not bounded and (self.above is None or self.above.passes)
 
     def demand(self, periods: Array) -> tuple[Array, Array]:
         """Return spectral displacements [m] and accelerations [m/s²] of the demand.
@@ -213,7 +224,7 @@ class KinematicAssessment(ResultDisplay):
         outcome = describe_difference(last.decisive, apart, linear) or last.outcome
         return (
             f"KinematicAssessment of '{self.structure.name}': alpha_0 {self.alpha_0:.4g}, a_0* "
-            f"{self.a_0_star:.4g} m/s², {vanishes}{outcome}"
+            f"{self.a_0_star:.4g} m/s², {vanishes}{'; '.join([outcome, *self._lower])}"
         )
 
     def __str__(self) -> str:
@@ -234,8 +245,8 @@ class KinematicAssessment(ResultDisplay):
             weight = self.M_star * self.structure.gravity / self.e_star / kN
             divided = f", which the checks divide by FC = {self.confidence_factor:g}"
             lines += [
-                f"{name_mechanism(self.structure, self.path.velocity)}{ONE_OF_MANY * bool(many)}; "
-                f"hinges: {hinges or 'none'}; sliding: {sliding or 'none'}",
+                f"{self.mechanism_name}{ONE_OF_MANY * bool(many)}; hinges: {hinges or 'none'}; "
+                f"sliding: {sliding or 'none'}",
                 f"alpha_0 = {self.alpha_0:.4g}, e* = {self.e_star:.3f} of the {weight:.4g} kN that "
                 f"move, M* = {self.M_star:.4g} kg{' of this body' * bool(many)}, "
                 f"a_0* = {self.a_0_star:.4g} m/s² ({self.a_0_star / STANDARD_GRAVITY:.3f} g)"
@@ -250,7 +261,7 @@ class KinematicAssessment(ResultDisplay):
                 lines.append(over_fill.describe_states(digits=3, name=" times the spectrum"))
                 own = (k for k, x in over_fill.values.items() if x == self.checks[-1].ratio)
                 lines += [f"all else is under one assumption: {key}" for key in [*own][:1]]
-        lines += [f"{NOTE_MARK}{note}" for note in [*self.notes, *self._split_note]]
+        lines += [f"{NOTE_MARK}{note}" for note in [*self.notes, *self._split_note, *self._lower]]
         return "\n".join([*lines, *(f"{DOUBT_MARK}{doubt}" for doubt in self.doubts)])
 
     @property
@@ -260,6 +271,15 @@ class KinematicAssessment(ResultDisplay):
             return []
         back = Ends.of(self.path.blocks.setback[[k for k, _ in self.hinges]])
         return [f"joints crush at {self.strength / MPa:.3g} MPa: hinges are set back by {back:mm}"]
+
+    @property
+    def _lower(self) -> list[str]:
+        """Mechanism and ratio of what is above a bed, if it is lower."""
+        if self.above is None:
+            return []
+        check, moves = self.above.checks[-1], f"from alpha_0 = {self.above.alpha_0:.4g} on"
+        ratio = f"{format_ratio(check.decisive)} by {check.name}, {check.words}"
+        return [f"{self.above.mechanism_name}, {moves}, has a lower ratio: {ratio}"]
 
     @property
     def _split_note(self) -> list[str]:
@@ -375,6 +395,8 @@ def kinematic_assessment(  # noqa: PLR0913  (the factors of the codes are argume
     found = search.assess(lever, fill)
     found = add_fill_ranges(found, search.vary(lever, fill, found))
     least = (found.least or found).path
+    if part is blocks is None and (above := search.assess_above(lever, fill, found)):
+        found = replace(found, above=above)
     if fill is not None and least is not None:
         push = [BodyForce(search.direction)]
         attach_fill(structure, fill).warn_of_lost_loads(push, (), least.mechanisms[0].factor)
@@ -396,6 +418,20 @@ class _Search:
     confidence_factor: float
     q: float
     strength: float = np.inf  # at which joints crush [Pa]
+    bed: int | None = None  # the one joint that moves at first
+
+    def assess_above(
+        self, lever: float, fill: Any, found: KinematicAssessment
+    ) -> KinematicAssessment | None:
+        """Return the assessment of the body above a bed of a stack with a lower ratio, if any."""
+        check = partial(self.rules.check, self.spectrum, self.confidence_factor)
+        least = find_weakest_body(self.structure, self.loads, self.direction, check)
+        if least is None or [least[0]] == [joint for joint, _ in found.hinges]:
+            return None
+        law = self.friction and "coulomb"  # without dilatancy the whole alone is searched
+        above = replace(self, bed=least[0], blocks=least[1], friction=law).assess(lever, fill)
+        lower = above.checks[-1].decisive < 0.999 * found.checks[-1].decisive
+        return above if lower else None
 
     def assess(self, lever: float, fill: Fill | PlasticFill | None) -> KinematicAssessment:
         """Return the assessment with a fill, whose horizontal forces act at a lever."""
@@ -407,11 +443,12 @@ class _Search:
         loads = (*weights, *self.loads)
         placed = PlacedBlocks.at_rest(stones, loads, self.direction, pressure)
         friction = stones.friction if self.friction else np.full(len(stones.joints), np.inf)
-        placed, mechanism = find_first_mechanism(placed, joints, friction, self.strength)
+        first = joints if self.bed is None else [self.bed]
+        placed, mechanism = find_first_mechanism(placed, first, friction, self.strength)
         if mechanism is None:
             return _Oscillator(self, placed, None, 0, bool(weights)).assess()
         path, holds, doubt = self._follow(placed, joints, friction, mechanism)
-        ties = describe_ties(placed, joints, friction, path.mechanisms[0].factor)
+        ties = describe_ties(placed, first, friction, path.mechanisms[0].factor)
         return _Oscillator(self, placed, path, holds, bool(weights), False, doubt, ties).assess()
 
     def _follow(
@@ -604,7 +641,8 @@ class _Oscillator:
     @property
     def doubts(self) -> list[Doubt]:
         """Why a ratio may be too high: another code's spectrum, a fill left out, other joints."""
-        found = self.given.rules.doubt(self.given.spectrum, self.given.structure.above)
+        foot = find_foot(self.placed, self.path)
+        found = self.given.rules.doubt(self.given.spectrum, foot)
         if self.searched:
             found.append(self.searched)
         if self.fill and self.placed.fill is None and self.path is not None:
@@ -623,7 +661,7 @@ class _Oscillator:
     def linear(self) -> AssessmentCheck:
         """Linear check with a behaviour factor q."""
         confidence, q = self.given.confidence_factor, self.given.q
-        ground = float(spectral_acceleration(self.given.spectrum, np.zeros(1), 0.05)[0])
+        ground = peak_acceleration(self.given.spectrum)
         capacity = q / confidence * (np.inf if self.path is None else float(self.curve["a"][0]))
         ratio = capacity / ground
         source = "Circolare 7/2019, C8.7.1.2.1.5 and C8.7.1.2.1.7, eq. C8.7.1.8"
@@ -645,11 +683,10 @@ class _Oscillator:
             mass = self.e_star * (self.weights[0].sum() / structure.gravity)
             control = structure.blocks[self.control].name
             if len(path.factors) > 1:
-                # by the ratio at which it is set in motion
-                displacement = self._check_displacement(self.linear.ratio / given.q)
+                displacement = self._check_displacement()
             if path.end is PathEnd.FALLS:
                 d_0 = float(curve["d"][-1])
-                secant = self._secant_period(0.16 * d_0)
+                secant = secant_period(curve["d"].values, curve["a"].values, 0.16 * d_0)
         found = KinematicAssessment(
             structure,
             given.spectrum,
@@ -684,24 +721,9 @@ class _Oscillator:
         split = [doubt for check in found.checks for doubt in check.doubt_split()]
         return replace(found, doubts=(*found.doubts, *split))
 
-    def _secant_period(self, displacement: float) -> float:
-        """Return the secant period of the capacity curve at a displacement [s]."""
-        growing = np.maximum.accumulate(self.curve["d"].values)
-        acceleration = float(np.interp(displacement, growing, self.curve["a"].values))
-        return float(2.0 * np.pi * np.sqrt(displacement / acceleration)) if acceleration else np.inf
-
-    def _check_displacement(self, starts: float) -> AssessmentCheck:
+    def _check_displacement(self) -> AssessmentCheck:
         """Check the displacement of the capacity curve against the spectrum."""
-        rules = self.given.rules
-        capacity = rules.share * float(self.curve["d"][-1])
-        secant = self._secant_period(rules.secant_share * capacity)
-        # FC reduces the accelerations of the curve
-        period = rules.period_factor / 2.0 * np.sqrt(self.given.confidence_factor) * secant
-        # The largest spectral displacement up to the period; code spectra grow with it.
-        periods = period * np.linspace(0.0, 1.0, 41)[1:]
-        acceleration = spectral_acceleration(self.given.spectrum, periods, rules.damping)
-        demand = float((acceleration * (periods / (2.0 * np.pi)) ** 2).max())
-        ratio = max(capacity / demand, starts)
-        higher = ratio > starts and bool(self.opens or doubt_stretches(self.stretches))
-        values = rules.name, capacity, demand, "m", ratio, float(period), rules.source
-        return AssessmentCheck(*values, bounded=self.bounded_at_rest or higher)
+        given, curve = self.given, (self.curve["d"].values, self.curve["a"].values)
+        check = given.rules.check(given.spectrum, given.confidence_factor, *curve)
+        higher = not check.at_rest and bool(self.opens or doubt_stretches(self.stretches))
+        return replace(check, bounded=self.bounded_at_rest or higher)

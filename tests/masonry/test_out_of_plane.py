@@ -323,7 +323,7 @@ def test_a_column_above_a_level_doubts_the_spectrum_of_the_ground(tmp_path):
         said = [str(doubt) for doubt in found.doubts if "that of the ground" in str(doubt)]
         assert len(said) == doubted
         assert all(
-            "and 3 m above it, at the foot of this column, it is larger" in x for x in said
+            "and 3 m above it, at the foot of what moves, it is larger" in x for x in said
         ), said
         table = af.motion.TableSpectrum(periods=[0.0, 1.0, 4.0], values=[0.1, 0.2, 0.1])
         found = af.kinematic_assessment(read.structure, table)

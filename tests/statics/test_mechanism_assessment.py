@@ -231,7 +231,7 @@ def test_a_tie_bears_what_equilibrium_needs(force, factor, pull):
     assert found.alpha_0 == pytest.approx(factor, rel=1e-4)
     says = f"pushed to the right, alpha_0 needs {pull} of the {force / 1e3:g} kN of the tie at bl"
     assert found.notes[0].startswith(says)
-    assert ", for 1 m of width, without a factor on the tie; along the" in found.notes[0]
+    assert " in all for 1 m of width, without a factor on the tie; along the" in found.notes[0]
     if pull == 5:  # what rocks is the block above, which the tie does not reach
         alone = af.kinematic_assessment(af.column(breadth=0.5, heights=[2.0]), SPECTRUM)
         assert found.d_0_star == pytest.approx(alone.d_0_star, rel=1e-4)
@@ -243,6 +243,108 @@ def test_a_tie_bears_what_equilibrium_needs(force, factor, pull):
     )
     assert ", pushed to the left: " in describe_margin([found, free])
     assert ", pushed to" not in describe_margin([free, replace(free, direction=1.0)])
+
+
+def overturn(height, top, weight, pull=0.0, level=0.0, half=0.25):
+    """α₀ and the ratio of NTC-2018 SLV of a body of one weight that a tie holds, by virtual work.
+
+    The tie is on its rear face at a level; d* is that of a point at the height `top`.
+    """
+
+    def factor(turn):
+        rest = weight * (half * cos(turn) - height / 2 * sin(turn))
+        tied = pull * (level * cos(turn) + 2 * half * sin(turn))
+        return (rest + tied) / (weight * (height / 2 * cos(turn) + half * sin(turn)))
+
+    def moved(turn):
+        return (half * (1.0 - cos(turn)) + top * sin(turn)) * height / 2 / top
+
+    capacity = 0.4 * moved(brentq(factor, 0.0, 1.5))
+    acceleration = G * factor(brentq(lambda turn: moved(turn) - capacity, 0.0, 1.5)) / 1.35
+    period = 1.68 * pi * sqrt(capacity / acceleration)
+    demand = replace(SPECTRUM, damping=0.08).horizontal(period) * G * (period / 2 / pi) ** 2
+    return factor(0.0), capacity / float(demand)
+
+
+@pytest.mark.parametrize(
+    ("force", "decides"),
+    [
+        (3e3, True),
+        pytest.param(0.3e3, False, marks=pytest.mark.slow),
+        pytest.param(2e4, False, marks=pytest.mark.slow),
+    ],
+)
+def test_what_is_above_a_tie_may_have_the_least_ratio(force, decides, verified):
+    """Two blocks of 0.5 × 2 m, tied at 2 m: all of them, or the upper one."""
+    whole, upper = overturn(4.0, 3.0, 40e3, force, 2.0), overturn(2.0, 1.0, 20e3)
+    found = assess_tied(2.0, force)
+    first = min(whole, upper)  # by α₀
+    assert (found.alpha_0, found.checks[-1].decisive) == pytest.approx(first, rel=5e-3)
+    assert (found.above is not None) == decides == (upper[1] < first[1])
+    if decides:
+        check = found.above.checks[-1]
+        assert (found.above.alpha_0, check.ratio) == pytest.approx(upper, rel=1e-3)
+        verified("what is above a tie: ratio", upper[1], "virtual work", check.ratio)
+        says = "rocking of all above block 1 about the toe of block 2, from alpha_0 = 0.25 on, has "
+        says += f"a lower ratio: {upper[1]:.3g} by NTC-2018 SLV, fails"
+        assert says in str(found)
+        assert repr(found).endswith(f"passes; {says}")
+        assert not found.passes
+    assert assess_tied(2.0, force, direction=-1.0).above is None
+
+
+def test_a_thin_part_above_a_bed_may_have_the_least_ratio():
+    """A wall of 1 × 3 m with 0.3 × 1 m on it, to the left: moments, and virtual work of a block."""
+    blocks = (
+        box(0.0, 1.0, -0.5, 0.0, "base", fixed=True),
+        box(0.0, 1.0, 0.0, 3.0, "wall"),
+        box(0.0, 0.3, 3.0, 4.0, "parapet"),
+    )
+    joints = (bed((0, 1), 0.0, 1.0, 0.0), bed((1, 2), 0.0, 0.3, 3.0))
+    structure = af.Structure(blocks, joints)
+    found = af.kinematic_assessment(structure, SPECTRUM, direction=-1.0)
+    assert found.alpha_0 == pytest.approx((3.0 * 0.5 + 0.3 * 0.15) / (3.0 * 1.5 + 0.3 * 3.5))
+    assert found.checks[-1].passes
+    above = overturn(1.0, 0.5, 1.0, half=0.15)
+    assert above[0] > found.alpha_0
+    assert (found.above.alpha_0, found.above.checks[-1].ratio) == pytest.approx(above, rel=1e-3)
+    assert not found.passes
+    # blocks that are named move alone
+    assert af.kinematic_assessment(structure, SPECTRUM, direction=-1.0, blocks=[1, 2]).above is None
+
+
+@pytest.mark.slow
+def test_a_stack_that_slides_has_nothing_above_a_bed():
+    slippery = replace(af.masonry.STONE_TO_STONE, friction=0.2)
+    stack = af.column(breadth=1.0, heights=[1.0, 1.0], contact=slippery)
+    found = af.kinematic_assessment(stack, SPECTRUM, friction="nonassociated")
+    assert (found.alpha_0, found.above) == (pytest.approx(0.2), None)
+
+
+def test_no_force_of_a_tie_suffices_where_what_is_above_it_fails():
+    """Without the tie all of it fails, and with any tie the block above it."""
+    spectrum = {"code": "NTC-2018", "ag": 0.25, "f0": 2.4, "tc_star": 0.32, "site": "B"}
+    tie = {"block": "block 1", "point": [0.0, 2.0], "force": [-12e3, 0.0], "passive": True}
+    column = {"shape": "column", "breadth": 0.5, "heights": [2.0, 2.0], "width": 4.0, "above": 0.0}
+    assessment = {"spectrum": spectrum, "direction": 1, "loads": [tie]}
+    case = af.Case.of({"structure": column, "assessment": assessment})
+    name, (_, ratio) = (
+        "rocking of all above block 1 about the toe of block 2",
+        overturn(2.0, 1.0, 20e3),
+    )
+    says = f"not even 4 times the forces of the ties suffice: {name} has a ratio of {ratio:.3g}"
+    assert note_ties(case) == [f"note: pushed to the right, {says}"]
+    found = case.assessment.solve(case.structure, None)
+    assert list(found) == ["right", f"right, {name}"]
+    margins = [find_margin([each]) for each in found.values()]
+    assert margins[0] > 1.0 > margins[1] == pytest.approx(ratio, rel=1e-3)
+    # what moves above ties is in a building
+    whole, above = ([str(x) for x in each.doubts] for each in found.values())
+    doubt = "and 2 m above it, at the foot of what moves, it"
+    assert [sum(doubt in text for text in each) for each in (whole, above)] == [0, 1]
+    assert (
+        "in all for 4 m of wall at its foot, without a factor on the tie" in found["right"].notes[0]
+    )
 
 
 def two_tied_blocks(force):
@@ -333,8 +435,8 @@ def test_a_check_that_alone_fails_is_in_every_headline_with_the_force_of_a_tie()
     ]
     assert note_ties_left_out(af.Case.of({"structure": column})) == []
     assert note_ties(case) == [
-        "note: pushed to the right, all its checks are just passed with "
-        f"{needed:.3g} kN of the tie at block 1, for 1 m of width, without a factor on the tie"
+        f"note: pushed to the right, all its checks are just passed with {needed:.3g} kN of the "
+        "tie at block 1 in all for 1 m of width, without a factor on the tie"
     ]
     bounded = replace(free, displacement=replace(free.displacement, bounded=True))
     assert describe_margin([bounded]).endswith(": fails")  # an upper bound shows no passing

@@ -30,7 +30,7 @@ from archfem.dynamics.collapse_state import (
 )
 from archfem.dynamics.rigid_body.bodies import masses_of
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
-from archfem.masonry.structure import Structure
+from archfem.masonry.structure import Structure, list_stack
 from archfem.models.model import Doubt
 from archfem.motion.motion import Motion
 from archfem.units import STANDARD_GRAVITY, Ends
@@ -237,7 +237,7 @@ def find_rocking_body(structure: Structure) -> RockingBody | None:
 
     It is None of other structures, and where joints resist tension.
     """
-    stack = _list_stack(structure)
+    stack = list_stack(structure)
     if stack is None or structure.tension.any() or find_yielding_blocks(structure):
         return None
     masses, centroids, bodies = masses_of(structure), structure.centroids, []
@@ -254,18 +254,3 @@ def find_rocking_body(structure: Structure) -> RockingBody | None:
         given = structure.joints[joint].name, arms, float(inertia), reach, structure.gravity
         bodies.append(RockingBody(*given, float(structure.friction[joint])))
     return min(bodies, key=lambda body: body.start)
-
-
-def _list_stack(structure: Structure) -> list[tuple[int, int]] | None:
-    """Return joint and block of each course from the ground on; None unless there is one stack."""
-    stack, block = list[tuple[int, int]](), None
-    beside: dict[int, list[tuple[int, int]]] = {}
-    for number, (a, b) in enumerate(structure.pairs.tolist()):
-        beside.setdefault(a, []).append((number, b))
-        beside.setdefault(b, []).append((number, a))
-    onward = [x for k, each in beside.items() if structure.blocks[k].fixed for x in each]
-    while len(onward) == 1:
-        stack += onward
-        joint, block = onward[0]
-        onward = [each for each in beside[block] if each[0] != joint]
-    return stack if not onward and 2 <= len(stack) == len(structure.free) else None
