@@ -87,8 +87,18 @@ class Linkage:
 
     @cached_property
     def held(self) -> Numbers:
-        """Numbers of the ties that keep their length."""
-        return Bodies(self.start, self.mechanism.body).find_held_ties(self.first_velocity)
+        """Numbers of the ties that keep their length, where the contacts alone do not keep it."""
+        bodies, contacts = Bodies(self.start, self.mechanism.body), self.mechanism.contacts
+        ties, kept = bodies.find_held_ties(self.first_velocity), list[int]()
+        normal, along = bodies.rates(contacts) * bodies.units
+        rows = np.vstack([normal, along[[not contact.slip for contact in contacts]]])
+        for k in ties:
+            rate = bodies.tie_forces[[k]].toarray() / np.hypot(*self.start.ties[k].force)
+            more = np.vstack([rows, rate * bodies.units])
+            if np.linalg.matrix_rank(more, tol=1e-9) > np.linalg.matrix_rank(rows, tol=1e-9):
+                rows = more
+                kept.append(k)
+        return np.array(kept, dtype=np.intp)
 
     def place(self, blocks: PlacedBlocks, motion: Array) -> "LinkageState":
         """Return the state after a finite motion of the bodies from other places of the blocks."""

@@ -502,6 +502,24 @@ def test_a_tie_holds_its_point_along_the_motion():
     assert assess_tied(4.0, 5e3).alpha_0 == pytest.approx((10.0 + 5.0 * 4.0) / 80.0, rel=1e-4)
 
 
+def test_a_bar_between_posts_that_turn_alike_changes_nothing():
+    """The lintel keeps the distance of its points already."""
+    contact, blocks = af.Contact(1e9, 4e8, friction=None), []
+    for name, x, breadth, low, high in (
+        ("ground", -1.0, 5.0, -0.5, 0.0),
+        *(("left", 0.0, 0.5, 0.0, 2.0), ("right", 2.5, 0.5, 0.0, 2.0)),
+        ("lintel", -0.2, 3.4, 2.0, 2.5),
+    ):
+        corners = ((x, low), (x + breadth, low), (x + breadth, high), (x, high))
+        blocks.append(af.Block(corners, af.STONE, name, fixed=name == "ground", role="pier"))
+    portal = af.masonry.assembled(blocks, contact)
+    ends = {"block": "left", "point": (0.0, 1.8), "anchor": "right", "anchor_point": (3.0, 1.8)}
+    bar = af.masonry.AttachedLoad(**ends, force=(1e4, 0.0), passive=True)
+    tied, free = (af.kinematic_assessment(portal, SPECTRUM, loads=each) for each in ([bar], []))
+    assert tied.alpha_0 == pytest.approx(free.alpha_0, rel=1e-6)
+    assert tied.d_0_star == pytest.approx(free.d_0_star, rel=1e-6)
+
+
 @pytest.mark.parametrize(
     ("height", "doubted"), [(3.0, True), pytest.param(0.1, False, marks=pytest.mark.slow)]
 )
