@@ -16,7 +16,7 @@ from archfem.cases.motion_keys import find_matched_band
 from archfem.cases.result_text import PushFactors, Remark, ResultTable
 from archfem.dynamics.motion_scaling import CollapseScale
 from archfem.dynamics.scale_search import MechanismScales
-from archfem.errors import InvalidInput
+from archfem.errors import DidNotConverge, InvalidInput
 from archfem.limit.fill_range import FillRange
 from archfem.limit.rating import Rating
 from archfem.masonry.loads import name_side
@@ -368,38 +368,46 @@ def note_ties(case: Case) -> list[str]:
     ties = [load for load in loads if load.passive]
 
     @cache  # ends of the search are tried before it
-    def solve(scale: float, sense: float) -> tuple[float, str]:
-        """Return the least ratio with a multiple of the forces of all ties, and its mechanism."""
+    def solve(scale: float, sense: float) -> tuple[float, str, bool]:
+        """Return least ratio, mechanism and any upper bound with multiples of the ties' forces."""
         tied = [replace(x, force=(scale * x.force[0], scale * x.force[1])) for x in ties if scale]
         options = {**settings.options, "loads": [x for x in loads if not x.passive] + tied}
         own = replace(settings, directions=(sense,), options=options)
         found = own.solve(case.structure, case.demand).values()
         least = min(found, key=lambda each: find_margin([each]))
-        return min(MOST_TIED, find_margin([least])), least.mechanism_name
+        bounded = any(check.bounded for each in found for check in each.checks)
+        return min(MOST_TIED, find_margin([least])), least.mechanism_name, bounded
 
-    def exceed(scale: float, sense: float) -> float:
-        """Return the least ratio above 1 [-]."""
-        return solve(scale, sense)[0] - 1.0
+    def describe(sense: float) -> str:
+        """Describe the least force from which on all checks pass; empty where ties do nothing."""
+        if solve(0.0, sense)[0] >= 1.0:
+            return ""
+        ratio, mechanism, _ = solve(MOST_TIED, sense)
+        if ratio <= 1.0:
+            pulls = any(tie.anchor or sense * tie.force[0] < 0.0 for tie in ties)
+            most = f"not even {MOST_TIED:g} times the forces of the ties suffice: {mechanism}"
+            return f"{most} has a ratio of {format_ratio(ratio)}" * pulls
+        # from above, as another mechanism with less force may pass again
+        scales = MOST_TIED * 2.0 ** (-0.5 * np.arange(1, 11))
+        low = next((scale for scale in scales if solve(scale, sense)[0] < 1.0), 0.0)
+        high = 2.0**0.5 * low or float(scales[-1])
+        scale = brentq(lambda each: solve(each, sense)[0] - 1.0, low, high, xtol=1e-3)
+        of = f"{scale:.3g} times the forces of the ties"
+        if len(ties) == 1:
+            size = scale * float(np.hypot(*ties[0].force)) / kN
+            of = f"{size:.3g} kN of the tie at {ties[0].block}"
+        bounded = ", one by an upper bound alone," * solve(scale, sense)[2]
+        return f"all its checks are just passed{bounded} with {of} " + describe_tied_length(
+            case.structure
+        )
 
     for sense in settings.directions if ties else ():
         with suppress(InvalidInput):  # without its ties it may not stand
-            if exceed(0.0, sense) >= 0.0:
-                continue
-            most, mechanism = solve(MOST_TIED, sense)
-            if most > 1.0:
-                scale = brentq(exceed, 0.0, MOST_TIED, (sense,), xtol=1e-3)
-                of = f"{scale:.3g} times the forces of the ties"
-                if len(ties) == 1:
-                    size = scale * float(np.hypot(*ties[0].force)) / kN
-                    of = f"{size:.3g} kN of the tie at {ties[0].block}"
-                text = f"all its checks are just passed with {of} "
-                text += describe_tied_length(case.structure)
-            elif any(sense * tie.force[0] < 0.0 for tie in ties):
-                text = f"not even {MOST_TIED:g} times the forces of the ties suffice: {mechanism} "
-                text += f"has a ratio of {format_ratio(most)}"
-            else:
-                continue
-            notes.append(f"{NOTE_MARK}pushed to the {name_side(sense)}, {text}")
+            try:
+                text = describe(sense)
+            except DidNotConverge as error:
+                text = f"the force of ties with which all checks pass was not found: {error}"
+            notes += [f"{NOTE_MARK}pushed to the {name_side(sense)}, {text}"] * bool(text)
     return notes
 
 
