@@ -293,15 +293,20 @@ def test_what_is_above_a_tie_may_have_the_least_ratio(force, decides, verified):
     assert assess_tied(2.0, force, direction=-1.0).above is None
 
 
-def test_a_thin_part_above_a_bed_may_have_the_least_ratio():
-    """A wall of 1 × 3 m with 0.3 × 1 m on it, to the left: moments, and virtual work of a block."""
+def wall_with_a_parapet(friction):
+    """A wall of 1 × 3 m with 0.3 × 1 m on it, flush on its left face."""
     blocks = (
         box(0.0, 1.0, -0.5, 0.0, "base", fixed=True),
         box(0.0, 1.0, 0.0, 3.0, "wall"),
         box(0.0, 0.3, 3.0, 4.0, "parapet"),
     )
-    joints = (bed((0, 1), 0.0, 1.0, 0.0), bed((1, 2), 0.0, 0.3, 3.0))
-    structure = af.Structure(blocks, joints)
+    joints = (bed((0, 1), 0.0, 1.0, 0.0, friction), bed((1, 2), 0.0, 0.3, 3.0, friction))
+    return af.Structure(blocks, joints)
+
+
+def test_a_thin_part_above_a_bed_may_have_the_least_ratio():
+    """By moments, and by virtual work of a block, to the left."""
+    structure = wall_with_a_parapet(0.6)
     found = af.kinematic_assessment(structure, SPECTRUM, direction=-1.0)
     assert found.alpha_0 == pytest.approx((3.0 * 0.5 + 0.3 * 0.15) / (3.0 * 1.5 + 0.3 * 3.5))
     assert found.checks[-1].passes
@@ -314,10 +319,9 @@ def test_a_thin_part_above_a_bed_may_have_the_least_ratio():
 
 
 @pytest.mark.slow
-def test_a_stack_that_slides_has_nothing_above_a_bed():
-    slippery = replace(af.masonry.STONE_TO_STONE, friction=0.2)
-    stack = af.column(breadth=1.0, heights=[1.0, 1.0], contact=slippery)
-    found = af.kinematic_assessment(stack, SPECTRUM, friction="nonassociated")
+def test_a_wall_and_its_parapet_slide_at_one_factor():
+    structure = wall_with_a_parapet(0.2)
+    found = af.kinematic_assessment(structure, SPECTRUM, direction=-1.0, friction="nonassociated")
     assert (found.alpha_0, found.above) == (pytest.approx(0.2), None)
 
 
