@@ -440,7 +440,8 @@ def test_a_check_that_alone_fails_is_in_every_headline_with_the_force_of_a_tie()
     assert note_ties_left_out(af.Case.of({"structure": column})) == []
     assert note_ties(case) == [
         "note: pushed to the right, all its checks are just passed, one by an upper bound alone, "
-        f"with {needed:.3g} kN of the tie at block 1 in all for 1 m of width, without a factor on the tie"
+        f"with {needed:.3g} kN of the tie at block 1 in all for 1 m of width, without a factor on "
+        "the tie"
     ]
     bounded = replace(free, displacement=replace(free.displacement, bounded=True))
     assert describe_margin([bounded]).endswith(": fails")  # an upper bound shows no passing
