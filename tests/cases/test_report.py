@@ -537,6 +537,9 @@ def test_captions_are_numbered_without_a_gap(carried_out, unplotted, tmp_path):
         numbers = [int(number) for number in re.findall(rf"{kind} (\d+)\. [A-Z]", words)]
         assert numbers == list(range(1, len(numbers) + 1))
         assert len(numbers) > 3
+    # what was assessed is drawn behind the answer, before the tables of the inputs
+    drawn = words.index("Figure 1. The structure, with its assessed joints")
+    assert words.index("Demand and capacity") < drawn < words.index("Inputs. Given")
 
 
 @pytest.mark.slow
@@ -981,6 +984,11 @@ def test_a_report_of_several_folders_has_the_worst_verdict_and_the_inputs_once(
     assert words.count("heights 1, 1 given") == words.count("place, date signature") == 1
     figures = [int(number) for number in re.findall(r"Figure (\d+)\.", words)]
     assert figures == [*range(1, len(figures) + 1)]
+    for label, figure in zip("AB", (1, 2), strict=True):  # once, before the inputs
+        drawn = f"Figure {figure}. {label}: the structure, with its assessed joints"
+        assert words.index("place, date signature") < words.index(drawn)
+        assert words.index(drawn) < words.index("Inputs. Given")
+    assert words.count("with its assessed joints") == 2
     study = ["report", *folders, "--study", folders[0]]
     assert af.commands.main(study) == 1
     assert "--study is of one folder" in capsys.readouterr().err

@@ -43,7 +43,7 @@ from archfem.joints.criteria import assessed_joints
 from archfem.masonry.block import Block
 from archfem.masonry.joint_closing import describe_closing
 from archfem.masonry.materials import COURSE_LENGTH
-from archfem.masonry.structure import Structure, join_names
+from archfem.masonry.structure import Structure, join_names, join_words
 from archfem.motion.record_selection import SELECTION_RULES
 from archfem.statics.assessment_checks import LIMIT_STATES, LimitState
 from archfem.units import MPa, format_mm, kN
@@ -82,9 +82,13 @@ _METHODS = (
 
 
 def build_joint_sections(parts: Mapping[str, ReportData]) -> list[Section]:
-    """Build the sections of a report of several cases: signatures, inputs, and each case."""
-    report = next(iter(parts.values())).case.report
-    sections = [Section("Inputs of all cases", [build_signatures(report), *compare_inputs(parts)])]
+    """Build the sections of a report of several cases: drawings, inputs, and each case."""
+    report, labels = next(iter(parts.values())).case.report, dict[Structure, list[str]]()
+    for label, data in parts.items():
+        labels.setdefault(data.case.structure, []).append(label)
+    drawn = [_draw_assessed(each, f"{join_words(own)}: the") for each, own in labels.items()]
+    sections = [Section("Signatures and drawings", [build_signatures(report), *drawn])]
+    sections.append(Section("Inputs of all cases", compare_inputs(parts)))
     for data in parts.values():
         own = [replace(each, level=each.level + 1) for each in build_sections(data)]
         sections += [Section(data.name, [Grid((), list_facts(data))]), *own]
@@ -96,8 +100,8 @@ def build_sections(data: ReportData) -> list[Section]:
     studies = [piece for each in data.studies for piece in _build_study(data, each)]
     sections = [
         build_conclusion(data),
-        build_input_section(data),
         build_structure_section(data),
+        build_input_section(data),
         *build_static_sections(data),
         build_ground_section(data),
         *build_run_sections(data),
@@ -184,41 +188,49 @@ def _describe_joints(data: ReportData) -> str:
 
 
 def build_structure_section(data: ReportData) -> Section:
-    """Build extent, parts, names of joints, thrust line, and joints and stress under dead load."""
+    """Build extent, drawing, thrust line, parts, and joints and stress under dead load."""
     case, structure = data.case, data.case.structure
-    drawn = np.ptp(np.concatenate([block.drawn() for block in structure.blocks]), axis=0)
+    extent = np.ptp(np.concatenate([block.drawn() for block in structure.blocks]), axis=0)
+    beside = not data.label and data.dead is not None and extent[0] < MAX_SLENDERNESS * extent[1]
+    with limit_width(HALF_WIDTH) if beside else nullcontext():
+        # of several cases the drawings stand before their inputs
+        figures = [] if data.label else [_draw_assessed(structure)]
+        if data.dead is not None:
+            criteria = case.analysis.failure_criteria
+            thrust = draw_structure(structure, data.dead, criteria=criteria)
+            figures.append(_untitle(thrust, _THRUST))
+        else:
+            figures += data.read_figure("dead.png", _THRUST)
     blocks: list[Any] = [
         TextBlock(_describe_extent(structure)),
         *_describe_drawing(data),
+        *(replace(each, beside=beside) for each in figures),
         _tabulate_parts(structure),
-        # tables stand before figures, which leave room where they move to the next page
         *([] if data.dead is None else [_tabulate_dead_load(data.dead)]),
         *map(TextBlock, map(sentence, describe_margins_at_rest(case, structure))),
     ]
-    beside = data.dead is not None and drawn[0] < MAX_SLENDERNESS * drawn[1]
-    with limit_width(HALF_WIDTH) if beside else nullcontext():
-        # of a wall in bond the picture has numbers of stones
-        named = ["The structure, with its assessed joints", *list_numbers(structure)]
-        if structure.heads.any():
-            thick = f"The structure, {structure.width:g} m thick"
-            named = [f"{thick}, with numbers of stones in the order of the case, from 0 on"]
-        figures = [(draw_names(structure), f"{'; '.join(named)}.")]
-        if structure.heads.any():
-            draw_dimensions(figures[0][0].axes[0], structure)
-        if data.dead is not None:
-            criteria = case.analysis.failure_criteria
-            figures.append((draw_structure(structure, data.dead, criteria=criteria), _THRUST))
-    for figure, caption in figures:
-        figure.suptitle("")  # caption and head of the report say the same
-        for axes in figure.axes:
-            axes.set_title("")
-        blocks.append(replace(FigureBlock.of(figure, caption), beside=beside))
-    if data.dead is None:
-        blocks += data.read_figure("dead.png", _THRUST)
     caption = "Principal compression under dead load."
     blocks += data.read_result("dead_stress", caption, table="Largest stresses of each part")
     caption = "A block cut free: forces on it, and their closing."
     return Section("Structure and dead load", blocks + data.read_figure("free_body.png", caption))
+
+
+def _draw_assessed(structure: Structure, the: str = "The") -> FigureBlock:
+    """Draw a structure with the names of joints, or with those of the stones of a wall in bond."""
+    figure, named = draw_names(structure), ["with its assessed joints", *list_numbers(structure)]
+    if structure.heads.any():
+        draw_dimensions(figure.axes[0], structure)
+        numbers = "with numbers of stones in the order of the case, from 0 on"
+        named = [f"{structure.width:g} m thick, {numbers}"]
+    return _untitle(figure, f"{the} structure, {'; '.join(named)}.")
+
+
+def _untitle(figure: Any, caption: str) -> FigureBlock:
+    """Return a figure without the titles that its caption and the head of the report have."""
+    figure.suptitle("")
+    for axes in figure.axes:
+        axes.set_title("")
+    return FigureBlock.of(figure, caption)
 
 
 def _describe_extent(structure: Structure) -> str:
