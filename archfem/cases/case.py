@@ -282,6 +282,9 @@ class Case:
             return toml_file.format_tables(self.settings)
         # results must not need the drawing beside them
         blocks = write_structure(self.structure)
+        given = self.settings["structure"]
+        # also where they equal their defaults, which are not written
+        blocks["structure"] |= {key: given[key] for key in ("width", "gravity") if key in given}
         tables = blocks | self.settings | {"structure": blocks["structure"]}
         with suppress(ArchfemError):
             if cached_structure(tables) == self.structure:

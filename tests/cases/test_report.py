@@ -606,6 +606,38 @@ def test_every_input_has_its_mark():
     assert "E 5 GPa" not in defaults
 
 
+@pytest.mark.parametrize(
+    ("key", "value", "row"),
+    [
+        ("structure.gravity", 9.81, ("gravity", "9.81 m/s²")),
+        ("structure.width", 1.0, ("width", "1 m")),
+        ("model.tolerance", 0.005, ("time step", "by an error of 0.005 in |e|")),
+        ("model.quadrature", "exact", ("quadrature", "exact")),
+        ("model.max_cell_size", 0.2, ("max cell size", "0.2 m")),
+        ("analysis.scheme", "conserving", ("scheme", "conserving")),
+        ("criteria.duration", 0.001, ("failure lasts for", "1 ms")),
+        ("suite.scale", 1.0, ("scale of the motions", "1.0")),
+        ("suite.reversed", False, ("motions are reversed", "False")),
+    ],
+)
+def test_a_value_that_equals_its_default_is_given_where_the_case_states_it(
+    key, value, row, tmp_path
+):
+    """A drawing too, of which results have the blocks in place of its file."""
+    drawn = {"shape": "outlines", "file": "pier.geojson"}
+    af.masonry.write_outlines(af.column(breadth=1.0, heights=[1.0]), tmp_path / drawn["file"])
+    for tables in (tomllib.loads(CASE), tomllib.loads(CASE) | {"structure": drawn}):
+        for stated in (False, True):
+            section, name = key.split(".")
+            if stated:
+                tables.setdefault(section, {})[name] = value
+            text = af.Case.of(tables, tmp_path).text()
+            data = report_data.ReportData(af.Case.of(tomllib.loads(text)), {})
+            rows = [each for each in tabulate_inputs(data).rows if each[:2] == row]
+            without = [] if name in ("max_cell_size", "reversed") else [(*row, "default")]
+            assert rows == ([(*row, "given")] if stated else without)
+
+
 @pytest.mark.parametrize("young", [30e9, 28e9])
 def test_a_value_is_given_by_the_table_of_its_material_whatever_its_name(young, tmp_path):
     """`write` gives a table another key than the name where it leaves out a key of a preset."""

@@ -420,6 +420,8 @@ def _motion_rows(data: ReportData) -> Iterator[Row]:
             yield "motions are matched", "from {:g} to {:g} s".format(*band), _mark("band" in suite)
         for key, name in (("scale", "scale of the motions"), ("reduction", "reduction factor R")):
             yield name, str(suite.get(key, 1.0)), _mark(key in suite)
+        if "reversed" in suite:
+            yield "motions are reversed", describe_value(suite["reversed"]), "given"
     elif motion is not None:
         own = {key: value for key, value in motion.items() if key != "scale"}
         yield from _source_rows([own])
@@ -495,7 +497,12 @@ def _model_rows(data: ReportData) -> Iterator[Row]:
     yield "fidelity", data.fidelity, "inferred" if selected else _mark("fidelity" in model)
     yield "displacements", analysis.displacements, _mark("displacements" in model)
     if not analysis.selects_model:
-        yield "quadrature", analysis.discretisation.rule.rule, _mark("quadrature" in model)
+        follows = {"quadrature_points"} & model.keys() and "quadrature" not in model
+        mark = "inferred" if follows else _mark("quadrature" in model)
+        yield "quadrature", analysis.discretisation.rule.rule, mark
+        for key, unit in {"quadrature_points": "", "max_cell_size": "m", "degree": ""}.items():
+            if key in model:
+                yield key.replace("_", " "), describe_value(model[key], unit), "given"
         if analysis.discretisation.fidelity != "rigid":
             through, along = analysis.discretisation.cells
             yield "cells a block", f"{through} through, {along} along", _mark("cells" in model)
@@ -506,7 +513,7 @@ def _model_rows(data: ReportData) -> Iterator[Row]:
     yield "scheme", scheme, _mark("scheme" in own)
     if analysis.dt is None:
         error = f"by an error of {analysis.tolerance:g} in |e|"
-        yield "time step", error, _mark("tolerance" in own)
+        yield "time step", error, _mark("tolerance" in model)
     else:
         yield "time step", f"{1e3 * analysis.dt:g} ms", "given"
     yield from _damping_rows(data, own.get("damping"))
