@@ -687,6 +687,22 @@ def test_the_paper_is_cited_where_a_value_is_its_own_alone():
     ]
 
 
+def test_the_lengths_of_a_wall_are_named_by_its_plane():
+    """A wall of 2 m, 0.4 m thick, and a metre of it across: its thickness is in the plane then."""
+    wall = {"shape": "wall", "breadth": 2.0, "height": 1.0, "course": 0.25, "stone": 0.5}
+    structure = af.Case.of({"structure": {**wall, "width": 0.4}}).structure
+    strip = af.masonry.columns_across(structure)["strip"]
+    arch = af.circular_arch(span=2.0, rise=1.0, thickness=0.4, voussoirs=9, width=3.0)
+    for made, words in (
+        (structure, "2 m long, 1 m high and 0.4 m thick; "),
+        (strip, "0.4 m thick, 1 m high and 1 m long; "),
+        (arch, " high and 3 m wide; "),
+    ):
+        case = af.Case.of(write_structure(made))
+        text = build_structure_section(report_data.ReportData(case, {})).pieces[0].text
+        assert words in text
+
+
 def test_materials_that_differ_in_weight_alone_stand_once():
     blocks = [
         {"outline": [[0, k], [1, k], [1, k + 1], [0, k + 1]], "name": f"b{k}", "material": f"m{k}"}

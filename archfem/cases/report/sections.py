@@ -238,9 +238,12 @@ def _describe_extent(structure: Structure) -> str:
     # the ground is no part of its size
     moving = [structure.blocks[number] for number in structure.free]
     length, height = np.ptp(np.concatenate([block.drawn() for block in moving]), axis=0)
+    # the width of a wall is its thickness, that of a column across its plane its length
+    along, width = ("thick", "long") if structure.above is not None else ("long", "wide")
+    width = "thick" if structure.heads.any() else width
     text = (
-        f"{length:.3g} m long, {height:.3g} m high and {structure.width:g} m wide; {len(moving)} "
-        f"blocks that can move, weighing {structure.weight / kN:.4g} kN, and "
+        f"{length:.3g} m {along}, {height:.3g} m high and {structure.width:g} m {width}; "
+        f"{len(moving)} blocks that can move, weighing {structure.weight / kN:.4g} kN, and "
         f"{len({*structure.face_names})} joints."
     )
     loads = Counter(block.material.stands_for for block in moving)
