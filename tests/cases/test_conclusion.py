@@ -708,19 +708,51 @@ def test_the_verdict_of_several_cases_is_the_worst_and_names_its_case(case):
         vars(data)["statements"] = {"assessment": state("assessment", check)} if ratio else {}
     lorry = answers.Row("rating", "LM1", "fails", "0.8", {"passes": False})
     load = answers.Row("limit analysis", "a load", "", "1.2", PushFactors(1.2, 1.2)._asdict())
-    for name, row, rank in (("rating", lorry, (1, 0.8)), ("limit", load, (4, 1.2))):
+    ranks = (1, {"the vehicle": 0.8}), (4, {"the given load": 1.2})
+    for name, row, rank in zip(("rating", "limit"), (lorry, load), ranks, strict=True):
         static = ReportData(case, {})
         vars(static)["statements"] = {name: answers.Statement([], [row])}
         assert conclusion._rank_verdict(static) == rank
-    order = sorted(parts, key=lambda name: conclusion._rank_verdict(parts[name]))
+    ranks = {name: conclusion._rank_verdict(each) for name, each in parts.items()}
+    order = sorted(ranks, key=lambda x: (ranks[x][0], min(ranks[x][1].values(), default=np.inf)))
     assert order[:4] == ["fallen 2.0", "stands 0.9", "mechanism 2.0", "dislocated 2.0"]
     assert order[4:] == ["stands 1.4", "stands 1.5", "stands None"]
     facts = conclusion.list_joint_facts(parts)
     assert facts[1][1].startswith("The worst of 7 cases is fallen 2.0: It does not survive: ")
     assert facts[2][0] == "margin"
-    assert facts[2][1].startswith("The least margins are 0.9 of stands 0.9, 1.4 of stands 1.4, ")
-    assert facts[2][1].endswith(" and not known of stands None.")
+    least = "of stands 0.9 0.9 times the earthquake; of stands 1.4 1.4 times the earthquake; "
+    assert facts[2][1].startswith(f"The least margins are {least}")
+    assert facts[2][1].endswith("; of stands None not known.")
     assert [key for key, _ in facts[3:]] == [name for name in parts if name != "fallen 2.0"]
+
+
+@pytest.mark.parametrize("fails", [False, True])
+def test_cases_are_ranked_by_the_kind_of_their_demand(case, fails):
+    """Two pushes over the site's acceleration, and a lorry that may have the largest factor."""
+    site = {"site": "the site's acceleration"}
+    rows = {
+        "hill": answers.Row("limit", "", "", "3", PushFactors(3.0, 3.1, **site)._asdict()),
+        "road": answers.Row("rating", "LM1", "", "4", {"passes": not fails}),
+        "vale": answers.Row("limit", "", "", "2", PushFactors(2.0, 2.5, **site)._asdict()),
+    }
+    parts = {name: ReportData(case, {}) for name in rows}
+    for name, data in parts.items():
+        vars(data)["transverse_push"] = np.nan
+        stated = answers.Statement(["in words"], [rows[name]])
+        vars(data)["statements"] = {rows[name].result: stated}
+    facts = dict(conclusion.list_joint_facts(parts))
+    assert facts["margin"] == (
+        "The least margins are of vale 2 times the earthquake; of hill 3 times the earthquake; "
+        "of road 4 times the vehicle."
+    )
+    if fails:  # a failure is the worst of whatever kind
+        assert facts["verdict"].startswith("The worst of 3 cases is road: Rating for LM1: factor 4")
+        return
+    assert facts["verdict"] == (
+        "The worst of 3 cases, each by its kind of demand, are vale (2 times the earthquake) and "
+        "road (4 times the vehicle)."
+    )
+    assert {*parts} < {*facts}
 
 
 @pytest.mark.parametrize(("breadth", "across"), [(0.5, True), (0.45, False)])

@@ -1026,7 +1026,8 @@ def test_a_report_of_several_folders_has_the_worst_verdict_and_the_inputs_once(
     assert f"cases {broad}; {slender} verdict" in words
     worst = "verdict The worst of 2 cases is B: "
     assert f"{worst}By the kinematic assessment it does not withstand" in words
-    assert f"margin The least margins are {ratios[1]} of B and {ratios[0]} of A." in words
+    of = [f"{x} times the earthquake" for x in ratios]
+    assert f"margin The least margins are of B {of[1]}; of A {of[0]}." in words
     assert " A By the kinematic assessment it withstands" in words
     assert "A B breadth 0.9 m (given) 0.3 m (given)" in words
     assert words.count("heights 1, 1 given") == words.count("place, date signature") == 1

@@ -70,6 +70,9 @@ _BEGUN = {RESULTS["risk"]: "risk_samples.nc"}
 # Lines of the head with the answer, in their order
 HEAD = ("verdict", "margin", "depends on", "not checked")
 
+# Demands of which factors of several cases are multiples, in words
+KINDS = "the earthquake", "the vehicle", "the given load"
+
 # Project in the templates of new cases
 PLACEHOLDER = "Name of the project"
 
@@ -118,18 +121,30 @@ def list_joint_facts(parts: Mapping[str, ReportData]) -> list[tuple[str, str]]:
         for name, head in heads.items()
     }
     ranks = {name: _rank_verdict(data) for name, data in parts.items()}
-    worst, listed = min(ranks, key=ranks.__getitem__), list[str]()
-    for name, (_, least) in sorted(ranks.items(), key=lambda each: each[1][1]):
-        listed.append(f"{format_ratio(least) if least < np.inf else 'not known'} of {name}")
+    place = min(each for each, _ in ranks.values())
+    worst, listed = dict[str, str](), list[str]()
+    for kind in KINDS:  # factors on demands of several kinds have no order
+        own = {name: least[kind] for name, (_, least) in ranks.items() if kind in least}
+        order = sorted(own, key=own.__getitem__)
+        listed += [f"of {name} {format_ratio(own[name])} times {kind}" for name in order]
+        for name in [name for name in order if ranks[name][0] == place][:1]:
+            worst.setdefault(name, f"{name} ({format_ratio(own[name])} times {kind})")
+    listed += [f"of {name} not known" for name, (_, least) in ranks.items() if not least]
     facts = [("cases", "; ".join(data.name for data in parts.values()))]
-    facts.append((answer, f"The worst of {len(parts)} cases is {worst}: {said.pop(worst)}"))
-    facts.append((margin, f"The least margins are {join_words(listed)}."))
+    words = f"The worst of {len(parts)} cases, each by its kind of demand, are "
+    if len(worst) > 1:
+        facts.append((answer, f"{words}{join_words([*worst.values()])}."))
+    else:
+        name = next(iter(worst), min(ranks, key=lambda x: ranks[x][0]))
+        facts.append((answer, f"The worst of {len(parts)} cases is {name}: {said.pop(name)}"))
+    facts.append((margin, f"The least margins are {'; '.join(listed)}."))
     return [*signed, *facts, *said.items()]
 
 
-def _rank_verdict(data: ReportData) -> tuple[int, float]:
-    """Return the place of a case among others, the worst first, and its least margin."""
-    ranked, outcome = margins.rank_margins(data), find_worst(data)[1] if data.runs else ""
+def _rank_verdict(data: ReportData) -> tuple[int, dict[str, float]]:
+    """Return the place of a case among others, the worst first, and its least factors by kind."""
+    ranked = margins.rank_margins(data, rests=False)
+    outcome = find_worst(data)[1] if data.runs else ""
     rows = [row for each in data.statements.values() for row in each.rows]
     rows = [row for row in rows if "passes" in row.numbers]
     loads = read_numbers(PushFactors, data.statements.get("limit"))
@@ -137,10 +152,11 @@ def _rank_verdict(data: ReportData) -> tuple[int, float]:
     fails = [x < 1.0 for x, is_ranked, _ in ranked if is_ranked] + [x < 1.0 for x in factors]
     fails += [least < 1.0 for least, *_ in margins.say_less(data)]
     fails += [not row.numbers["passes"] for row in rows]
-    factors += [*(x for x, *_ in ranked), *(float(x.factor) for x in rows if x.factor != "-")]
+    shaken, rated = (x for x, *_ in ranked), (float(x.factor) for x in rows if x.factor != "-")
+    every = zip(KINDS, (min(x, default=np.inf) for x in (shaken, rated, factors)), strict=True)
     undecided = outcome.startswith("may") or (bool(data.runs) and bool(_say_why_undecided(data)))
     places = outcome == "does not survive", any(fails), undecided, "damage" in outcome, True
-    return places.index(True), min(factors, default=np.inf)
+    return places.index(True), {kind: least for kind, least in every if least < np.inf}
 
 
 def _say_plainly(data: ReportData, doubtful: Sequence[str]) -> Iterator[tuple[str, str]]:

@@ -124,14 +124,15 @@ def describe_margin(data: ReportData) -> Iterator[str]:
         yield from [*(f"{rank}{x}" for x in texts[:1]), *texts[1:]]
 
 
-def rank_margins(data: ReportData) -> list[tuple[float, bool, list[str]]]:
+def rank_margins(data: ReportData, *, rests: bool = True) -> list[tuple[float, bool, list[str]]]:
     """Return what `_list_margins` yields, the least first.
 
-    That at rest is among them where it is less than all. Where the least is across the plane, the
-    next stands in the same sentence. What the head states is counted and not repeated.
+    That at rest, if it counts, is among them where it is less than all. Where the least is across
+    the plane, the next stands in the same sentence. What the head states is counted and not
+    repeated.
     """
     margins = sorted(_list_margins(data), key=lambda each: each[0])
-    at_rest = list_margins_at_rest(data.case.structure, data.case.limit.strength)
+    at_rest = list_margins_at_rest(data.case.structure, data.case.limit.strength) if rests else []
     least = min((each[0] for each in margins), default=np.inf)
     for factor, of in sorted(at_rest)[:1]:
         if factor < least:  # alone it has no rank
