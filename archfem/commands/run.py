@@ -420,9 +420,6 @@ def report(options: argparse.Namespace) -> None:
     sign({}, options.changes)  # a wrong key is found before histories are read
     if options.pdf:
         write_progress_line("report", "drawing figures")
-    if options.studies and options.folders[1:]:
-        words = "--study is of one folder: add the study to that, `archfem study … --out FOLDER`"
-        raise InvalidInput(words)
     if (history := Path(options.folders[0])).is_file() and not options.folders[1:]:
         folders = {"set": options.changes, "study": options.studies, "inputs": options.inputs}
         if ignored := join_words([f"--{name}" for name, value in folders.items() if value]):

@@ -1038,9 +1038,20 @@ def test_a_report_of_several_folders_has_the_worst_verdict_and_the_inputs_once(
         assert words.index("place, date signature") < words.index(drawn)
         assert words.index(drawn) < words.index("Inputs. Given")
     assert words.count("with its assessed joints") == 2
-    study = ["report", *folders, "--study", folders[0]]
-    assert af.commands.main(study) == 1
-    assert "--study is of one folder" in capsys.readouterr().err
+    # a study of one case, that of the file, is shown with that
+    study, shown = tmp_path / "study.toml", tmp_path / "study"
+    text = 'title = "Heights"\ncase = "column.toml"\ncompute = "assessment"\n'
+    study.write_text(f"{text}[vary]\nstructure.breadth = [0.3, 0.35]\n", encoding="utf-8")
+    assert af.commands.main(["study", str(study), "--out", str(shown), "--workers", "1"]) in (0, 3)
+    given = ["report", *folders, "--study", str(shown), "--out", str(page)]
+    assert af.commands.main(given) == 0
+    words = " ".join(words_of(page).split())
+    assert words.count("Study of many cases") == 1
+    assert words.index(f" {slender} verdict") < words.index("Study of many cases")
+    capsys.readouterr()
+    given = ["report", folders[0], folders[0], "--study", str(shown)]
+    assert af.commands.main(given) == 1
+    assert f"{shown} is a study of none of the cases: none has its" in capsys.readouterr().err
 
 
 @pytest.mark.slow

@@ -38,6 +38,9 @@ def write_report(data: ReportData, path: str | Path, *others: ReportData) -> Pat
     digest = sha256("".join(each.case.text() for each in cases).encode()).hexdigest()[:12]
     origin = f"report of archfem {import_module('archfem').__version__} · case {digest}"
     parts = label_parts(cases)
+    known = {each.folder for part in parts.values() for each in part.studies}
+    if others and (lost := [place for place in data.study_folders if place not in known]):
+        raise InvalidInput(f"{lost[0]} is a study of none of the cases: none has its structure")
     with limit_width(FIGURE_WIDTH):
         facts = list_joint_facts(parts) if others else list_facts(data)
         sections = build_joint_sections(parts) if others else build_sections(data)

@@ -64,12 +64,15 @@ class ReportData:
     def studies(self) -> list[StudyFindings]:
         """Findings of the studies, also of other structures."""
         own = [self.folder] if self.folder and (self.folder / "study.txt").is_file() else []
-        folders, case = self.study_folders or own, self.case
+        folders, case = [*self.study_folders] or own, self.case
+        folders += own if self.label and self.study_folders else []
         if not folders:
             return []
         # a case in a folder of results has the blocks of its drawing
         given = hash_value(case.structure), case.hash_sections(STRUCTURE_SECTIONS)
-        return [read_study(place, given) for place in folders]
+        found = [read_study(place, given) for place in folders]
+        # of several cases each has those of its structure
+        return [each for each in found if each.is_own or not self.label]
 
     @property
     def name(self) -> str:
