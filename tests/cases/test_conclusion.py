@@ -263,9 +263,46 @@ def test_the_margin_of_scales_ends_where_it_is_dislocated(case):
     for least, fails in ((1.3, ""), (0.9, ", which it fails")):
         begun = scales("a", 0.7, unfinished=True, moves=0.5, falls=least)
         assert say_margin(data, scale=state("scale", begun))[0] == (
-            f"the least margin is 0.700 (search unfinished) on 'a', at a PGA of 0.14 g{fails}, "
-            "under one motion"
+            "the least margin is 0.700 so far (search unfinished) on 'a', at a PGA of 0.14 g"
+            f"{fails}, under one motion"
         )
+        (fall,) = find_first_failures(data)
+        at = f"at {0.2 * least:.3g} g, {least:#.3g} × the motion"
+        assert fall == f"falls {at}; the search is unfinished: at less it may, too"
+
+
+def test_rows_are_in_doubt_that_a_doubt_is_about_by_its_motion_or_its_check(case):
+    """Where it is about all rows of a result, the caption says so once."""
+
+    def mark(rows, doubts, name):
+        data = data_of(case)
+        vars(data)["statements"] = {name: answers.Statement([], rows, doubts)}
+        vars(data)["pairs"] = ("a", "b")
+        pieces = conclusion.build_conclusion(data).pieces
+        (table,) = [x for x in pieces if "Demand and capacity" in getattr(x, "caption", "")]
+        own = [row for row in table.rows if row[0].startswith(name)]
+        return [row[2].endswith("in words (in doubt)") for row in own], table.caption
+
+    def checks(name):
+        ratios = answers.Ratios(name, ["right"], 1.5, 1.5)
+        row = f"assessment: {name}, right", "1 m", "in words", "1.5", ratios._asdict()
+        return answers.Row(*row)
+
+    every = [checks("linear"), checks("SLV")]
+    split = Doubt("{} passes by the split of weights, and else fails: {:.3g}", "", ("SLV", 0.9))
+    of_all, whole = Doubt("it is not known"), "In doubt as a whole: kinematic assessment"
+    marks, caption = mark(every, [split], "assessment")
+    assert (marks, whole in caption) == ([False, True], False)
+    for own in ([of_all], [split, of_all]):
+        marks, caption = mark(every, own, "assessment")
+        assert (marks, whole in caption) == ([False, False], True)
+    assert mark(every[:1], [of_all], "assessment")[0] == [True]
+    every = [
+        answers.Row("scale", f"'{x}', PGA 0.20 g", "in words", "1", scales(x, 1.0)._asdict())
+        for x in "ab"
+    ]
+    marks, caption = mark(every, [replace(of_all, place="b")], "scale")
+    assert (marks, "as a whole" in caption) == ([False, True], False)
 
 
 def test_a_first_fall_has_scale_peak_and_motion_of_one_search(case):
@@ -485,7 +522,8 @@ def test_the_answer_has_displacements_the_first_fall_and_the_checks(case):
         assert (words in head_of(conclusion.list_facts(data))) == said
     data.statements["scale"] = state("scale", first._replace(unfinished=True), other)
     begun = head_of(conclusion.list_facts(data))
-    assert "over motions and time steps); search unfinished." in begun
+    assert "time steps). The search is unfinished: at less it may, too." in begun
+    assert " It falls at " in begun
     data.statements["scale"] = searched
     vars(data)["case"] = af.Case.of({**case.settings, "assessment": SPECTRUM})
     passed = answers.Ratios("damage", ["right"], 1.1, 1.1, moved=0.842)

@@ -459,6 +459,7 @@ def test_an_interrupted_search_of_a_pair_continues(searched, tmp_path, monkeypat
     assert text.count("in doubt: ") == 1
     (row,) = json.loads((out / "strong" / "scale.json").read_text(encoding="utf-8"))["rows"]
     assert ", search unfinished, " in row[2]
+    assert row[3].endswith(" so far")
     assert len(json.loads((out / "strong" / "scale_runs.json").read_text())) == 2
     (out / "weak" / "scale.txt").unlink()
     capsys.readouterr()

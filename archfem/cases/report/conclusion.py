@@ -1,7 +1,9 @@
 """Head and conclusion of a report: who signs what, outcome with margin and range."""
 
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import compress
 from typing import Any
 
 import numpy as np
@@ -338,12 +340,7 @@ def build_conclusion(data: ReportData) -> Section:
             doubts.setdefault(result, []).append(doubt)
         stated.add(doubt.kind)
     doubtful, decisive = [*dict.fromkeys(x for x, _ in every)], list_decisive_doubts(data, every)
-    rows = []
-    for result, row in _capacity_rows(data):
-        # what a bound from above fails it fails for certain
-        fails = row.numbers.get("most", 1.0) < 1.0
-        in_doubt = " (in doubt)" * (result in (decisive if fails else doubtful))
-        rows.append((*row[:2], f"{row.outcome}{in_doubt}", row.factor))
+    rows, whole = _mark_rows(data, every, decisive)
     blocks: list[Any] = tabulate_demands(data)
     for lead, texts in _build_paragraphs(data, decisive).items():
         sentences = [*map(sentence, texts)]
@@ -366,10 +363,42 @@ def build_conclusion(data: ReportData) -> Section:
         head = ("", "demand", "capacity or outcome", "factor")
         named = dict.fromkeys(_FACTORS[name] for name in _FACTORS if name in data.statements)
         factors = f". Factors are multiples of the demand: {'; '.join(named)}" * bool(named)
+        factors += f". In doubt as a whole: {join_words(whole)}" * bool(whole)
         blocks.append(Grid(head, rows, f"Demand and capacity{factors}", "words"))
     blocks += map(TextBlock, _list_outdated(data))
     blocks += [] if data.label else [build_signatures(data.case.report)]
     return Section("Conclusion", blocks)
+
+
+def _mark_rows(
+    data: ReportData, doubts: Sequence[tuple[str, Doubt]], decisive: Sequence[str]
+) -> tuple[list[Sequence[str]], list[str]]:
+    """Return the rows of the capacities, and results of which all rows of several are in doubt.
+
+    Rows are marked that a doubt is about, by its motion or its check; without, it is about all.
+    """
+    rows, pairs = [*_capacity_rows(data)], {*data.runs, *data.pairs}
+    checks = {row.numbers.get("check") for _, row in rows}
+
+    def is_about(doubt: Doubt, row: Row) -> bool:
+        named = [f"'{pair}'" for pair in pairs if f"'{pair}'" in doubt.place]
+        named += checks.intersection(doubt.values)
+        return not named or any(name in f"{row.result} {row.demand}" for name in named)
+
+    marked = [
+        # what a bound from above fails it fails for certain
+        (row.numbers.get("most", 1.0) >= 1.0 or result in decisive)
+        and any(of == result and is_about(doubt, row) for of, doubt in doubts)
+        for result, row in rows
+    ]
+    names = [result for result, _ in rows]
+    counts = Counter(compress(names, marked))
+    whole = [result for result, count in counts.items() if 1 < count == names.count(result)]
+    grid = list[Sequence[str]]()
+    for (result, row), mark in zip(rows, marked, strict=True):
+        in_doubt = " (in doubt)" * (mark and result not in whole)
+        grid.append((*row[:2], f"{row.outcome}{in_doubt}", row.factor))
+    return grid, whole
 
 
 def _list_outdated(data: ReportData) -> Iterator[str]:

@@ -53,7 +53,8 @@ def find_first_failures(data: ReportData) -> Iterator[str]:
     several, count = len(searches) + len(unscaled) > 1, len(data.runs)
     was = "were" if len(searches) > 1 else "was"
     some = f"; {len(searches)} of {count} motions {was} scaled" * (len(searches) < count)
-    some += f"; {UNFINISHED}" * any(x.unfinished for x in searches)
+    unfinished = any(x.unfinished for x in searches)
+    some += "; the search is unfinished: at less it may, too" * unfinished
     for state in ("falls", "dislocated", "mechanism"):
         first = [(x.states[state], x.pga, x.motion) for x in searches if state in x.states]
         first += [(1.0, peak, name) for name, (found, peak) in unscaled.items() if found == state]
@@ -70,7 +71,8 @@ def find_first_failures(data: ReportData) -> Iterator[str]:
         notes = ["or less"] * (name in unscaled) + [f"{wide} over {over}"] * bool(wide)
         motion = f"'{name}'" if several or count > 1 else "the motion"
         beside = f" ({', '.join(notes)})" * bool(notes)
-        yield f"{_STATES[state][1]} at {peak:.3g} g, {least:#.3g} × {motion}{beside}{some}"
+        does = _STATES[state][1].replace("first ", "" if unfinished else "first ")
+        yield f"{does} at {peak:.3g} g, {least:#.3g} × {motion}{beside}{some}"
         some = ""  # once
 
 
@@ -103,7 +105,8 @@ def describe_scales(data: ReportData) -> Iterator[tuple[float, list[str]]]:
     # between the scales that were run nothing is known
     failing = {"dislocated", "falls", "mechanism"} & first.states.keys()
     met = min((first.states[state] for state in failing), default=np.inf)
-    words = f"{first.held:#.3g}" + f" ({UNFINISHED})" * first.unfinished
+    # smaller scales may fail that were not run
+    words = f"{first.held:#.3g}" + f" so far ({UNFINISHED})" * first.unfinished
     if _bound(first) < first.held:
         met = min(met, _bound(first))
         words = f"below {_bound(first):#.3g} as one rigid body ({words} in courses)"
