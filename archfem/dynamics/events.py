@@ -37,26 +37,17 @@ from archfem.limit.mechanism_count import (
     counted_mechanisms,
     matching_definitions,
 )
-from archfem.limit.mechanism_kinematics import get_verifier, joint_freedoms
+from archfem.limit.mechanism_kinematics import get_verifier
 from archfem.masonry.parts import select_assessed_parts
 from archfem.masonry.structure import Structure, join_joint_names
 
 
 @dataclass(frozen=True, eq=False)
 class FailureState:
-    """Failure pattern of the scanned joints at a step."""
+    """Failures of the scanned joints at a step."""
 
-    side: NDArray[np.int8]  # face of each hinge, 1 extrados, -1 intrados, 0 none (n,)
-    sense: NDArray[np.int8]  # sign of the shear force of each sliding joint, else 0 (n,)
-    slides: NDArray[np.bool_]  # whether friction is exhausted (n,)
-    apart: NDArray[np.bool_]  # whether the joint has lost contact (n,)
-    head: NDArray[np.bool_]  # whether it is a head joint, and so never counts (n,)
+    failed: NDArray[np.bool_]  # whether each joint has failed; head joints never count (n,)
     joint_states: Callable[[], xr.Dataset]  # labels and flags of all joints, by `joint_dataset`
-
-    @property
-    def failed(self) -> NDArray[np.bool_]:
-        """Whether each joint has failed (n,)."""
-        return ((self.side != 0) | self.slides | self.apart) & ~self.head
 
 
 @dataclass(eq=False)
@@ -88,21 +79,18 @@ class FailureScan:
         limits = sliding_ratio(forces[..., 0], e, *self._laws)
         hinges, slides = judge_joints(e, friction, limits, self.criteria.hinge)
         apart = tension_margin(forces[..., 0], self._tension) <= 0.0
-        failures = np.count_nonzero(hinges | slides | apart, axis=1)
+        failing = hinges | slides | apart
         senses = np.where(hinges, np.sign(e), 0.0), np.where(slides, np.sign(forces[..., 1]), 0.0)
         states = np.stack([*senses, slides, apart], axis=1).astype(np.int8)
-        head = self.structure.heads[self._numbers]
-        for step, count in enumerate(failures.tolist()):
+        is_counted = ~self.structure.heads[self._numbers]
+        for step, count in enumerate(np.count_nonzero(failing, axis=1).tolist()):
             if count < min_failures:
                 yield frozenset()
                 continue
             key = states[step].tobytes()
             if key not in self._cache:
-                side, sense, slid, loose = states[step]
                 joints = partial(self.joint_states, resultants[step])
-                flags = slid.astype(bool), loose.astype(bool), head
-                state = FailureState(side, sense, *flags, joints)
-                self._cache[key] = self.query(state)
+                self._cache[key] = self.query(FailureState(failing[step] & is_counted, joints))
             yield self._cache[key]
 
     def joint_states(self, resultants: Array) -> xr.Dataset:
@@ -343,19 +331,10 @@ class EveryMechanism:
         scanned = sorted({*np.flatnonzero(structure.judged), *verifier.rigid_regions.joints})
         roles = {joint.part: joint.role for joint in structure.joints}
         parts = np.array([structure.joints[number].part for number in scanned])
-        columns = np.searchsorted(scanned, verifier.rigid_regions.joints)
         required = {"verified", *applicable_definitions(structure, criteria)}
         timers = {name: DurationCounter(criteria.duration) for name in required - {OVER_RECORD}}
         met: set[str] = set()
         ever_failed = RecordCounter(structure, criteria)
-
-        def moves(state: FailureState) -> bool:
-            pattern: Any = (state.side, state.slides, state.apart, state.sense)
-            # the closed loops of blocks decide most patterns without a linear programme
-            freedoms = joint_freedoms(*(values[columns] for values in pattern))
-            if not verifier.loop_check.permits_motion(freedoms):
-                return False
-            return verifier.verify(state.joint_states()).kind != "none"
 
         def conditions_of(state: FailureState) -> frozenset[str]:
             count = {
@@ -364,8 +343,9 @@ class EveryMechanism:
             }
             counted = matching_definitions(count, roles, criteria.failures)
             failed = {_joint_condition(scanned[k]) for k in np.flatnonzero(state.failed).tolist()}
-            moving = {"verified"} if "verified" not in met and moves(state) else set()
-            return counted | failed | moving
+            # once there was a motion, no further one is searched for
+            moves = "verified" not in met and verifier.verify_if_moving(state.joint_states())
+            return counted | failed | ({"verified"} if moves else set())
 
         def reason(conditions: frozenset[str], _: Array, step: float) -> str | None:
             if ever_failed.add_step(conditions, step):
