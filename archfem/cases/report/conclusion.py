@@ -382,7 +382,7 @@ def _mark_rows(
 
     def is_about(doubt: Doubt, row: Row) -> bool:
         named = [f"'{pair}'" for pair in pairs if f"'{pair}'" in doubt.place]
-        named += checks.intersection(doubt.values)
+        named += [name for name in checks if name and name in doubt.values]
         return not named or any(name in f"{row.result} {row.demand}" for name in named)
 
     marked = [
