@@ -146,7 +146,14 @@ def build_spectrum(table: Table, section: str) -> DesignSpectrum:
     values = dict(table)
     code = check_choice(values.pop("code", None), f"{section}.code", registered_spectra)
     spectrum = registered_spectra[code]
-    values = check_table(values, declared_keys(spectrum), section)
+    own, every = declared_keys(spectrum), map(declared_keys, registered_spectra.values())
+    if others := sorted(set().union(*every).intersection(values).difference(own)):
+        raise InvalidInput(
+            f"unknown key '{section}.{others[0]}': it is of another code than {code}, whose keys "
+            f'are {sorted(own)}: leave it out (remove = ["{section}"] leaves out the table of a '
+            "base)"
+        )
+    values = check_table(values, own, section)
     if "ground_spectrum" in values and spectrum is FloorSpectrum:
         key = "ground_spectrum"
         values[key] = build_spectrum(values[key], f"{section}.{key}")

@@ -214,10 +214,16 @@ def test_a_case_states_only_differences_from_its_base(tmp_path):
         ("base = 3", "not the name of a file"),
         ('base = "ring.toml"\nremove = ["structure.rise"]', "there is no such key"),
         ('base = "ring.toml"\n[structure]\nradios = 3.0', "did you mean 'radius'"),
+        (
+            'base = "ring.toml"\n[assessment.spectrum]\ncode = "ASCE-7-22"\nsds = 1.0\nsd1 = 0.5',
+            r"'assessment.spectrum.ag': it is of another code than ASCE-7-22, whose keys.*"
+            r'\(remove = \["assessment\.spectrum"\] leaves out the table of a base\)$',
+        ),
     ],
 )
 def test_invalid_bases_are_refused(text, says, tmp_path):
-    (tmp_path / "ring.toml").write_text(BASE)
+    spectrum = '[assessment]\nspectrum = { code = "EC8", ag = 0.2, ground = "B" }\n'
+    (tmp_path / "ring.toml").write_text(BASE + spectrum)
     (tmp_path / "case.toml").write_text(text)
     with pytest.raises(af.InvalidInput, match=says):
         af.Case.read(tmp_path / "case.toml")
