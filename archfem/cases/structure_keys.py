@@ -49,7 +49,7 @@ Described = TypeVar("Described")
 # Parts of which a shape has several, each under its name; those of a bridge from left to right
 PARTS_BY_NAME: Mapping[str, Table] = {
     "bridge": {"arches": Arch, "piers": Pier, "sidewalls": Sidewall},
-    "wall": {"openings": walls.Opening},
+    "wall": {"openings": walls.Opening, "floors": walls.Floor},
 }
 
 # Parts of which a bridge has one

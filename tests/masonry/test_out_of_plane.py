@@ -310,6 +310,62 @@ def test_a_roof_is_on_the_ridge_of_a_strip_and_weighs_on_the_piers(tmp_path):
     assert least == pytest.approx(min(pushes.values()), rel=2e-3)
 
 
+def test_a_roof_of_a_gable_is_that_laid_stone_by_stone():
+    door = af.shapes.Opening(left=-0.5, breadth=1.0, head=2.0, name="door")
+    roof = af.shapes.Floor(level=4.0, load=4e3, name="roof")
+    given = {"breadth": 4.0, "height": 4.0, "eaves": 3.0, "width": 0.5, "openings": [door]}
+    wall, by_hand = af.shapes.wall(**given, floors=[roof]), gable_with_a_roof(4e3)
+    for own, other in zip(wall.blocks, by_hand.blocks, strict=True):
+        assert own.material.stands_for == other.material.stands_for
+        assert own.material.unit_weight == pytest.approx(other.material.unit_weight)
+
+
+def test_floor_and_roof_of_a_front_weigh_on_its_columns_by_hand():
+    """A front of 6 x 5 m, 0.5 m thick: a door, a window, a floor at 2.75 m and a roof at 5 m."""
+    openings = [
+        af.shapes.Opening(left=-1.5, breadth=1.0, head=2.25, name="door"),
+        af.shapes.Opening(left=0.5, breadth=1.0, sill=3.0, head=4.25, name="window"),
+    ]
+    stone, floor, roof, half = 0.5 * 20e3, 12e3, 8e3, 0.25  # [N/m², N/m, N/m, m]
+    floors = [
+        af.shapes.Floor(level=2.75, load=floor),
+        af.shapes.Floor(level=5.0, load=roof, name="roof"),
+    ]
+    wall = af.shapes.wall(breadth=6.0, height=5.0, width=0.5, openings=openings, floors=floors)
+
+    def by_hand(areas, floor_length, roof_length):
+        """Return weight, and push: masses of floors are at the middle of the course below them."""
+        parts = [(stone * area, y) for area, y in areas]
+        parts += [(floor * floor_length, 2.625), (roof * roof_length, 4.875)]
+        weight = sum(each for each, _ in parts)
+        return weight, half * weight / sum(each * y for each, y in parts)
+
+    door, window = (-1.0 * 2.25, 2.25 / 2.0), (-1.0 * 1.25, 3.625)
+    above_door, above_window = (0.5 * 2.75, 3.625), (0.5 * 0.75, 4.625)
+    # piers carry up to the middles of the openings beside them, but nothing below a window
+    piers = [
+        by_hand([(7.5, 2.5), above_door], 2.0, 2.0),
+        by_hand([(5.0, 2.5), above_door, above_window], 1.5, 2.0),
+        by_hand([(7.5, 2.5), above_window], 1.5, 2.0),
+    ]
+    expected = {
+        "strip": by_hand([(5.0, 2.5)], 1.0, 1.0),
+        "whole": by_hand([(30.0, 2.5), door, window], 6.0, 6.0),
+        "pier": min(piers, key=lambda each: each[1]),
+    }
+    for name, column in af.masonry.columns_across(wall).items():
+        weight, push = expected[name]
+        assert column.weight == pytest.approx(weight, rel=1e-6)
+        found = af.collapse_factor(column, live=af.BodyForce(1.0), friction=None).factor
+        assert found == pytest.approx(push, rel=2e-3)
+        carrying = {x.points[:, 1].max(): x.material.stands_for for x in column.blocks}
+        assert (carrying[2.75], carrying[5.0]) == ("floor", "roof")
+        assert describe_carried(column).startswith("the mass of floor, roof counts at the middle")
+    # above the floor its weight is left out
+    upper = af.masonry.columns_across(wall, above=2.75)["strip"]
+    assert upper.weight == pytest.approx(stone * 2.25 + roof)
+
+
 def test_a_column_above_a_level_doubts_the_spectrum_of_the_ground(tmp_path):
     wall = gable_with_a_roof(4e3)
     for above, doubted in ((None, False), (3.0, True)):

@@ -348,9 +348,64 @@ def test_case_file_has_openings_by_name(tmp_path):
     assert area == pytest.approx(WALLS["two heads"][1] + 1.2 * 0.4, rel=1e-12)
 
 
+def test_a_floor_weighs_on_the_stones_below_its_bed_by_their_lengths(tmp_path):
+    """A floor on 4 m with a door of 1 m through its bed, and a roof along slopes and on a tie."""
+    lengths = {"breadth": 4.0, "height": 4.0, "eaves": 2.5, "width": 0.4, "openings": [DOOR]}
+    floors = [
+        af.shapes.Floor(level=1.5, load=6e3),
+        af.shapes.Floor(level=2.5, load=2e3, name="beam"),
+        af.shapes.Floor(level=2.5, load=1e3, name="vault"),
+        af.shapes.Floor(level=4.0, load=3e3, name="roof"),
+    ]
+    wall = af.shapes.wall(**lengths, floors=floors)
+    bare = af.shapes.wall(**lengths)
+    # each has its load on 4 m: the floor on 3 m of stones, slopes by their horizontal lengths
+    assert wall.weight - bare.weight == pytest.approx(4.0 * 12e3)
+    found = dict.fromkeys(("floor", "beam and vault", "roof"), 0.0)
+    for block, plain in zip(wall.blocks, bare.blocks, strict=True):
+        (left, low), (right, _), (top_right, high), *rest = block.points
+        top = top_right - (rest[0][0] if rest else top_right)
+        word, load = {1.5: ("floor", 6e3 * 4.0 / 3.0), 2.5: ("beam and vault", 3e3)}.get(
+            high, (None, 0.0)
+        )
+        load *= top
+        if low >= 2.5 and (slope := right - left - top) > 1e-9:
+            word, load = "roof", 3e3 * slope
+        added = (block.material.unit_weight - plain.material.unit_weight) * block.area * 0.4
+        assert added == pytest.approx(load, abs=1e-3)
+        assert block.material.stands_for == word
+        if word:
+            found[word] += added
+    assert [*found.values()] == pytest.approx([24e3, 12e3, 12e3])
+    path = af.Analysis(wall, fidelity="rigid").write(tmp_path / "wall.toml")
+    text = path.read_text()
+    assert "[structure.floors.roof]\nlevel = 4.0\nload = 3000.0\n" in text
+    assert af.Case.read(path).structure == wall
+    path.write_text(text.replace("load = 3000.0", 'load = "3.5 kN/m"'))
+    assert af.Case.read(path).structure.weight == pytest.approx(wall.weight + 2e3)
+
+
+@pytest.mark.parametrize("floor", [{"level": 1.5, "load": 6.0}, {"level": 1.5, "load": -6e3}])
+def test_a_floor_weighs_newtons_per_metre(floor):
+    with pytest.raises(af.InvalidInput, match=r"'floor': load \[N/m\].*6 kN/m are 6e3"):
+        af.shapes.Floor(**floor)
+
+
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
+        *(  # within a course, above eaves at 2.5 m, above the ridge
+            (
+                {"floors": [af.shapes.Floor(level=level, load=6e3)]},
+                rf"'floor' at {level:g} m is at no bed that .* take the nearest, {nearest} m",
+            )
+            for level, nearest in (
+                (1.1, r"1\.000 and 1\.250"),
+                (3.0, r"2\.500 and 4\.000"),
+                (9.0, r"4\.000"),
+                (0.0, r"0\.250"),
+            )
+        ),
         ({"eaves": 4.5}, "eaves"),
         ({"breadth": 0.0}, "breadth"),
         ({"stone": -0.5}, "stone"),

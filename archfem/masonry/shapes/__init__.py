@@ -3,7 +3,7 @@
 bridge_parts  Arch, Pier, Sidewall, Backfill, Paving
 bridges       bridges and arcades, and their stonework
 rings         rings, columns, arch on piers, polycentric curves
-walls         walls in running bond, with openings
+walls         walls in running bond, with openings and floors
 """
 
 from archfem.masonry.shapes.bridge_parts import Arch as Arch
@@ -21,5 +21,6 @@ from archfem.masonry.shapes.rings import column as column
 from archfem.masonry.shapes.rings import elliptical_arch as elliptical_arch
 from archfem.masonry.shapes.rings import flat_arch as flat_arch
 from archfem.masonry.shapes.rings import pointed_arch as pointed_arch
+from archfem.masonry.shapes.walls import Floor as Floor
 from archfem.masonry.shapes.walls import Opening as Opening
 from archfem.masonry.shapes.walls import wall as wall

@@ -6,19 +6,26 @@ jambs of two storeys are nearly above one another, those of the lower one count;
 near a jamb, the end of a lintel or another head joint moves a little, or is left out.
 """
 
+from bisect import bisect
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations, pairwise, permutations
 
 import numpy as np
 
-from archfem._typing import Array, Metres, MetresPerSecondSquared
-from archfem._validation import check_between, check_integer, count_pieces, validate_arguments
+from archfem._typing import Array, Metres, MetresPerSecondSquared, NewtonsPerMetre
+from archfem._validation import (
+    check_between,
+    check_fields,
+    check_integer,
+    count_pieces,
+    validate_arguments,
+)
 from archfem.errors import InvalidStructure
 from archfem.masonry.assembly import assembled
 from archfem.masonry.block import Block
 from archfem.masonry.materials import STONE, STONE_TO_STONE, Contact, Material
-from archfem.masonry.structure import Structure, record_origin
+from archfem.masonry.structure import Structure, join_words, record_origin
 from archfem.units import G
 
 # Least distance of a head joint from the edge of a wall, over the length of a stone
@@ -64,6 +71,31 @@ class Opening:
         return self.left + self.breadth
 
 
+@dataclass(frozen=True, kw_only=True)
+class Floor:
+    """A floor or roof as weight of the stones below a bed of a wall, by their lengths there.
+
+    What is above an opening weighs on all of these stones. A roof on the slopes of a gable weighs
+    on their stones by horizontal length.
+
+    Attributes:
+        level: height of the bed above the ground, up to the eaves; that of the ridge for a roof on
+            slopes [m].
+        load: weight per horizontal metre of the whole breadth of the wall [N/m].
+        name: thing that these stones stand for besides themselves.
+    """
+
+    level: Metres
+    load: NewtonsPerMetre
+    name: str = "floor"
+
+    def __post_init__(self) -> None:
+        """Check that the load is one of newtons per metre."""
+        check_fields(self)
+        remedy = "give it in N/m, of which 6 kN/m are 6e3"
+        check_between(self.load, f"'{self.name}': load [N/m]", 50.0, 1e6, ends="[]", remedy=remedy)
+
+
 @record_origin
 @validate_arguments
 def wall(  # noqa: PLR0913  (all are lengths and properties of one structure)
@@ -73,6 +105,7 @@ def wall(  # noqa: PLR0913  (all are lengths and properties of one structure)
     width: Metres,
     eaves: Metres | None = None,
     openings: Sequence[Opening] = (),
+    floors: Sequence[Floor] = (),
     course: Metres = 0.25,
     stone: Metres = 0.5,
     material: Material = STONE,
@@ -93,6 +126,7 @@ def wall(  # noqa: PLR0913  (all are lengths and properties of one structure)
         eaves: height of the upright sides, below a gable with its ridge in the middle; by default
             that of the wall, and 0 makes a triangle [m].
         openings: doors and windows.
+        floors: floors and roofs that weigh on it.
         course: height of a course, about [m].
         stone: length of a stone, about [m].
         material: material of all stones.
@@ -102,7 +136,8 @@ def wall(  # noqa: PLR0913  (all are lengths and properties of one structure)
     Raises:
         InvalidInput: there are more than 10 000 stones.
         InvalidStructure: a length is not positive; or an opening or its lintel is not within the
-            wall, overlaps another opening, or leaves no course for its lintel.
+            wall, overlaps another opening, or leaves no course for its lintel; or a floor is on no
+            bed.
 
     Example:
         >>> barn = af.shapes.wall(breadth=4.0, height=4.0, eaves=2.5, width=0.4)
@@ -150,7 +185,42 @@ def wall(  # noqa: PLR0913  (all are lengths and properties of one structure)
             corners = dict.fromkeys([(a, low), (b, low), (d, high), (c, high)])  # three at a ridge
             name = f"course {k + 1}, stone {number}"
             blocks.append(Block(tuple(corners), material, name, part="wall", role="pier"))
+    blocks = _put_floors(blocks, floors, levels, shoulder, breadth / width)
     return assembled(blocks, contact, width=width, gravity=gravity, name="wall")
+
+
+def _put_floors(
+    blocks: Sequence[Block],
+    floors: Sequence[Floor],
+    levels: Sequence[float],
+    eaves: float,
+    slenderness: float,
+) -> list[Block]:
+    """Return blocks with floors on a wall, of some breadth over its width, as their weight."""
+    beds, loaded = [y for y in levels[1:] if y <= eaves or y == levels[-1]], [*blocks]
+    for floor in floors:
+        above = bisect(beds, floor.level)
+        near = beds[max(above - 1, 0) : above + 1]
+        bed = min(near, key=lambda each: abs(each - floor.level))
+        if abs(bed - floor.level) > 1e-3:  # beds are printed to the millimetre
+            nearest = " and ".join(f"{each:.3f}" for each in near)
+            raise InvalidStructure(
+                f"'{floor.name}' at {floor.level:.4g} m is at no bed that bears floors, up to the "
+                f"eaves or at the ridge: take the nearest, {nearest} m, or change `course`"
+            )
+        lengths = []  # of each block at the bed, and along the slopes below a ridge
+        for block in blocks:
+            x, y = block.points.T
+            top = np.ptp(x[y == y.max()])
+            lengths.append(top * (y.max() == bed) + (np.ptp(x) - top) * (bed == levels[-1]))
+        load = floor.load * slenderness / sum(lengths)
+        for k in np.flatnonzero(lengths):
+            material, area = loaded[k].material, loaded[k].area
+            weight = round(material.unit_weight + load * lengths[k] / area, 3)  # equal ones share
+            words = join_words([*filter(None, [material.stands_for]), floor.name])
+            material = replace(material, unit_weight=weight, stands_for=words)
+            loaded[k] = replace(loaded[k], material=material)
+    return loaded
 
 
 def _check_opening(opening: Opening, height: float, reach: float) -> None:
