@@ -25,12 +25,14 @@ Program. 11 (1976) 14-27.
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from scipy import sparse
 from scipy.spatial import cKDTree
 
 from archfem._display import ProgressReport
+from archfem._recent import RecentResults
 from archfem._typing import Array
 from archfem.errors import DidNotConverge, Interrupted
 from archfem.limit.linear_programme import Limits, Optimum, Programme, no_limits, uneven_compression
@@ -65,8 +67,8 @@ GAP_TOLERANCE = 1e-7
 # Relative gap of the nearest iterate that stands in where no start leads to a solution [-]
 NEAR_GAP_TOLERANCE = 1e-3
 
-# Relative gap that counts as zero with crushing, whose cuts leave objectives uncertain by 2e-5 [-]
-CRUSHING_GAP_TOLERANCE = 1e-4
+# Relative gap that counts as zero with crushing, and error of objectives by its cuts [-]
+CRUSHING_GAP_TOLERANCE, CUT_ERROR = 1e-4, 2e-5
 
 # Preference for a weak objective, as a share of it, first and where that holds the gap open [-]
 WEAK_PREFERENCE, LEAST_PREFERENCE = 1e-4, 1e-6
@@ -103,11 +105,11 @@ def find_solution(
         iterate = _alternate(programme, programme, forces, preference=preference)
         if iterate is None or iterate.converged:
             return iterate
-        forces, stagnates = iterate.state.forces, iterate.gap > (1.0 - GAP_TOLERANCE) * smallest
-        smallest = iterate.gap
+        forces, value = iterate.state.forces, abs(iterate.state.value)
+        decrease = GAP_TOLERANCE * smallest if programme.crushing is None else CUT_ERROR * value
+        stagnates, smallest = iterate.gap > smallest - decrease, iterate.gap
         if stagnates:
             # the preference may hold a gap of that share of the objective open
-            value = abs(iterate.state.value)
             if preference < WEAK_PREFERENCE or smallest > preference * value:
                 return iterate if smallest <= NEAR_GAP_TOLERANCE * value else None
             smallest, preference = np.inf, LEAST_PREFERENCE
@@ -115,21 +117,29 @@ def find_solution(
 
 
 def descend(
-    programme: Programme, first: AlternatingIterate | None, forces: Array, patience: int
+    programme: Programme,
+    first: AlternatingIterate | None,
+    forces: Array,
+    patience: int,
+    progress: ProgressReport | None = None,
 ) -> Iterator[AlternatingIterate]:
     """Yield solutions of increasing objective until `patience` alternations in a row find none."""
     rng, fruitless, perturb, smallest = np.random.default_rng(1), 0, first is not None, np.inf
-    restricted = programme
+    restricted, least = programme, np.nan
     if first is not None:
-        restricted, forces = _require_weaker(programme, first.state.value), first.state.forces
+        least, forces = first.state.value, first.state.forces
+        restricted = _require_weaker(programme, least)
     while fruitless < patience:
+        if progress is not None:
+            progress.show(f"descent {fruitless} of {patience}{_describe_most(programme, least)}")
         factor = rng.lognormal(size=len(forces) // 3) if perturb else None
         iterate = _alternate(programme, restricted, forces, factor)
         if iterate is None:
             return
         if iterate.converged:
             yield iterate
-            restricted, fruitless = _require_weaker(programme, iterate.state.value), 0
+            least, fruitless = iterate.state.value, 0
+            restricted = _require_weaker(programme, least)
         perturb = iterate.converged or iterate.gap > (1.0 - GAP_TOLERANCE) * smallest
         smallest, forces = np.inf if perturb else iterate.gap, iterate.state.forces
         fruitless += 1
@@ -271,7 +281,8 @@ class NonassociatedBounds:
         if np.isclose(weakest, upper, rtol=1e-6):
             limits += "; the least found is the factor of 'coulomb' too"
         if np.isnan(weakest):
-            return f"{tried} starting states led to no solution without dilatancy; {limits}"
+            reached = f"{tried} starting states led to no" if tried else "no start has reached a"
+            return f"{reached} solution without dilatancy; {limits}"
         least = str(self.agreeing or "a descent below them")
         if not successful and self.gap > GAP_TOLERANCE:
             least = f"a state near one, whose work balances within {100.0 * self.gap:.1g} %"
@@ -425,34 +436,38 @@ def _search_solutions(programme: Programme, start: Optimum | None, found: _Searc
         return  # none is weaker
     # the number of starts falls with the joints squared
     number = max(2, MAX_START_COUNT * min(joints, MAX_FULL_SEARCH_JOINTS) ** 2 // joints**2)
+    hard = replace(programme, crushing=None)
     with ProgressReport("limit analysis", len(FRICTION_SHARES) + number) as progress:
-        followed, found.path = _follow_friction(programme, progress)
-        starts = followed + _free_head_joints(programme)
-        starts += _relax_starts(programme, start, number)
+        followed, found.path = _follow_friction(programme, progress, associated)
+        starts = followed + _free_head_joints(hard)
+        starts += _relax_starts(hard, start, number)
         try:
-            found.tried, found.solutions = len(starts), _find_solutions(programme, starts, progress)
+            found.solutions = _find_solutions(programme, starts, progress, associated)
+            found.tried = len(starts)
         except Interrupted as error:
-            found.tried, found.solutions = error.last
+            if error.last[1]:
+                found.tried, found.solutions = error.last
             raise
-    first = max(found.solutions, key=lambda iterate: iterate.state.value, default=None)
-    least = -np.inf
-    if first is not None:
-        least = first.state.value + OBJECTIVE_DECREASE * abs(first.state.value)
-    if starts and max(found.bound, associated) > least:  # a weaker solution is possible
-        # near the last optimum slips changed at random would lead to few other vertices
-        fresh = replace(programme, starts_from_last=False)
-        for iterate in descend(fresh, first, starts[0], patience=30):
-            found.weaker += (iterate,)
+        first = max(found.solutions, key=lambda iterate: iterate.state.value, default=None)
+        least = -np.inf
+        if first is not None:
+            least = first.state.value + OBJECTIVE_DECREASE * abs(first.state.value)
+        if starts and max(found.bound, associated) > least:  # a weaker solution is possible
+            # near the last optimum slips changed at random would lead to few other vertices
+            fresh = replace(programme, starts_from_last=False)
+            for iterate in descend(fresh, first, starts[0], patience=30, progress=progress):
+                found.weaker += (iterate,)
 
 
 def _follow_friction(
-    programme: Programme, progress: ProgressReport
+    programme: Programme, progress: ProgressReport, most: float
 ) -> tuple[list[Array], list[tuple[float, float]]]:
     """Return forces of solutions with nearly all friction, and shares and objectives on the way."""
     followed: list[Array] = []
     path = []
     for share in FRICTION_SHARES:
-        progress.show(f"{share:.3g} of the friction", done=1)
+        words = f"{share:.3g} of the friction{_describe_most(programme, most)}"
+        progress.show(words, done=1)
         reduced, starts = replace(programme, friction=share * programme.friction), followed
         with suppress(DidNotConverge):  # it might not stand with so little friction
             if (associated := reduced.solve()) is not None:
@@ -477,22 +492,43 @@ def _free_head_joints(programme: Programme) -> list[Array]:
 
 
 def _find_solutions(
-    programme: Programme, starts: Sequence[Array], progress: ProgressReport | None = None
+    programme: Programme,
+    starts: Sequence[Array],
+    progress: ProgressReport | None = None,
+    most: float = np.nan,
 ) -> list[AlternatingIterate]:
     """Return the solutions to which given forces lead; Ctrl-C raises with those so far.
 
-    Where there is none, the iterate nearest to one stands in.
+    Where there is none, the iterate nearest to one stands in. Progress says the least, or a bound.
     """
     solutions, near, number = list[AlternatingIterate](), list[AlternatingIterate](), 1
+    hard = replace(programme, crushing=None)
+    known = RecentResults[AlternatingIterate | None](len(starts))
     try:
         for number, forces in enumerate(starts, start=1):
             if progress is not None:
-                progress.show(f"start {number} of {len(starts)}", done=1)
-            if (iterate := find_solution(programme, forces)) is not None:
+                least = max((each.state.value for each in solutions), default=most)
+                words = f"start {number} of {len(starts)}{_describe_most(programme, least)}"
+                progress.show(words, done=1)
+            iterate = find_solution(hard, forces)
+            if programme.crushing is not None:
+                # most starts lead to one state of hard stones, from which few alternations are left
+                for state in [forces] if iterate is None else [iterate.state.forces, forces]:
+                    key = (np.round(state, 6) + 0.0).tobytes()
+                    iterate = known.look_up(key, partial(find_solution, programme, state))
+                    if iterate is not None and iterate.converged:
+                        break
+            if iterate is not None:
                 (solutions if iterate.converged else near).append(iterate)
     except KeyboardInterrupt as error:
         raise Interrupted((number - 1, solutions)) from error
     return solutions or sorted(near, key=lambda iterate: iterate.gap)[:1]
+
+
+def _describe_most(programme: Programme, value: float) -> str:
+    """Describe the bound of an objective on a growing load; "" of none."""
+    known = np.isfinite(value) and programme.force_cost is None
+    return f", factor at most {-value:.4g}" if known else ""
 
 
 def find_weakest(programme: Programme, starts: Sequence[Array]) -> Optimum | None:
@@ -586,8 +622,11 @@ def _bound_objective(programme: Programme, known: Optimum | None) -> float:
     bound, least = -_least_objective(opposite), np.zeros(len(programme.friction))
     carries = np.ones(len(least)) if known is None else normal_forces(known.forces)
     sought = (carries > RESISTANCE_MARGIN) & (len(least) <= MAX_FULL_SEARCH_JOINTS)
+    cut = programme.with_cuts_at(known)
     for number in range(MAX_BOUND_ROUNDS):
-        between, last = _limit_objective(programme, known, bound), least.copy()
+        # no N is less than with some of the crushing cuts alone, which are those at known states
+        between = replace(_limit_objective(cut, known, bound), crushing=None)
+        last = least.copy()
         for joint in np.flatnonzero(sought):
             least[joint] = max(least[joint], _least_normal_force(between, joint))
         if number and not np.any(least > last + MIN_BOUND_CHANGE * least.max()):
@@ -601,6 +640,7 @@ def _bound_objective(programme: Programme, known: Optimum | None) -> float:
         bound = min(bound, safe.value)
         if known and bound <= known.value + CRUSHING_GAP_TOLERANCE * abs(known.value):
             return bound
+        cut = programme.with_cuts_at(known).with_cuts_at(safe)
         slips = np.abs(mechanism_gaps(programme, safe.multipliers).reshape(3, -1)[2])
         sought = slips > GAP_TOLERANCE * slips.max()
     return bound

@@ -654,6 +654,7 @@ def test_an_interrupted_search_leaves_the_least_factor_so_far(monkeypatch, caplo
         assert "the search was interrupted after 3 starting states; run it to its" in caplog.text
     else:
         assert found.outcome is Outcome.BRACKETED
+        assert "interrupted: no start has reached a solution without dilatancy; " in caplog.text
         assert found.upper == pytest.approx(upper)
         bound = "the mechanism is of the bound, and dilates"
         assert f"{bound}; the search was interrupted: " in caplog.text
@@ -661,6 +662,70 @@ def test_an_interrupted_search_leaves_the_least_factor_so_far(monkeypatch, caplo
 
 def stop_at_once(*_):
     raise KeyboardInterrupt
+
+
+def test_an_interrupted_search_keeps_the_state_of_the_associated_mechanism(monkeypatch):
+    """It is a solution, though not yet proved the least, where the first start is interrupted."""
+    monkeypatch.setattr(nonassociated, "_bound_objective", lambda *_: 0.0)
+    monkeypatch.setattr(nonassociated, "_follow_friction", lambda *_: ([], []))
+    monkeypatch.setattr(nonassociated, "_find_solutions", interrupt_first_start)
+    with pytest.raises(Interrupted) as raised:
+        af.collapse_factor(ring(voussoirs=5), live=SIDEWAYS, friction="nonassociated")
+    plain = af.collapse_factor(ring(voussoirs=5), live=SIDEWAYS)
+    assert raised.value.last.factor == pytest.approx(plain.factor, rel=EXACT)
+    assert raised.value.last.solutions.starts == (1, 1)
+
+
+def interrupt_first_start(*_):
+    raise Interrupted((0, []))
+
+
+@pytest.mark.usefixtures("few_starts")
+def test_progress_states_the_least_factor_so_far(monkeypatch, capfd):
+    monkeypatch.setattr("archfem._display.PROGRESS_INTERVAL", 0.0)
+    found = af.collapse_factor(wall(HALVES, 0.5), live=SIDEWAYS, friction="nonassociated")
+    lines = [x.split(", factor at most ") for x in capfd.readouterr().err.splitlines()]
+    values = {place.split(": ")[1]: float(most) for place, most in lines}
+    assert values["0.7 of the friction"] == pytest.approx(found.solutions.bracket[1], rel=1e-4)
+    last = next(k for k in reversed(values) if k.startswith("start"))
+    assert values[last] >= found.factor * (1.0 - 1e-4)
+    assert values[[*values][-1]] == pytest.approx(found.factor, rel=1e-4)
+    assert "descent 0 of 30" in values
+
+
+@pytest.mark.usefixtures("few_starts")
+def test_a_search_with_strength_starts_from_states_of_hard_stones(monkeypatch):
+    """Few programmes have crushing cuts: each state of hard stones is followed once.
+
+    The bound takes no cuts but those of known states, and is a bound below the factor all the same.
+    """
+    counts, solve, bound = {}, linear_programme.Programme.solve, nonassociated._bound_objective
+    inside = []
+
+    def counted(programme, **options):
+        kind = "bound" * bool(inside) + "hard" * (programme.crushing is None)
+        counts[kind] = counts.get(kind, 0) + 1
+        return solve(programme, **options)
+
+    def bounded(*given):
+        inside.append(1)
+        value = bound(*given)
+        inside.clear()
+        return value
+
+    monkeypatch.setattr(linear_programme.Programme, "solve", counted)
+    monkeypatch.setattr(nonassociated, "_bound_objective", bounded)
+    found = {
+        strength: af.collapse_factor(
+            wall(HALVES * 2, 0.5), live=SIDEWAYS, friction="nonassociated", strength=strength
+        )
+        for strength in (None, 0.2e6)
+    }
+    lower, upper = found[0.2e6].solutions.bracket
+    assert lower <= found[0.2e6].factor <= upper < found[None].solutions.bracket[1]
+    assert lower == pytest.approx(0.01073, rel=1e-3)  # as where every least force has all its cuts
+    assert counts["bound"] < 10  # such least forces take 19 more
+    assert counts[""] < 0.4 * counts["hard"]  # and starts that all have cuts as many as without
 
 
 @pytest.mark.usefixtures("few_starts")
