@@ -272,9 +272,16 @@ def _find_supports(
 
 
 def _stands(
-    dead: Programme, friction: float | None = None, depth: float = 1.0, cap: float = np.inf
+    dead: Programme,
+    friction: float | None = None,
+    depth: float = 1.0,
+    cap: float = np.inf,
+    enough: float = 1e-3,
 ) -> bool:
-    """Return whether blocks stand with friction in a range, and joints deepened by a factor."""
+    """Return whether blocks stand with friction in a range, and joints deepened by a factor.
+
+    A bound of the residual above `enough` suffices [mean block weights].
+    """
     blocks: RigidBlocks = dead.blocks
     coefficient: Array = blocks.structure.friction
     if friction is not None:
@@ -284,7 +291,7 @@ def _stands(
     crushing = None if dead.crushing is None else depth * dead.crushing
     relaxed = replace(dead, blocks=deepened, friction=coefficient, cohesion=cohesion)
     relaxed = replace(relaxed, crushing=crushing)
-    return is_balanced(relaxed.minimise_residual(), relaxed)
+    return is_balanced(relaxed.minimise_residual(enough), relaxed)
 
 
 def _least_friction(dead: Programme, name: str, lower: float, upper: float) -> float:
@@ -296,12 +303,25 @@ def _least_friction(dead: Programme, name: str, lower: float, upper: float) -> f
 
 
 def _least_value(
-    dead: Programme, name: str, lower: float, upper: float, precision: float = 1e-3
+    dead: Programme,
+    name: str,
+    lower: float,
+    upper: float,
+    precision: float = 1e-3,
+    enough: float = 1e-3,
 ) -> float:
     """Return the least value of a property with which blocks stand, by bisection."""
+    if dead.crushing is not None and enough > 0.0:
+        # crushing cuts of states take long: upwards from where the first bound lets blocks stand
+        lower = least = _least_value(dead, name, lower, upper, precision, -np.inf)
+        step = precision
+        while not _stands(dead, **{name: least}):
+            lower, least, step = least, min(upper, least * (1.0 + step)), 2.0 * step
+        upper = least
     while upper > (1.0 + precision) * max(lower, precision):
         middle = 0.5 * (lower + upper)
         if upper > 4.0 * max(lower, precision):  # far apart: by the geometric mean
             middle = float(np.sqrt(max(lower, precision) * upper))
-        lower, upper = (lower, middle) if _stands(dead, **{name: middle}) else (middle, upper)
+        stands = _stands(dead, **{name: middle}, enough=enough)
+        lower, upper = (lower, middle) if stands else (middle, upper)
     return upper

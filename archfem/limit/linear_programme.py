@@ -345,16 +345,24 @@ class Programme:
         column = sparse.csr_matrix(-self.blocks.dimensionless(load)[:, None])
         return self.with_unknowns(column, np.array([-1.0]))
 
-    def minimise_residual(self) -> Optimum:
-        """Minimise the sum of residual forces; the multipliers are the motion of the fall."""
+    def minimise_residual(self, enough: float = np.inf) -> Optimum:
+        """Minimise the sum of residual forces; the multipliers are the motion of the fall.
+
+        A lower bound above `enough` ends the rounds of crushing cuts [mean block weights].
+        """
+        identity = sparse.identity(len(self.load))
+        columns = sparse.hstack([identity, -identity], format="csr")
+        programme = self.with_unknowns(columns, np.ones(2 * len(self.load)))
+        if self.crushing is not None and enough < np.inf:
+            least = programme.solve(enough=-np.inf)  # of the first round
+            if least is not None and least.value > enough:
+                return least
         # Any state of equilibrium is an optimum, and is found faster where there is one.
         with suppress(DidNotConverge):
             state = self.solve()
             assert state is not None  # it has no objective
             return state
-        identity = sparse.identity(len(self.load))
-        columns = sparse.hstack([identity, -identity], format="csr")
-        optimum = self.with_unknowns(columns, np.ones(2 * len(self.load))).solve()
+        optimum = programme.solve(enough=enough)
         assert optimum is not None  # a sum of magnitudes is bounded from below
         return optimum
 
@@ -373,11 +381,17 @@ class Programme:
         return float(force_cost + self.unknown_cost @ state.unknowns)
 
     def solve(
-        self, *, forces: bool = True, max_rounds: int = 60, crushing_tolerance: float = 1e-7
+        self,
+        *,
+        forces: bool = True,
+        enough: float = np.inf,
+        max_rounds: int = 60,
+        crushing_tolerance: float = 1e-7,
     ) -> Optimum | None:
         """Solve, adding crushing cuts until none is violated; None where it is unbounded.
 
-        Without forces, until the objective and its mechanism, from below, no longer change.
+        Without forces, until the objective and its mechanism, from below, no longer change, or the
+        objective is above `enough`.
         """
         limits = self.limits or no_limits(len(self.friction))
         if self.crushing is not None:  # this tangent bounds every thrust by the crushing force
@@ -399,7 +413,7 @@ class Programme:
                     raise
                 found, programme, before = None, self, np.inf  # the optimum was not yet known
                 continue
-            if optimum is None or self.crushing is None:
+            if optimum is None or self.crushing is None or optimum.value > enough:
                 return optimum
             ends = optimum.forces.reshape(3, -1)[:2]
             thrust = ends.sum(axis=0)

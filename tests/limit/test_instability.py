@@ -85,6 +85,19 @@ def test_the_geometric_factor_of_a_block_on_a_slope(slope, factor):
         af.limit.geometric_factor(stone, -1.0)
 
 
+def test_where_a_wall_crushes_most_depths_take_one_programme(monkeypatch):
+    """Its lowest bed crushes under γ H; that, its first crushing cuts say, bounds the depth."""
+    solved, solve = [], linear_programme.solve_linear
+    monkeypatch.setattr(
+        linear_programme, "solve_linear", lambda *given: [solved.append(1), solve(*given)][1]
+    )
+    wall = af.shapes.wall(breadth=3.0, height=1.8, width=0.5, course=0.3, stone=0.5)
+    weight = {block.material.unit_weight for block in wall.blocks}.pop()
+    found = af.limit.geometric_factor(wall, 8.0 * weight * 1.8)
+    assert found == pytest.approx(8.0, rel=2e-3)  # of the bisection
+    assert len(solved) < 60  # 38; 178 where each depth has all its cuts
+
+
 def test_cohesion_of_less_deep_joints_is_less():
     """A block on a slope of 0.8 slides unless c h = W (sin - mu cos)."""
     cube = [[0.0, 0.0], [1.0, 0.0], [1.0, 0.5], [0.0, 0.5]]
