@@ -444,6 +444,8 @@ def _search_solutions(programme: Programme, start: Optimum | None, found: _Searc
         try:
             found.solutions = _find_solutions(programme, starts, progress, associated)
             found.tried = len(starts)
+            if known and programme.crushing is not None:  # no start of hard stones need lead to it
+                found.tried, found.solutions = len(starts) + 1, [*found.solutions, known]
         except Interrupted as error:
             if error.last[1]:
                 found.tried, found.solutions = error.last

@@ -723,6 +723,8 @@ def test_a_search_with_strength_starts_from_states_of_hard_stones(monkeypatch):
     }
     lower, upper = found[0.2e6].solutions.bracket
     assert lower <= found[0.2e6].factor <= upper < found[None].solutions.bracket[1]
+    # the state that the associated one leads to at once is among the solutions
+    assert found[0.2e6].solutions.between[1] > 1.005 * found[0.2e6].factor
     assert lower == pytest.approx(0.01073, rel=1e-3)  # as where every least force has all its cuts
     assert counts["bound"] < 10  # such least forces take 19 more
     assert counts[""] < 0.4 * counts["hard"]  # and starts that all have cuts as many as without
