@@ -71,8 +71,8 @@ class Ratios(NamedTuple):
 
     check: str
     directions: Sequence[str]
-    least: float  # with the weights of blocks apart
-    most: float  # over what is assumed of a fill
+    least: float  # with the weights of blocks apart, where it is not the decisive one
+    most: float  # the largest of the decisive ones over a fill; without one `least`
     needed: str = ""  # assumptions on the fill under which alone it passes
     linear: bool = False  # whether accelerations are checked, rather than displacements
     moved: float | None = None  # by displacements, of what passes at rest
@@ -94,7 +94,7 @@ class Ratios(NamedTuple):
     @property
     def ends(self) -> Ends:
         """The least ratio, and the largest over what is assumed of a fill [-]."""
-        return Ends((self.decisive, self.most if self.most > self.least else self.decisive))
+        return Ends((self.decisive, self.decisive if self.most == self.least else self.most))
 
     @property
     def by_split(self) -> bool:
@@ -296,13 +296,15 @@ def list_ratios(found: KinematicAssessment) -> list[tuple[AssessmentCheck, Ratio
     """List the checks of an assessment with their ratios; with one weight a body if it is less."""
     listed = []
     for check in found.checks:
-        over = check.over_fill
-        ends = (check.ratio, check.ratio) if over is None else over.ends
+        over, split = check.over_fill, check.bodies
         moved = check.moved if check.at_rest and not over else None
-        bodies = check.bodies if (check.bodies or np.inf) < 0.999 * check.least else None
+        floor = None if check.floor is None else check.decisive
+        split = check.decisive if split and floor is None else split
+        bodies = split if (split or np.inf) < 0.999 * check.ratio else None
+        least = check.decisive if bodies is floor is None else check.ratio
+        ends = least, over.ends[1] if over else least
         needed, linear = over.needed if over else "", check.unit != "m"
-        least = None if over else check.floor
-        ratios = Ratios(check.name, (), *ends, needed, linear, moved, bodies, check.bounded, least)
+        ratios = Ratios(check.name, (), *ends, needed, linear, moved, bodies, check.bounded, floor)
         listed.append((check, ratios))
     return listed
 
@@ -341,11 +343,10 @@ def describe_margin(found: Iterable[KinematicAssessment]) -> str:
     same = [x.over_fill for x, _ in alike if x.over_fill is not None]
     if same:
         over = FillRange.least_of(same)
-        text, outcome = over.describe(digits=3), over.outcome
-        if ratios.bodies is not None:
-            text = f"{format_ratio(ratios.bodies)} with one weight a body, {text} with them apart"
-        outcome = check.words if outcome == "passes" else outcome
-        return f"least margin {text}, by {check.name}: {outcome}"
+        of = " with one weight a body" * (ratios.bodies is not None)
+        of = of if ratios.floor is None else " with e* = 1"
+        outcome = over.outcome if ratios.needed else check.words
+        return f"least margin{of} {over.describe(digits=3)}, by {check.name}: {outcome}"
     others = [x.decisive for x, way in alike if way != sense and x.ratio > 1.001 * check.ratio]
     side, other = "", ""
     if others:

@@ -148,7 +148,7 @@ class AssessmentCheck:
         period: period of the equivalent oscillator [s]; undefined (NaN) where accelerations are
             checked.
         source: clause of the code.
-        over_fill: ratios over all assumptions on a fill; None without one.
+        over_fill: decisive ratios over all assumptions on a fill; None without one.
         bodies: ratio with one weight for each body that moves as one, at its centroid; None where
             each body has one anyhow.
         bounded: whether the ratio is an upper bound, by which a check fails and does not pass.
@@ -175,9 +175,9 @@ class AssessmentCheck:
     @property
     def outcome(self) -> str:
         """Whether it "passes" or "fails", or that fill, split of weights or mechanism decide."""
+        if self.over_fill is not None and self.over_fill.needed:
+            return self.over_fill.outcome
         found = "passes" if self.ratio >= 1.0 else "fails"
-        if self.over_fill is not None:
-            found = self.over_fill.outcome
         for least, doubtful in ((self.bodies, BY_SPLIT), (self.floor, BY_MECHANISM)):
             if found == "passes" and least is not None and least < 1.0:
                 return doubtful
@@ -199,23 +199,23 @@ class AssessmentCheck:
 
     @property
     def ratios(self) -> str:
-        """The ratio as text, or its range over all assumptions on a fill, or from e* = 1 on."""
+        """The ratio as text, or its decisive range over a fill, or from e* = 1 on."""
+        floor = "e* = 1, whatever moves at this alpha_0"
         if self.over_fill is not None:
-            return self.over_fill.format_ends(digits=3)
+            of = floor if self.floor is not None else "one weight a body" * bool(self.bodies)
+            return self.over_fill.format_ends(digits=3) + f" ({of})" * bool(of)
         own = format_ratio(self.ratio)
-        if self.floor is None:
-            return own
-        return f"{format_ratio(self.floor)} (e* = 1, whatever moves at this alpha_0) to {own}"
+        return own if self.floor is None else f"{format_ratio(self.floor)} ({floor}) to {own}"
 
     @property
-    def least(self) -> float:
-        """The ratio, or the least of all assumptions on a fill [-]."""
-        return self.ratio if self.over_fill is None else self.over_fill.ends[0]
+    def assumed(self) -> float:
+        """The least ratio by either split of weights, or with e* = 1, with its own fill [-]."""
+        return min(x for x in (self.ratio, self.bodies, self.floor) if x is not None)
 
     @property
     def decisive(self) -> float:
-        """The least ratio: over a fill, by either split of weights, or with e* = 1 [-]."""
-        return min(x for x in (self.least, self.bodies, self.floor) if x is not None)
+        """The same, the least over what is assumed of a fill [-]."""
+        return self.assumed if self.over_fill is None else self.over_fill.ends[0]
 
     @property
     def moved(self) -> float:
@@ -350,7 +350,7 @@ def measure_blocks(*blocks: Block) -> float:
 
 
 def add_fill_ranges(found: Any, others: Mapping[FillAssumption, Any]) -> Any:
-    """Return a `KinematicAssessment` with its ratios by assumption on a fill, and the least one.
+    """Return a `KinematicAssessment` with decisive ratios by assumption on a fill, and the least.
 
     Args:
         found: assessment under the assumption that is given.
@@ -360,7 +360,7 @@ def add_fill_ranges(found: Any, others: Mapping[FillAssumption, Any]) -> Any:
     for name in ("linear", "displacement"):
         # what has no motion withstands any spectrum
         ratios = {
-            key: 0.0 if other is None else getattr(getattr(other, name), "ratio", np.inf)
+            key: 0.0 if other is None else getattr(getattr(other, name), "assumed", np.inf)
             for key, other in others.items()
         }
         if ratios and getattr(found, name) is not None:

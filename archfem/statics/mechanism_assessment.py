@@ -220,7 +220,7 @@ class KinematicAssessment(ResultDisplay):
         """Describe the result in one line."""
         vanishes = f"d_0* {self.d_0_star:.4g} m, " if np.isfinite(self.d_0_star) else ""
         last, linear = self.checks[-1], self.linear.decisive
-        apart = last.least if self.displacement else linear
+        apart = last.ratio if self.displacement else linear
         outcome = describe_difference(last.decisive, apart, linear) or last.outcome
         return (
             f"KinematicAssessment of '{self.structure.name}': alpha_0 {self.alpha_0:.4g}, a_0* "
@@ -259,7 +259,7 @@ class KinematicAssessment(ResultDisplay):
             lines += map(str, self.checks)
             if (over_fill := self.checks[-1].over_fill) is not None:
                 lines.append(over_fill.describe_states(digits=3, name=" times the spectrum"))
-                own = (k for k, x in over_fill.values.items() if x == self.checks[-1].ratio)
+                own = (k for k, x in over_fill.values.items() if x == self.checks[-1].assumed)
                 lines += [f"all else is under one assumption: {key}" for key in [*own][:1]]
         lines += [f"{NOTE_MARK}{note}" for note in [*self.notes, *self._split_note, *self._lower]]
         return "\n".join([*lines, *(f"{DOUBT_MARK}{doubt}" for doubt in self.doubts)])

@@ -418,7 +418,7 @@ def _title_check(check: AssessmentCheck) -> str:
     some = check.over_fill is not None and check.over_fill.needed
     outcome = "passes with some assumptions" if some else check.words
     whole, drawn = "", ""
-    if check.bodies is not None and check.bodies < 0.999 * check.least:
+    if not check.over_fill and (check.bodies or np.inf) < 0.999 * check.ratio:
         whole, drawn = f"{check.bodies:.3g} with one weight a body, ", " as drawn"
     return f"{check.name}: {outcome}, {whole}ratio {check.ratios}{drawn}"
 

@@ -1,7 +1,7 @@
 """Range of results over what is assumed of a fill: closed forms of a stone in it, and its words."""
 
 import json
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import product
 from types import SimpleNamespace
 
@@ -11,10 +11,12 @@ from backfilled import SOIL, rectangle
 
 import archfem as af
 from archfem.cases.analysis_keys import LimitAnalysis
+from archfem.cases.answers import list_ratios
 from archfem.cases.result_folder import limit_files
 from archfem.cases.result_text import describe_collapse
 from archfem.limit import collapse
 from archfem.limit.fill_range import FillAssumption, FillRange, vary_fill
+from archfem.statics.assessment_checks import BY_SPLIT, AssessmentCheck, add_fill_ranges
 from archfem.studies.evaluators import evaluate_limit
 
 SITE = af.Eurocode8(ag=0.25, ground="C")
@@ -197,16 +199,16 @@ def test_an_assessment_of_a_backed_stone_has_the_ratio_without_backing():
 
 @pytest.mark.slow
 def test_an_assessment_has_a_linear_ratio_by_each_assumption():
-    """By hand, and the least of all is that of one fill."""
+    """By hand, of one weight for the body that moves; the least of all is that of one fill."""
     structure, fill = buried_stone(), af.limit.Fill(friction_angle=30.0)
     options = {"friction": None, "q": 1.0, "confidence_factor": 1.0}
     found = af.kinematic_assessment(structure, SITE, fill=fill, **options)
     ground = float(SITE.horizontal(0.0)) * 9.80665
-    ratios = {
-        key: factor * structure.gravity / share / ground
-        for key, (factor, share) in turning_factors(3.0).items()
-    }
+    unit, expected = structure.gravity / ground, turning_factors(3.0)
+    ratios = {key: factor * unit for key, (factor, _) in expected.items()}
     assert found.linear.over_fill.values == pytest.approx(ratios, rel=1e-6)
+    factor, share = expected[FillAssumption(FEET, THIRD)]
+    assert found.linear.ratio == pytest.approx(factor * unit / share, rel=1e-6)
     assert found.least.displacement.over_fill.values == found.displacement.over_fill.values
     assert found.least.alpha_0 < 0.99 * found.alpha_0
 
@@ -221,7 +223,8 @@ def test_an_assessment_passes_only_with_what_it_needs():
     displacement = found.displacement.over_fill.values
     for assumption, (_, assumed) in vary_fill(fill).items():
         alone = af.kinematic_assessment(structure, SITE, fill=assumed, **options)
-        assert displacement[assumption] == pytest.approx(alone.displacement.ratio)
+        assert displacement[assumption] == pytest.approx(alone.displacement.bodies)
+        assert alone.displacement.bodies < 0.99 * alone.displacement.ratio
         if displacement[assumption] == min(displacement.values()):
             assert found.least.alpha_0 == pytest.approx(alone.alpha_0)
             assert found.least.displacement.capacity == pytest.approx(alone.displacement.capacity)
@@ -232,13 +235,55 @@ def test_an_assessment_passes_only_with_what_it_needs():
     assert partly.outcome == f"passes only with {THIRD}"
     assert not partly.passes
     low, high = (end / between for end in (min(ratios.values()), max(ratios.values())))
-    assert f"{partly.outcome}, the spectrum may be {low:.3g} to {high:.3g} times" in str(partly)
+    assert f"{partly.outcome}, the spectrum may be {low:.3g} to {high:.3g} (one weight" in str(
+        partly
+    )
     # as weight and mass alone its inertia varies
     bare = af.kinematic_assessment(structure, SITE, **options)
     assert [*bare.linear.over_fill.values] == [
         FillAssumption(FEET, ""),
         FillAssumption(CENTROIDS, ""),
     ]
+
+
+@dataclass(frozen=True)
+class Assessed:
+    """What `add_fill_ranges` reads and writes of an assessment."""
+
+    linear: AssessmentCheck
+    displacement: AssessmentCheck | None = None
+    least: "Assessed | None" = None
+
+
+def check_of(ratio, bodies):
+    return AssessmentCheck("linear", ratio, 1.0, "m/s²", ratio, np.nan, "", bodies=bodies)
+
+
+@pytest.mark.parametrize(
+    ("apart", "bodies", "outcome", "of_given"),
+    [
+        # of a laden bridge, by feet and centroids with a third, then with none
+        ((1.36, 1.16, 1.08, 0.91), (1.12, 0.965, 0.886, 0.761), f"{FEET} and {THIRD}", ""),
+        ((1.36, 1.16, 1.08, 1.01), (1.12, 1.0, 0.886, 0.761), THIRD, ""),
+        ((1.36, 1.16, 0.9, 0.8), (0.96, 0.9, 0.8, 0.7), "fails", BY_SPLIT),
+        ((1.36, 1.16, 1.08, 1.01), (0.96, 0.9, 0.8, 0.7), BY_SPLIT, BY_SPLIT),
+    ],
+)
+def test_a_range_and_what_it_needs_are_of_one_weight_a_body(apart, bodies, outcome, of_given):
+    """It passes with no assumption under which one weight a body fails, whatever blocks do."""
+    keys = (FillAssumption(i, p) for p, i in product((THIRD, NONE), (FEET, CENTROIDS)))
+    each = [Assessed(check_of(*ratios)) for ratios in zip(apart, bodies, strict=True)]
+    found = add_fill_ranges(each[0], dict(zip(keys, each, strict=True)))
+    given, least = found.linear, found.least.linear
+    outcome = outcome if of_given else f"passes only with {outcome}"
+    assert (given.outcome, least.outcome) == (of_given or outcome, outcome)
+    for check in (given, least):
+        assert (*check.over_fill.values.values(),) == bodies
+        assert not check.passes
+    assert least.ratio == apart[-1]
+    ((_, ratios),) = list_ratios(SimpleNamespace(checks=[least]))
+    assert (ratios.decisive, ratios.least, ratios.most) == (bodies[-1], apart[-1], bodies[0])
+    assert str(ratios) == f"{bodies[-1]} to {bodies[0]} ({apart[-1]} with the weights apart)"
 
 
 @pytest.mark.slow

@@ -164,7 +164,7 @@ def _rank_verdict(data: ReportData) -> tuple[int, dict[str, float]]:
 def _say_plainly(data: ReportData, doubtful: Sequence[str]) -> Iterator[tuple[str, str]]:
     """Yield the answer for a client, in the lines of the head."""
     checks = list_checks(data)
-    failed = [check for check in checks if check.least < 1.0]
+    failed = [check for check in checks if check.needed or check.least < 1.0]
     found = dict.fromkeys(margins.judge_check(data, check)[0] for check in failed or checks)
     assessed = [f"by the kinematic assessment {words}" for words in found]
     unchecked, overturns = _say_unchecked(data)

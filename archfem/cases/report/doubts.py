@@ -110,7 +110,7 @@ def list_decisive_doubts(data: ReportData, doubts: Sequence[tuple[str, Doubt]]) 
     checks, studies = list_checks(data), [each.worst for each in data.own_studies if each.doubts]
     margins = [worst.get("least_margin", [1.0]) for worst in studies]
     failed = {
-        RESULTS["assessment"]: bool(checks) and all(check.most < 1.0 for check in checks),
+        RESULTS["assessment"]: bool(checks) and all(max(x.least, x.most) < 1.0 for x in checks),
         STUDIES: all(len(each) and max(each) < 1.0 for each in margins),
     }
     bounded = {each for each in doubts if failed.get(each[0]) and UPPER_BOUND in str(each[1])}

@@ -200,7 +200,7 @@ def describe_push(data: ReportData, name: str, push: PushFactors) -> Iterator[st
 
 def _describe_check(data: ReportData, check: Ratios) -> tuple[float, list[str]]:
     """Return the ratio of a check of an assessment, and its sentences."""
-    over = OVER_FILL * (check.most > check.least)
+    over = OVER_FILL * (check.most not in (check.least, check.decisive))
     by = f"on {name_spectrum(data)}, by {check.name}"
     moves = _say_motion(data, check.least, peak_of_spectrum(data.case))
     if check.moved is not None and moves:  # what moves at less than the push that begins it is
