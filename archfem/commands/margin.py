@@ -16,7 +16,8 @@ from archfem.cases.case import Case
 from archfem.cases.result_text import mark_remarks, record_doubts
 from archfem.cases.run import HISTORY_FILE, load_finished_run
 from archfem.commands.cli import ExitCode
-from archfem.commands.run import Command, doubt_code, keep_attempt, name_group, write_results
+from archfem.commands.run import Command, keep_attempt, name_group, write_results
+from archfem.commands.tools import doubt_code
 from archfem.dynamics.collapse_state import (
     DISLOCATION,
     FALLEN_STATES,
@@ -88,7 +89,7 @@ def verdict(options: argparse.Namespace) -> int:
         return own | {"verdict_range.png": computed.plot()}
 
     write_results("verdict", case, options.out, text, draw, options.pair)
-    return ExitCode.DOUBTFUL if computed.doubts else 0
+    return doubt_code(computed.doubts)
 
 
 def _say_steps(case: Case, motion: Motion, options: argparse.Namespace) -> str:

@@ -44,8 +44,7 @@ from archfem.cases.run import (
 )
 from archfem.cases.structure_keys import read_survey
 from archfem.cases.toml_file import format_tables, parse_change
-from archfem.commands.cli import ExitCode
-from archfem.commands.tools import print_motions, show_both_senses
+from archfem.commands.tools import doubt_code, print_motions, show_both_senses
 from archfem.dynamics.history import Ending, History
 from archfem.dynamics.walls_across import check_across
 from archfem.errors import ArchfemError, DidNotConverge, Interrupted, InvalidInput, keep_warnings
@@ -93,13 +92,13 @@ def run(options: argparse.Namespace) -> int:
                 for x in computed
             )
         try:
-            headline, doubtful = print_results(case, computed, draft)
+            headline, doubts = print_results(case, computed, draft)
             verdict.append(headline)
         except FailedPairs as error:
             failure = error
     if failure is not None:
         raise failure
-    return ExitCode.DOUBTFUL if doubtful else 0
+    return doubt_code(doubts)
 
 
 @contextmanager
@@ -184,11 +183,6 @@ def keep_attempt(name: str) -> Callable[[Command], Command]:
     return decorate
 
 
-def doubt_code(remarks: Iterable[result_text.Remark]) -> int:
-    """Return the exit code of printed doubts and notes."""
-    return ExitCode.DOUBTFUL if any(isinstance(each, Doubt) for each in remarks) else 0
-
-
 def modes(options: argparse.Namespace) -> int:
     """Compute the modes of a case about its dead load: table, picture, film of the first two."""
     case, folder = Case.read(options.case, options.changes), create_result_folder(options.out)
@@ -203,7 +197,7 @@ def modes(options: argparse.Namespace) -> int:
             from archfem.view.films.film import film_modes
 
             write({"modes.gif": lambda path: film_modes(computed, path, first)}, draft)
-    return ExitCode.DOUBTFUL if at_rest.doubts else 0
+    return doubt_code(at_rest.doubts)
 
 
 @keep_attempt("limit")
@@ -216,8 +210,8 @@ def limit(options: argparse.Namespace) -> int:
         write_results("limit", case, options.out, f"{case.title}\n{text}", files)
 
     with result_text.record_doubts(case.structure) as doubts:
-        show_both_senses(case, case.limit.solve_so_far(case.structure), show, doubts)
-    return doubt_code(doubts)
+        first = case.limit.solve_so_far(case.structure)
+        return doubt_code(show_both_senses(case, first, show, doubts))
 
 
 def thickness(options: argparse.Namespace) -> int:
@@ -410,7 +404,7 @@ def risk(options: argparse.Namespace) -> int:
     files: Files = {"risk.txt": str(found), "risk.nc": found.save, "risk.png": found.plot()}
     files |= answers.state_risk(found).as_file("risk")
     write_results("risk", case, options.out, str(found), lambda: files)
-    return ExitCode.DOUBTFUL if found.doubts else 0
+    return doubt_code(found.doubts)
 
 
 def report(options: argparse.Namespace) -> None:
@@ -454,10 +448,10 @@ def compile_steps(options: argparse.Namespace) -> None:
         print(f"{seconds:5.0f} s: {kind}", flush=True)
 
 
-def print_results(case: Case, found: Iterable[Result], folder: Path) -> tuple[str, bool]:
-    """Print results, write their files, and return the verdict and whether any is in doubt."""
+def print_results(case: Case, found: Iterable[Result], folder: Path) -> tuple[str, list[Doubt]]:
+    """Print results, write their files, and return the verdict and all doubts."""
     # `carry_out` yields dead load, pushover, suite, runs and limit analysis in this order.
-    runs, motions, of_limit = dict[str, History](), dict[str, Motion](), False
+    runs, motions, shown = dict[str, History](), dict[str, Motion](), list[Doubt]()
     if (survey := read_survey(case.settings, case.folder)) is not None:
         print(survey)
     with result_text.record_doubts(case.structure) as doubts:
@@ -466,8 +460,7 @@ def print_results(case: Case, found: Iterable[Result], folder: Path) -> tuple[st
         write_progress_line(case.title, f"dead load of {len(case.structure.free)} blocks")
         for result in found:
             if isinstance(result, Collapse):
-                show_both_senses(case, result, partial(_print_limit, case, folder), doubts)
-                of_limit = len(doubts) > 0
+                shown = show_both_senses(case, result, partial(_print_limit, case, folder), doubts)
             elif isinstance(result, DeadLoadResult):
                 at_rest = result
                 print(result_text.describe_dead_load(at_rest))
@@ -497,7 +490,8 @@ def print_results(case: Case, found: Iterable[Result], folder: Path) -> tuple[st
     across, falls = check_across(case.structure, motions)
     if across:
         print(across)
-    return verdict + falls, any([of_limit, at_rest.doubts, *(run.doubts for run in runs.values())])
+    of_runs = (doubt for run in runs.values() for doubt in run.doubts)
+    return verdict + falls, [*shown, *at_rest.doubts, *of_runs]
 
 
 def _print_limit(case: Case, folder: Path, found: Collapse, text: str, *others: Any) -> None:

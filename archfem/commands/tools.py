@@ -8,7 +8,7 @@ import os
 import re
 import shutil
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from importlib import import_module, metadata
 from importlib.util import find_spec
@@ -32,6 +32,11 @@ from archfem.models.model import Doubt
 from archfem.motion.suite import Suite
 
 PIP_INSTALL = f"{sys.executable} -m pip install"
+
+
+def doubt_code(remarks: Iterable[result_text.Remark]) -> int:
+    """Return the exit code of printed doubts and notes."""
+    return ExitCode.DOUBTFUL if any(isinstance(each, Doubt) for each in remarks) else 0
 
 
 def check(options: argparse.Namespace) -> int:
@@ -72,12 +77,14 @@ def _check_case(options: argparse.Namespace) -> int:
             f"{NOTE_MARK}[{section}.{format_key(name)}] counts for nothing: there are {used} alone"
         )
     case.limit.check(case.structure)
+    doubts = list[Doubt]()
     if case.pushover is not None:
         case.pushover.check(case.structure)
     if case.limit.live and case.limit.friction == "nonassociated":
         print("limit analysis: `archfem limit` searches sliding without dilatancy, in both senses")
     elif case.limit.live:
-        show_both_senses(case, case.limit.solve(case.structure), lambda _, text, *__: print(text))
+        found = case.limit.solve(case.structure)
+        doubts = show_both_senses(case, found, lambda _, text, *__: print(text))
     # Unreadable records are errors before the dead load is computed.
     case.check_ground()
     at_rest = DeadLoadResult.of(case)
@@ -89,9 +96,10 @@ def _check_case(options: argparse.Namespace) -> int:
     elif case.motion is not None:
         motion = case.ground_motion()
         print(f"motion: {motion.name}, {motion.duration:.2f} s, PGA {motion.pga:.3f} m/s²")
-    ready = f"in doubt, {len(at_rest.doubts)} times, as above" if at_rest.doubts else "ready"
+    doubts += at_rest.doubts
+    ready = f"in doubt, {len(doubts)} times, as above" if doubts else "ready"
     print(f"{options.case}: {ready}; dead load in {at_rest.dead.iterations} iterations")
-    return ExitCode.DOUBTFUL if at_rest.doubts else 0
+    return doubt_code(doubts)
 
 
 def animate(options: argparse.Namespace) -> None:
@@ -177,10 +185,11 @@ def show_both_senses(
     first: Collapse,
     show: Callable[[Collapse, str, result_text.PushFactors | None, Sequence[Doubt]], None],
     doubts: Sequence[Doubt] = (),
-) -> None:
+) -> list[Doubt]:
     """Show a result of limit analysis beside that of the other sense, each at its least end.
 
-    Both may add to the doubts. Where it, or the rest, is cut short, the result is shown.
+    Both may add to the doubts; those that are shown are returned. Where it, or the rest, is cut
+    short, the result is shown.
     """
     # where a structure does not stand, the load plays no part
     other = None if first.outcome is Outcome.INFEASIBLE else case.limit.opposite
@@ -201,10 +210,9 @@ def show_both_senses(
         slides = [doubt for doubt in once if doubt.cause.startswith("joints slide (")]
         if len(slides) > 1 and opposite is not None:  # that of the sense which is shown is enough
             once.remove(slides[0 if found is opposite else 1])
-        if site and site.least < 1.0 <= site.most:
-            words = "what is assumed of the fill decides whether the ground sets it in motion"
-            once.append(Doubt(words, "measure it, or run motions on fill in pieces"))
+        once += result_text.doubt_fill(site)
         show(found, "\n".join([f"{text}{left}", *result_text.mark_remarks(once)]), site, once)
+    return once
 
 
 def print_motions(suite: Suite) -> None:

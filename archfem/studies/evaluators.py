@@ -206,6 +206,7 @@ def evaluate_limit(case: Case) -> Findings:
         collapse = case.limit.solve(case.structure)
         other = case.limit.opposite if collapse.outcome is not Outcome.INFEASIBLE else None
         senses = [collapse] if other is None else [collapse, other.solve(case.structure)]
+    doubts += result_text.doubt_fill(result_text.compare_with_site(case, *senses))
     findings: Findings = {
         "factor": float(collapse.factor),
         "hinges": len(collapse.hinges),

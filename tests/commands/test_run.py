@@ -27,6 +27,7 @@ from archfem.dynamics.scale_search import ScaledRun
 from archfem.errors import logger
 from archfem.models.model import Doubt
 from archfem.studies import study, variations
+from archfem.studies.evaluators import evaluate_limit
 
 RING = Path(__file__).parents[2] / "meshes" / "ring_paper.toml"
 
@@ -678,19 +679,29 @@ def test_limit_analysis_of_a_case(tmp_path, ring, unplotted, capsys):
     assert "in the other sense" not in capsys.readouterr().out
 
 
-def test_a_push_that_the_fill_decides_is_in_doubt(tmp_path, capsys):
+def test_a_push_that_the_fill_decides_is_in_doubt(tmp_path, unplotted, capsys):
     """The demand is within the range over what is assumed of the fill, or below all of it."""
-    path = tmp_path / "bridge.toml"
+    path, words = tmp_path / "bridge.toml", "what is assumed of the fill decides whether the ground"
     af.Analysis(slender_bridge(arch=(5.0, 1.5)), fidelity="rigid").write(path)
-    fill = af.limit.Fill(friction_angle=35.0)
+    fill = af.limit.Fill(friction_angle=45.0)
     found = af.collapse_factor(slender_bridge(arch=(5.0, 1.5)), live=af.BodyForce(1.0), fill=fill)
     low, high = found.range
     assert low < 0.9 * high
     for demand, decides in ((0.5 * (low + high), True), (0.5 * low, False)):
-        given = f'limit={{horizontal=1, demand="{demand} g", fill={{friction_angle="35 degree"}}}}'
-        assert af.commands.main(["limit", str(path), "--set", given]) == 3  # the fill slides
-        said = "in doubt: what is assumed of the fill decides whether the ground sets it in motion"
+        given = f'limit={{horizontal=1, demand="{demand} g", fill={{friction_angle="45 degree"}}}}'
+        assert af.commands.main(["limit", str(path), "--set", given]) == 3 * decides
+        said = f"in doubt: {words} sets it in motion"
         assert (said in capsys.readouterr().out) == decides
+        case = af.Case.read(path, [given])
+        assert evaluate_limit(case)["doubts"] == decides
+    given = given.replace(str(demand), str(0.5 * (low + high)))
+    assert af.commands.main(["check", str(path), "--set", given]) == 3
+    said = capsys.readouterr().out  # beside that on soft blocks
+    assert f"in doubt: {words}" in said
+    assert f"{path}: in doubt, 2 times, as above" in said
+    case = af.Case.read(path, [given])
+    _, doubts = print_results(case, carry_out(case, tmp_path), tmp_path)
+    assert [str(doubt).startswith(words) for doubt in doubts] == [True, False]
 
 
 @pytest.mark.parametrize("push", [1.0, -1.0])
