@@ -12,6 +12,7 @@ import json
 import re
 import tomllib
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -21,7 +22,7 @@ from archfem._typing import NumberOrWord
 from archfem._validation import declared_keys, short_repr
 from archfem.errors import InvalidInput
 from archfem.masonry.structure import suggest_name
-from archfem.units import in_degrees, in_unit
+from archfem.units import STANDARD_GRAVITY, in_degrees, in_unit, kN
 
 Table = Mapping[str, Any]
 
@@ -225,7 +226,11 @@ def refuse_unknown(table: Table, keys: Iterable[str], section: str = "") -> None
             if section == "structure" and key in ("materials", "contacts"):
                 hint = f"[{key}] stands beside [structure], at the top of the file"
             if key == "density" and "unit_weight" in keys:
-                hint = "give unit_weight, which is the density times g: 23.54 kN/m³ for 2400 kg/m³"
+                density = 2400.0
+                with suppress(InvalidInput):
+                    density = in_unit(table[key], "kg/m**3", key)
+                weight = f"{density * STANDARD_GRAVITY / kN:.4g} kN/m³ for {density:.5g} kg/m³"
+                hint = f"give unit_weight, which is the density times g: {weight}"
             raise InvalidInput(f"unknown key '{section + '.' if section else ''}{key}': {hint}")
 
 

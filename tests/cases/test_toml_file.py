@@ -227,9 +227,19 @@ def test_counts_beyond_the_room_are_refused_before_they_take_any():
         af.Motion.synthetic(duration=1.0).resampled(1e-12)
 
 
-def test_a_density_is_no_key_where_weights_are():
-    with pytest.raises(af.InvalidInput, match=r"materials\.stone\.density': give unit_weight"):
-        refuse_unknown({"density": 2300}, ["unit_weight", "young"], "materials.stone")
+@pytest.mark.parametrize(
+    ("density", "weight"),
+    [
+        (2300, "22.56 kN/m³ for 2300 kg/m³"),
+        ("2500 kg/m3", "24.52 kN/m³ for 2500 kg/m³"),
+        ("1.9 t/m3", "18.63 kN/m³ for 1900 kg/m³"),
+        ("heavy", "23.54 kN/m³ for 2400 kg/m³"),
+    ],
+)
+def test_a_density_is_no_key_where_weights_are(density, weight):
+    refused = r"materials\.stone\.density': give unit_weight, which .* times g: "
+    with pytest.raises(af.InvalidInput, match=refused + weight):
+        refuse_unknown({"density": density}, ["unit_weight", "young"], "materials.stone")
     with pytest.raises(af.InvalidInput, match="the keys are"):
         refuse_unknown({"density": 2300}, ["young"], "materials.stone")
 
