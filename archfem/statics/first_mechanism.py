@@ -58,7 +58,8 @@ def take_fill_as_loads(
             "an assessment takes no axles on a fill, on which a vehicle leans: push it by `archfem "
             "limit`, which compares it with the site's acceleration, or run motions on a fill in "
             "pieces; as weights of `loads`, axles do not press the fill against the stones, and "
-            "ratios were up to 2.4 times too high"
+            "ratios were up to 2.4 times too high; as bodies by `weight` none leans on the others, "
+            "and pushes were 0.7 to 1.2 times those of axles"
         )
     loads = []
     for number in np.unique(columns.stone):
