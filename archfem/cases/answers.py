@@ -356,6 +356,14 @@ def describe_margin(found: Iterable[KinematicAssessment]) -> str:
     return f"least margin {ratios}, by {check.name}{side}: {outcome}{other}"
 
 
+def doubt_fill(site: PushFactors | None) -> list[Doubt]:
+    """Return the doubt of a push that exceeds the site's acceleration on some fills alone."""
+    if site is None or not site.least < 1.0 <= site.most:
+        return []
+    words = "what is assumed of the fill decides whether the ground sets it in motion"
+    return [Doubt(words, "measure it, or run motions on fill in pieces")]
+
+
 def note_across(structure: Structure, found: Iterable[KinematicAssessment]) -> list[str]:
     """Return a note on the push across the plane that overturns it before alpha_0 moves it."""
     weaker = find_transverse_push(structure)[0] < min(each.alpha_0 for each in found)

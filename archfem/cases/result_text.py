@@ -550,14 +550,6 @@ def compare_with_site(case: Case, *senses: Collapse | None) -> PushFactors | Non
     return factors
 
 
-def doubt_fill(site: PushFactors | None) -> list[Doubt]:
-    """Return the doubt of a push that exceeds the site's acceleration on some fills alone."""
-    if site is None or not site.least < 1.0 <= site.most:
-        return []
-    words = "what is assumed of the fill decides whether the ground sets it in motion"
-    return [Doubt(words, "measure it, or run motions on fill in pieces")]
-
-
 def compare_push(case: Case, low: float, high: float, dead: Iterable[Action]) -> PushFactors | None:
     """Return how many times the site's ground acceleration two pushes are [g].
 

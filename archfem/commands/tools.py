@@ -19,6 +19,7 @@ from archfem import _numba, _optional
 from archfem._display import NOTE_MARK, write_progress_line
 from archfem._files import path_inside, read_listed
 from archfem.cases import result_text, structure_text
+from archfem.cases.answers import doubt_fill
 from archfem.cases.case import Case, read_settings
 from archfem.cases.examples import copy_example, list_example_titles, read_example, write_new_case
 from archfem.cases.run import HISTORY_FILE, DeadLoadResult, dead_load_of_case
@@ -210,7 +211,7 @@ def show_both_senses(
         slides = [doubt for doubt in once if doubt.cause.startswith("joints slide (")]
         if len(slides) > 1 and opposite is not None:  # that of the sense which is shown is enough
             once.remove(slides[0 if found is opposite else 1])
-        once += result_text.doubt_fill(site)
+        once += doubt_fill(site)
         show(found, "\n".join([f"{text}{left}", *result_text.mark_remarks(once)]), site, once)
     return once
 

@@ -13,7 +13,7 @@ import xarray as xr
 from archfem._validation import validate_arguments
 from archfem.cases import result_text
 from archfem.cases.analysis_keys import rate_case
-from archfem.cases.answers import find_margin
+from archfem.cases.answers import doubt_fill, find_margin
 from archfem.cases.case import Case
 from archfem.cases.provenance import hash_inputs, remove_presentation
 from archfem.cases.run import DeadLoadResult, log_prefix
@@ -206,7 +206,7 @@ def evaluate_limit(case: Case) -> Findings:
         collapse = case.limit.solve(case.structure)
         other = case.limit.opposite if collapse.outcome is not Outcome.INFEASIBLE else None
         senses = [collapse] if other is None else [collapse, other.solve(case.structure)]
-    doubts += result_text.doubt_fill(result_text.compare_with_site(case, *senses))
+    doubts += doubt_fill(result_text.compare_with_site(case, *senses))
     findings: Findings = {
         "factor": float(collapse.factor),
         "hinges": len(collapse.hinges),
