@@ -234,8 +234,8 @@ def state_ratings(
             if not np.isnan(each.factor):
                 at += "".join(f"; {x}" for x in (each.say_range(), flips) if x)
             factor = "-" if np.isnan(each.factor) else format_ratio(each.factor, 4)
-            row = Row("rating", demand, f"{words}{at}", factor, {"passes": bool(each.passes)})
-            rows.append((each.factor, row))
+            numbers = {"passes": bool(each.passes), "least": each.least}
+            rows.append((each.factor, Row("rating", demand, f"{words}{at}", factor, numbers)))
     sentences = [repr(first)]
     if not np.isnan(first.factor):
         outcome, *others = first.clauses

@@ -37,7 +37,7 @@ from archfem.limit.vehicles import (
     vehicle_positions,
 )
 from archfem.masonry.loads import PointLoad
-from archfem.masonry.standing import parse_axles
+from archfem.masonry.standing import describe_axles, parse_axles
 from archfem.masonry.structure import (
     HasStructure,
     Structure,
@@ -235,15 +235,23 @@ class Rating(ResultDisplay):
         several = [" or ".join(cut) for cut in cuts if len(cut) > 1]
         return ", and ".join(filter(None, [" and ".join(single), *several]))
 
+    @property
+    def _ends(self) -> list[float]:
+        """Factors over all that is assumed of fill and stones, or this one [-]."""
+        full = [] if np.isnan(self.full_pressure) else [self.full_pressure]
+        assumed = [*self._list_states().values()] if full or self.crushing else []
+        return [self.factor, *assumed, *full]
+
+    @property
+    def least(self) -> float:
+        """Least factor over what is assumed, 0 where the bridge does not stand [-]."""
+        return float(np.nan_to_num(self._ends, posinf=np.inf).min())
+
     def say_range(self) -> str:
         """Return the least and the greatest factor over all that is assumed, in words."""
-        factors = [self.factor, *self._list_states().values()]
-        if not np.isnan(self.full_pressure):
-            factors += [self.full_pressure]
-        elif not self.crushing:
-            return ""
         subjects = [*["the fill"] * (self.fill is not None), *["the stones"] * bool(self.crushing)]
-        return f"the factor is {_say_ends(factors)} over what is assumed of {join_words(subjects)}"
+        words = f"the factor is {_say_ends(self._ends)} over what is assumed of "
+        return (words + join_words(subjects)) * (len(self._ends) > 1)
 
     def _rule_text(self) -> str:
         """Return the factor with the width by rule and the code's whole load, if it is known."""
@@ -294,20 +302,17 @@ class Rating(ResultDisplay):
         stand = [x for here in over.values() for x in here] or stand
         if not (spans and stand):
             return f"at x = {self.moving.position:.3g} m (the vehicle's middle)"
-        sense = 1.0 if self.moving.direction == "right" else -1.0
-        every = {float(self.moving.position + sense * ahead): load for load, ahead in axles}
-        others = _name_places(every.keys() - {*stand})
+        others = _name_places(self._axles_at.keys() - {*stand})
         only = [name.strip("'") for name in over] if over else list(spans)
         apart = _name_places([x - spans[only[0]][0] for x in stand])
         clear = f", {apart} m from the left clear springing" if len(only) == 1 else ""
         count = f"{len(stand)} axle{'s'[: len(stand) - 1]}"
         count += f" of {len(axles)}" if len(axles) > len(stand) else ""
-        loads = [f"{every[x] / kN:.4g}" for x in sorted(stand)]
+        loads = [f"{self._axles_at[x] / kN:.4g}" for x in sorted(stand)]
         count += f" ({join_words(loads)} kN)" * (len({*loads}) > 1 and len(loads) < 5)
-        ends = np.array([*spans.values()])
-        beside = over and not all(((x >= ends[:, 0]) & (x <= ends[:, 1])).any() for x in stand)
+        beside = over and not all(any(a <= x <= b for a, b in spans.values()) for x in stand)
         name = f" over {'or beside ' if beside else ''}{join_names(list(over))}" if over else ""
-        others = f" (the other{'s'[: len(every) - len(stand) - 1]} at {others} m)" if others else ""
+        others = f" (the other{'s'[: len(axles) - len(stand) - 1]} at {others} m)" if others else ""
         return f"with {count}{name} at x = {_name_places(stand)} m{clear}{others}"
 
     def __str__(self) -> str:
@@ -334,6 +339,7 @@ class Rating(ResultDisplay):
             *self.describe_backing(),
             f"least factor driving {', '.join(least)}",
             f"{self.moving}",
+            *describe_axles(self.structure, self._axles_at, self.width),
             *self._describe_hinges(),
             f"every x is that of the case and the picture; {describe_spans(self.structure)}",
             f"geometric factor of safety at that place{self._as_given}: {self._geometric_text()}",
@@ -444,6 +450,13 @@ class Rating(ResultDisplay):
             f"{name} {by}: factor {each.factor:.4g}, {each.outcome}" for by, each in codes.items()
         ]
 
+    @property
+    def _axles_at(self) -> dict[float, float]:
+        """Weight of each axle by its x at the worst place, from the front [N, m]."""
+        sense = 1.0 if self.moving.direction == "right" else -1.0
+        axles = parse_axles(self.vehicle.axles, self.vehicle.spacings).tolist()
+        return {self.moving.position + sense * ahead: load for load, ahead in axles}
+
     def _describe_hinges(self) -> list[str]:
         """Return the line on where the hinges of the worst place are, if there are some."""
         joints = self.structure.joints
@@ -462,14 +475,9 @@ class Rating(ResultDisplay):
         vehicle = self.vehicle
         if vehicle.impact_on == "all axles" or len(vehicle.axles) == 1:
             return ""
-        sense = 1.0 if self.moving.direction == "right" else -1.0
         live = [load for load in self.moving.worst.live if isinstance(load, PointLoad)]
         forces = {load.x: -load.force[1] for load in reversed(live)}  # axles are the first
-        shares = [
-            forces.get(self.moving.position + sense * ahead, 0.0) / weight
-            for weight, ahead in parse_axles(vehicle.axles, vehicle.spacings).tolist()
-        ]
-        worst = int(np.argmax(shares))
+        worst = int(np.argmax([forces.get(x, 0.0) / load for x, load in self._axles_at.items()]))
         return f" on the worst axle alone, here number {worst + 1} from the front"
 
     def _geometric_text(self) -> str:

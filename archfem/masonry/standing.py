@@ -8,8 +8,9 @@ its weight and its horizontal force go to the stones straight below each foot, w
 that force about the road.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from json import dumps
 from numbers import Real
 
 import numpy as np
@@ -214,6 +215,27 @@ def describe_widths(structure: Structure) -> str:
         if body.width and body.width < structure.width
     ]
     return "; ".join(words)
+
+
+def describe_axles(structure: Structure, axles: Mapping[float, float], width: float) -> list[str]:
+    """Return the line of a case with the axles that stand on a structure as those of a body.
+
+    The weight of each [N] is given by its x [m], on some width [m].
+    """
+    tops = [block.top for block in structure.blocks]
+    on = [axle for axle in sorted(axles.items()) if any(top(axle[0]) is not None for top in tops)]
+    if not on:
+        return []
+    x, loads = np.array(on).T
+    keys = {
+        "x": f"{0.5 * (x[0] + x[-1]):.6g} m",
+        "axles": [f"{load / kN:.6g} kN" for load in loads],
+        "spacings": [f"{gap:.6g} m" for gap in np.diff(x)],
+        "width": f"{width:.6g} m" if width < structure.width else "",
+    }
+    table = ", ".join(f"{key} = {dumps(value)}" for key, value in keys.items() if value)
+    begin = "there in [structure.standing], axles from left to right"
+    return [f"{begin} (add length and centre_of_gravity): vehicle = {{ {table} }}"]
 
 
 @validate_arguments

@@ -133,7 +133,7 @@ def state_each(hazard):
     found = SimpleNamespace(hazard=hazard, doubts=(), sentence="falls at 0.002 a year")
     found.rate = lambda: Rate(0.002, 0.001, 0.003)
     found.fragility = lambda: SimpleNamespace(median=6.0)
-    vehicle = answers.Row("rating", "LM1", place, "1.25", {"passes": True})
+    vehicle = answers.Row("rating", "LM1", place, "1.25", {"passes": True, "least": 1.25})
     doubts = [Doubt("a made one", "mend it")]
     factors = result_text.PushFactors(4.8, 4.8)
     turns = "it turns, at 4.8 times the load", doubts, "the given load", factors

@@ -1,5 +1,6 @@
 """Rating of bridges: against `collapse_factor`, by hand, and both ways over a symmetric bridge."""
 
+import tomllib
 from dataclasses import replace
 from functools import partial
 
@@ -85,6 +86,40 @@ def test_a_symmetric_bridge_has_one_rating_in_both_directions(lorry_rating):
     assert np.isfinite(right).sum() > 10
     np.testing.assert_allclose(right, left[::-1], rtol=EXACT)
     assert (right != right[::-1]).any()  # the lorry is not symmetric
+
+
+def test_the_worst_place_is_printed_as_a_standing_body_with_axles_from_left_to_right(lorry_rating):
+    """By hand both ways; axles beyond the bridge, from 0 to 9 m, are left out."""
+    moving, front, rear = lorry_rating.moving, 60e3, 115e3
+    (pressed,) = moving.worst.live  # at the worst place the lorry is half on it
+    long = Vehicle("long", (5e3, front, rear), (40.0, 3.2))
+    places = [
+        (lorry_rating.vehicle, moving.direction, moving.position, [(pressed.x, rear)]),
+        (lorry_rating.vehicle, "right", 4.0, [(2.4, rear), (5.6, front)]),
+        (lorry_rating.vehicle, "left", 4.0, [(2.4, front), (5.6, rear)]),
+        (long, "left", 4.0 - 20.0, [(2.4, front), (5.6, rear)]),
+    ]
+    for vehicle, direction, position, expected in places:
+        there = replace(moving, direction=direction, position=position)
+        text = str(replace(lorry_rating, vehicle=vehicle, moving=there))
+        (line,) = (each for each in text.splitlines() if "[structure.standing]" in each)
+        table = tomllib.loads(line.partition("): ")[2])["vehicle"]
+        given = {
+            key: np.array([float(text.split()[0]) for text in np.atleast_1d(value)])
+            for key, value in table.items()
+        }
+        body = af.masonry.StandingBody(
+            x=given["x"].item(),
+            axles=(1e3 * given["axles"]).tolist(),
+            spacings=[*given.get("spacings", ())],
+            width=given["width"].item(),
+            length=0.3,
+            centre_of_gravity=1.3,
+        )
+        feet = np.column_stack([body.feet.mean(axis=1), body.axles])
+        np.testing.assert_allclose(feet, expected, rtol=1e-5)
+        assert table["width"] == "2 m"
+    assert ", width = " not in str(replace(lorry_rating, width=3.0))
 
 
 def column_under_axle(width=1.0, overhang=1.0):
@@ -697,6 +732,10 @@ def test_a_verdict_says_which_parts_of_the_fill_it_rests_on(lorry_rating):
     least = replace(either, without_either=1.005, full_pressure=np.inf)
     assert least.outcome.startswith("passes if")
     assert "; the factor is 1.005 to inf over what is assumed of the fill" in least.outcome
+    assert least.least == 1.005
+    assert replace(least, without_pressure=np.nan).least == 0.0
+    alone = replace(least, full_pressure=np.nan)
+    assert alone.least == alone.factor
     none = replace(least, without_pressure=np.nan, full_pressure=7.5).outcome
     assert "; the factor is none to 7.5 over what is assumed of the fill" in none
     assert "over what is assumed" not in replace(least, full_pressure=np.nan).outcome
@@ -830,6 +869,7 @@ def test_factors_of_codes_are_stated_with_outcome_and_range(monkeypatch):
     stated += [(f"lorry {name}", x, x.short_outcome) for name, x in codes]
     stated = [(name, x, f"{words}; {x.say_range()}") for name, x, words in stated]
     assert f"{ends}{given.by_cs454['full_pressure']:.4g} over" in str(rows)
+    assert [row.numbers["least"] for row in rows] == sorted(x.least for _, x, _ in stated)
     assert [row[:4] for row in rows] == [
         ("rating", name, words, f"{x.factor:.4g}")
         for name, x, words in sorted(stated, key=lambda each: each[1].factor)

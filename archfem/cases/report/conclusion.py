@@ -1,5 +1,6 @@
 """Head and conclusion of a report: who signs what, outcome with margin and range."""
 
+import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -78,6 +79,12 @@ KINDS = "the earthquake", "the vehicle", "the given load"
 # Project in the templates of new cases
 PLACEHOLDER = "Name of the project"
 
+# Words of a rating by a norm, by what the norm is called
+_NORMS_OF_RATINGS = {
+    **dict.fromkeys(("EUROCODE", "EN199", "NTC"), "by Eurocodes|^LM(1|2|71)"),
+    **dict.fromkeys(("CS45", "BD21"), "by CS 454|^CS454"),
+}
+
 # What the factors of results are, as multiples of their demands
 _FACTORS = {
     "assessment": "a check is just passed",
@@ -147,14 +154,16 @@ def _rank_verdict(data: ReportData) -> tuple[int, dict[str, float]]:
     """Return the place of a case among others, the worst first, and its least factors by kind."""
     ranked = margins.rank_margins(data, rests=False)
     outcome = find_worst(data)[1] if data.runs else ""
-    rows = [row for each in data.statements.values() for row in each.rows]
-    rows = [row for row in rows if "passes" in row.numbers]
+    stated = data.statements.get("rating")
+    rows = stated.rows if stated else []
+    if data.case.report.get("norm"):  # decides, if it has a rating
+        rows = [row for row in rows if _is_of_norm(data, row.demand)] or rows
     loads = read_numbers(PushFactors, data.statements.get("limit"))
     factors = [load.least for load in loads if not load.site]
     fails = [x < 1.0 for x, is_ranked, _ in ranked if is_ranked] + [x < 1.0 for x in factors]
     fails += [least < 1.0 for least, *_ in margins.say_less(data)]
-    fails += [not row.numbers["passes"] for row in rows]
-    shaken, rated = (x for x, *_ in ranked), (float(x.factor) for x in rows if x.factor != "-")
+    fails += [x.numbers["least"] < 1.0 for x in rows]
+    shaken, rated = (x for x, *_ in ranked), (x.numbers["least"] for x in rows)
     every = zip(KINDS, (min(x, default=np.inf) for x in (shaken, rated, factors)), strict=True)
     undecided = outcome.startswith("may") or (bool(data.runs) and bool(_say_why_undecided(data)))
     places = outcome == "does not survive", any(fails), undecided, "damage" in outcome, True
@@ -220,22 +229,26 @@ def _say_pushes(data: ReportData, name: str, stated: Statement) -> Iterator[str]
 
 
 def _say_ratings(data: ReportData, stated: Statement) -> Iterator[str]:
-    """Yield the least rating by the norm of the report, the least of others, and unlike ones.
+    """Yield the least rating by the norm of the report, that without a code, and unlike ones.
 
-    Without a norm the least without a code comes first, and others only if they are unlike.
+    Each is the least over what is assumed. Without a norm that without a code comes first.
     """
     own = [row for row in stated.rows if _is_of_norm(data, row.demand)]
-    others = [row for row in stated.rows if row not in own]
-    has_norm = bool(data.case.report.get("norm"))
-    shown = [*own[:1], *others[: has_norm or not own]]
+    shown = [*(own or stated.rows)[:1]]
+    of = [re.split(" by | with ", row.demand)[0] for row in shown]
+    # the vehicle itself, whose place is known
+    shown += [row for row in stated.rows if row.demand in of and row not in shown]
     for row in shown:
-        needed = ", 1 is required" * (has_norm and row in own)
-        # the result has the place of the vehicle
+        needed = ", 1 is required" * (bool(data.case.report.get("norm")) and row in own)
         outcome, _, over = row.outcome.partition("; ")
-        outcome = outcome.partition(", with ")[0]
-        yield f"rating for {row.demand}: factor {row.factor}{needed}, {outcome}"
+        outcome, _, place = outcome.partition(", with ")
+        least = row.numbers["least"]
+        factor = format_ratio(least, 4) if least else "none"
+        yield f"rating for {row.demand}: factor {factor}{needed}, {outcome}"
         yield from [over] * bool(over)
-    left = [row for row in (*own, *others) if row not in shown]
+        # of its places the result has those from springings, and of other axles
+        yield from [f"worst with {re.split('(?<= m), ', place)[0]}"] * bool(place)
+    left = [row for row in stated.rows if row not in shown]
     passes, fails = ([x for x in left if x.numbers["passes"] is state] for state in (True, False))
     if any(x.numbers["passes"] for x in shown):
         passes = []  # one is enough
@@ -252,8 +265,7 @@ def _is_of_norm(data: ReportData, text: str) -> bool:
     norm = data.case.report.get("norm", "").upper().replace(" ", "")
     if not norm:
         return not any(words in text for words in (" by Eurocodes", " by CS 454", "from memory"))
-    codes = {"EUROCODE": "by Eurocodes", "EN199": "by Eurocodes", "CS454": "by CS 454"}
-    return any(key in norm and words in text for key, words in codes.items())
+    return any(x in norm and re.search(words, text) for x, words in _NORMS_OF_RATINGS.items())
 
 
 def _say_survival(
