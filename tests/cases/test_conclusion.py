@@ -770,7 +770,7 @@ def test_cases_are_ranked_by_the_kind_of_their_demand(case, fails):
     site = {"site": "the site's acceleration"}
     rows = {
         "hill": answers.Row("limit", "", "", "3", PushFactors(3.0, 3.1, **site)._asdict()),
-        "road": answers.Row("rating", "LM1", "", "4", {"passes": not fails}),
+        "road": answers.Row("rating", "LM1", "", "4", {"passes": not fails, "least": 4.0}),
         "vale": answers.Row("limit", "", "", "2", PushFactors(2.0, 2.5, **site)._asdict()),
     }
     parts = {name: ReportData(case, {}) for name in rows}
@@ -1043,7 +1043,7 @@ def test_a_rating_is_stated_by_the_norm_of_the_report_alone(case, norm, first):
     needed = ", 1 is required" * bool(norm)
     least = 0.9 * float(codes[first])
     assert verdict == f"Rating for lorry {first}: factor {least:.4g}{needed}, passes."
-    assert conclusion._rank_verdict(data)[1] == pytest.approx(least)
+    assert conclusion._rank_verdict(data)[1] == {"the vehicle": pytest.approx(least)}
     pieces = conclusion.build_conclusion(data).pieces
     assert pieces[0].text.startswith(f"Lorry {first[:12]}")
     (table,) = (piece for piece in pieces if getattr(piece, "caption", "").startswith("Demand"))
@@ -1092,7 +1092,7 @@ def test_the_factor_without_a_code_and_its_place_stand_beside_that_of_the_norm(
     bare += "The factor is 3 to 4.635 over what is assumed of the fill. "
     bare += "Worst with 2 axles of 3 at x = 11.39 and 12.69 m."
     assert head_of(conclusion.list_facts(data)) == first * bool(norm) + bare
-    assert conclusion._rank_verdict(data)[1] == margin
+    assert conclusion._rank_verdict(data)[1] == {"the vehicle": margin}
 
 
 @pytest.mark.parametrize(

@@ -136,7 +136,7 @@ SHAPES = [each for each in vars(af.shapes).values() if callable(each)]
 
 @pytest.mark.parametrize("shape", SHAPES, ids=lambda shape: shape.__name__)
 def test_no_length_or_angle_of_a_shape_is_without_its_unit(shape):
-    assert len(SHAPES) == 17
+    assert len(SHAPES) == 18
     kinds = declared_keys(shape, named=(af.Material, af.Contact))
     assert [key for key, kind in kinds.items() if "'1'" in repr([kind])] == []
 
