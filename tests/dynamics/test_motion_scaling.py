@@ -657,7 +657,7 @@ def test_a_margin_rests_on_finished_steps():
     for each, held in ((found, 0.7), (CollapseScale({0.005: whole}), 1.25)):
         stated = answers.Statement.read(answers.state_scale(each, motion, [])["scale.json"])
         assert answers.read_numbers(answers.Scales, stated)[0].held == held
-        assert stated.rows[0].factor == f"{held:#.3g}"
+        assert stated.rows[0].factor == f"{held:#.3g}{' so far' * (each is found)}"
     (doubt,) = found.doubts
     words = "by 2.5 ms: the search was interrupted after 2 runs; the same command continues it"
     assert str(doubt) == words
