@@ -806,13 +806,21 @@ def test_a_stack_as_broad_as_another_case_is_wide_is_its_plane_across(case, brea
     assert facts["cases"] == "A: stack (None); B: stack (None)"
     said = f"{facts['verdict']} {facts.get('A', facts.get('B'))}"
     assert ("it was not checked" in said) is not across
-    assert (said.count("Across its plane: ") == 2) is across
+    # each stands once, the wall across no other
+    assert (said.count("Across its plane: B.") == said.count("its plane: ") - 1 == 1) is across
+    assert ("In its plane: A." in said) is across
     (block,) = margins.build_transverse(parts["A"])
     assert (block.text == "It is that of case B.") is across
     assert ("across the plane" in str(margins.rank_margins(parts["A"]))) is not across
     assert (margins.find_unchecked_push(parts["A"]) is None) is across
     still = ReportData(cases[1].case, {})  # one without results checks nothing
-    assert label_parts([cases[0], still])["A"].across_in == ""
+    assert label_parts([cases[0], still])["A"].other_plane is None
+    several = label_parts([cases[1], cases[1], cases[0]])
+    (block,) = margins.build_transverse(several["C"])
+    leads = [margins.build_transverse(several[label])[0].lead for label in "AB"]
+    if across:
+        assert (block.lead, block.text) == ("Across its plane?", "It is that of cases A and B.")
+        assert leads == ["In its plane?"] * 2
 
 
 def test_of_unequal_outcomes_the_worst_is_the_first(case):

@@ -196,7 +196,7 @@ def _say_plainly(data: ReportData, doubtful: Sequence[str]) -> Iterator[tuple[st
                 yield answer, f"{row.result}: {row.outcome}{times * (name != 'risk')}"
     yield from ((answer if fails else margin, x) for fails, x in less if fails or not data.runs)
     yield from [] if data.runs and overturns else ((left, x) for x in unchecked)
-    yield from [(answer, f"across its plane: {data.across_in}")] * bool(data.across_in)
+    yield from [(answer, ": ".join(data.other_plane))] if data.other_plane else []
 
 
 def _say_unchecked(data: ReportData) -> tuple[list[str], bool]:

@@ -34,7 +34,7 @@ def find_unchecked_push(data: ReportData) -> tuple[float, float] | None:
 
     The push is NaN where it is unknown, as of a single stack [g].
     """
-    if data.across[0] or data.across_in or not _leaves_plane_across(data):
+    if data.across[0] or data.other_plane or not _leaves_plane_across(data):
         return None
     return data.transverse_push, find_demand(data)
 
@@ -102,8 +102,10 @@ def build_transverse(data: ReportData) -> list[TextBlock]:
     """Build the paragraph on what is not checked across the plane, for results of earthquakes."""
     if not _leaves_plane_across(data):
         return []
-    if data.across_in:
-        return [TextBlock(f"It is that of case {data.across_in}.", lead="Across its plane?")]
+    if data.other_plane:
+        plane, labels = data.other_plane
+        cases = f"case{'s' * (' and ' in labels)} {labels}"
+        return [TextBlock(f"It is that of {cases}.", lead=f"{plane.capitalize()}?")]
     text = describe_transverse_push(data.case.structure)
     push, demand = data.transverse_push, find_demand(data)
     if push < demand:

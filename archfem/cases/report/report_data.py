@@ -31,7 +31,7 @@ from archfem.dynamics.verdict_range import VerdictRange
 from archfem.dynamics.walls_across import find_falls_across
 from archfem.errors import ArchfemError
 from archfem.masonry.out_of_plane import find_transverse_push
-from archfem.masonry.structure import join_names
+from archfem.masonry.structure import join_names, join_words
 from archfem.models.builder import build
 from archfem.models.discretisation import Discretisation
 from archfem.models.model import Model
@@ -58,7 +58,8 @@ class ReportData:
     missing: tuple[str, ...] = ()  # names of the pairs of the suite without a run
     study_folders: Sequence[Path] = ()  # without any, that of the results, which may have one
     label: str = ""  # in a report of several cases, with inputs and signatures of all
-    across_in: str = ""  # label of the case that has the plane across this one
+    # of several cases, those of a wall across its plane, or in its plane of a stack that is across
+    other_plane: tuple[str, str] | None = None  # which plane they are of, and their labels
 
     @cached_property
     def studies(self) -> list[StudyFindings]:
@@ -233,14 +234,19 @@ def label_parts(cases: Sequence[ReportData]) -> dict[str, ReportData]:
     """Label cases A, B and so on; a stack as broad as another case is wide is the plane across."""
     labels = [chr(ord("A") + k % 26) * (k // 26 + 1) for k in range(len(cases))]
     parts = {label: replace(x, label=label) for label, x in zip(labels, cases, strict=True)}
+    across: dict[str, list[str]] = {}  # stacks of each wall
     for label, stack in parts.items():
         ends = np.concatenate([x.points[:, 0] for x in stack.case.structure.blocks if not x.fixed])
         for other, each in parts.items():
             broad = np.isclose(np.ptp(ends), each.case.structure.width, rtol=0.01)
             alone = np.isnan(stack.transverse_push) > np.isnan(each.transverse_push)
-            if broad and alone and stack.is_shaken:
-                parts[label] = replace(parts[label], across_in=other)
-                parts[other] = replace(parts[other], across_in=label)
+            if broad and alone and stack.is_shaken and each.is_shaken:
+                across.setdefault(other, []).append(label)
+    for label, part in parts.items():
+        walls = [wall for wall, stacks in across.items() if label in stacks]
+        plane, found = ("in", walls) if walls else ("across", across.get(label, []))
+        if found:
+            parts[label] = replace(part, other_plane=(f"{plane} its plane", join_words(found)))
     return parts
 
 
