@@ -249,7 +249,8 @@ def test_the_margin_of_scales_ends_where_it_is_dislocated(case):
     ]
     small = scales("a", 0.5, mechanism=0.55)
     assert say_margin(data, scale=state("scale", small))[:2] == [
-        "the least margin is 0.500 on 'a', at a PGA of 0.1 g, which it fails, under one motion",
+        "the least margin is 0.500 on 'a', at a PGA of 0.1 g, beyond which it fails, under one "
+        "motion",
         "of the scales that were run it first forms a mechanism at 0.550 ×",
     ]
     assert say_margin(data, scale=state("scale", scales("a", 1.5)))[1] == (
@@ -260,7 +261,7 @@ def test_the_margin_of_scales_ends_where_it_is_dislocated(case):
         "of the scales that were run it first falls at 1.50 ×; it stands again at some scales "
         "from 1.60 to 2.00 ×"
     )
-    for least, fails in ((1.3, ""), (0.9, ", which it fails")):
+    for least, fails in ((1.3, ""), (0.9, ", beyond which it fails")):
         begun = scales("a", 0.7, unfinished=True, moves=0.5, falls=least)
         assert say_margin(data, scale=state("scale", begun))[0] == (
             "the least margin is 0.700 so far (search unfinished) on 'a', at a PGA of 0.14 g"
@@ -313,6 +314,24 @@ def test_a_first_fall_has_scale_peak_and_motion_of_one_search(case):
     (words,) = find_first_failures(data)
     over = "(0.903 to 0.912 g over motions and time steps)"
     assert words == f"first falls at 0.903 g, 4.56 × 'third' {over}"  # 4.56 × 0.198 g
+
+
+def test_the_range_of_a_first_fall_has_no_motion_that_was_not_searched(case):
+    """The third falls as given, and may at any less."""
+    data = data_of(case, a=verdict_of(), b=verdict_of(), c=verdict_of("fallen"))
+    searched = scales("a", 0.4, falls=0.41, all_steps=0.44), scales("b", 0.6, falls=0.7)
+    vars(data)["statements"] = {"scale": state("scale", *searched)}
+    (words,) = find_first_failures(data)
+    assert words == (
+        "first falls at 0.082 g at most, 0.410 × 'a' (0.410 to 0.700 ×, 0.082 to 0.14 g over "
+        "motions and time steps); 2 of 3 motions were scaled"
+    )
+    vars(data)["statements"] = {"scale": state("scale", *searched, scales("c", 0.8, falls=0.9))}
+    (words,) = find_first_failures(data)
+    assert words == (
+        "first falls at 0.082 g, 0.410 × 'a' (0.410 to 0.900 ×, 0.082 to 0.18 g over motions and "
+        "time steps)"
+    )
 
 
 def test_the_margin_said_first_is_the_least_of_the_report(case):
@@ -395,9 +414,10 @@ def test_what_fails_under_a_motion_that_was_not_scaled_has_a_margin_below_one(ca
     plain = head_of(conclusion.list_facts(data))
     assert plain.startswith("It survives with damage: it is dislocated but stands under 1 of 3 mot")
     # 2 m/s² are 0.204 g
-    said = "It is first dislocated at 0.204 g, 1.00 × 'b' (or less, 1.00 to 2.00 ×, 0.204 to 0.4 g "
-    said += "over motions and time steps). It first falls at 0.8 g, 4.00 × 'a'; 1 of 3 motions was "
-    said += "scaled."
+    said = (
+        "It is first dislocated at 0.204 g at most, 1.00 × 'b'. It first falls at 0.8 g at most, "
+    )
+    said += "4.00 × 'a'; 1 of 3 motions was scaled."
     assert said in plain
 
 
@@ -415,7 +435,9 @@ def test_the_stones_that_are_dislocated_stand_in_no_sentence_of_the_conclusion(c
     }
     plain = head_of(conclusion.list_facts(data))
     assert "it is dislocated but stands under 1 of 2 motions of PGA 0.20 g: b. It" in plain
-    assert "It is first dislocated at 0.19 g, 0.950 × 'a' (" in plain  # 0.95 × 0.2 g
+    # 0.95 × 0.2 g, of a range of one searched motion
+    first = "It is first dislocated at 0.19 g at most, 0.950 × 'a'; 1 of 2 motions was scaled."
+    assert first in plain
     assert "Under 'a' it stands at 1.00 ×, but is dislocated at 0.950 ×: not" in plain
     assert "loses" not in conclusion.build_conclusion(data).pieces[0].text
 
@@ -455,7 +477,7 @@ def test_a_motion_that_fells_it_at_a_smaller_scale_is_not_robust(case):
 def test_the_margin_of_a_stack_is_the_lesser_of_courses_and_of_one_body(case):
     """Under 'b' courses stand to less than under 'a', but one body falls under 'a' before."""
     found = scales("b", 1.3, falls=1.35, as_one=1.5), scales("a", 1.4, falls=1.5)
-    for at, fails in ((0.677, ", which it fails"), (1.05, "")):
+    for at, fails in ((0.677, ", beyond which it fails"), (1.05, "")):
         one = scales("a", 1.4, falls=1.5, as_one=at)
         assert say_margin(data_of(case), scale=state("scale", found[0], one))[:2] == [
             f"the least margin is below {at:#.3g} as one rigid body (1.40 in courses) on 'a', at a "

@@ -61,18 +61,20 @@ def find_first_failures(data: ReportData) -> Iterator[str]:
         # a dislocation beyond a fall says nothing
         if not first or min(first)[0] >= least:
             continue
-        every = [(scale, scale * pga, name) for scale, pga, name in first]
-        least, peak, name = min(every)  # all three of one motion
-        steps = [(x.all_steps, x) for x in searches if state == "falls"]
-        every += [(scale, scale * x.pga, x.motion) for scale, x in steps if scale]
-        ends = [f"{Ends.of(x[0] for x in every):#.3g} ×", f"{Ends.of(x[1] for x in every):.3g} g"]
-        over = " and ".join(["motions"] * several + ["time steps"])
-        wide = ", ".join(x for x in ends if " to " in x)
-        notes = ["or less"] * (name in unscaled) + [f"{wide} over {over}"] * bool(wide)
+        least, peak, name = min((scale, scale * pga, name) for scale, pga, name in first)
+        every = [(scale, scale * pga) for scale, pga, motion in first if motion not in unscaled]
+        steps = [(x.all_steps, x.pga) for x in searches if state == "falls"]
+        every += [(scale, scale * pga) for scale, pga in steps if scale]
+        wide, over = "", " and ".join(["motions"] * (len(searches) > 1) + ["time steps"])
+        if name not in unscaled:  # the least is of those that were searched
+            ends = Ends.of(x for x, _ in every), Ends.of(x for _, x in every)
+            wide = ", ".join(x for x in (f"{ends[0]:#.3g} ×", f"{ends[1]:.3g} g") if " to " in x)
         motion = f"'{name}'" if several or count > 1 else "the motion"
-        beside = f" ({', '.join(notes)})" * bool(notes)
+        beside = f" ({wide} over {over})" * bool(wide)
         does = _STATES[state][1].replace("first ", "" if unfinished else "first ")
-        yield f"{does} at {peak:.3g} g, {least:#.3g} × {motion}{beside}{some}"
+        # one that was not searched may fail at less
+        most = " at most" * (len(searches) < count)
+        yield f"{does} at {peak:.3g} g{most}, {least:#.3g} × {motion}{beside}{some}"
         some = ""  # once
 
 
@@ -111,7 +113,7 @@ def describe_scales(data: ReportData) -> Iterator[tuple[float, list[str]]]:
         met = min(met, _bound(first))
         words = f"below {_bound(first):#.3g} as one rigid body ({words} in courses)"
     words += f" on '{first.motion}', at a PGA of {_bound(first) * first.pga:.3g} g"
-    words += ", which it fails" * (met <= 1.0)
+    words += ", beyond which it fails" * (met <= 1.0)
     words += f", of {len(made)} motions" if made[1:] else ", under one motion"
     states = join_words([*_say_first_states(searches, first.motion)])
     first_at = f"of the scales that were run it first {states}"
