@@ -13,7 +13,7 @@ from archfem.cases.toml_file import Table, format_key
 from archfem.limit.instability import describe_friction, describe_geometric_factor, least_friction
 from archfem.masonry.joint_closing import finish_range
 from archfem.masonry.materials import Contact, Material
-from archfem.masonry.structure import Structure, join_names
+from archfem.masonry.structure import Structure, join_names, join_words
 from archfem.units import GPa, MPa, kN, kPa, mm
 
 HINGE_REASON = "8 % short of the edge, as in Demirel and Aldemir (2021)"
@@ -263,6 +263,14 @@ def _has_default_vertical(case: Case) -> bool:
     )
 
 
+def say_loads_left_out(case: Case) -> str:
+    """Say which loads that stay what is found at rest leaves out; "" if the case has none."""
+    attached = [load for load in case.assessment.options.get("loads", ()) if not load.passive]
+    loads = {"[assessment]": attached, "limit.dead": case.limit.dead}
+    named = join_words([section for section, own in loads.items() if own])
+    return f", without the loads of {named}" if named else ""
+
+
 def describe_margins_at_rest(case: Case, structure: Structure) -> list[str]:
     """Describe from which friction and depth of joints it stands, with a note on friction."""
     contacts = {joint.contact for joint in structure.joints}
@@ -270,11 +278,11 @@ def describe_margins_at_rest(case: Case, structure: Structure) -> list[str]:
     high = [f"{NOTE_MARK}a coefficient of friction is {most:g}, and {_OF_DRY}"] * (most > 1.0)
     if not (sentence := describe_friction(structure)):
         return high
-    least = least_friction(structure) or 0.0
+    least, left_out = least_friction(structure) or 0.0, say_loads_left_out(case)
     open_ones = [each.name for each in contacts if "friction" in list_default_keys(case, each)]
     lines = [
-        f"as rigid blocks {sentence}",
-        describe_geometric_factor(structure, case.limit.strength),
+        f"as rigid blocks {sentence}{left_out}",
+        f"{describe_geometric_factor(structure, case.limit.strength)}{left_out}",
         *high,
     ]
     if open_ones and least > DRY_FRICTION[0]:

@@ -10,7 +10,7 @@ from scipy.sparse.csgraph import connected_components
 
 from archfem.cases.answers import RESULTS, Row
 from archfem.cases.case import Case
-from archfem.cases.defaults import describe_margins_at_rest
+from archfem.cases.defaults import describe_margins_at_rest, say_loads_left_out
 from archfem.errors import InvalidInput
 from archfem.limit.collapse import describe_crushing
 from archfem.limit.instability import explain_instability, geometric_factor
@@ -130,12 +130,13 @@ def describe_thickness(case: Case, ring: Ring) -> tuple[list[Row], list[str]]:
         f"geometric factor of safety of the ring: {factor:.3g}; "
         f"{describe_crushing(limit.strength, case.structure)}",
     ]
-    rows = [Row(RESULTS["thickness"], "at rest", words, f"{factor:.4g}", {"most": factor})]
+    at_rest = f"at rest{say_loads_left_out(case)}"
+    rows = [Row(RESULTS["thickness"], at_rest, words, f"{factor:.4g}", {"most": factor})]
     whole = geometric_factor(case.structure, limit.strength)
     if len(ring.stones) < len(case.structure.free) and whole:
         depth = f"{1.0 / whole:.3g} of what is built"
         rows.append(
-            Row("least depth of all joints", "at rest", depth, f"{whole:.4g}", {"most": whole})
+            Row("least depth of all joints", at_rest, depth, f"{whole:.4g}", {"most": whole})
         )
     if limit.friction is not None:
         with suppress(InvalidInput):  # without sliding it may stand at any thickness

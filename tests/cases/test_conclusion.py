@@ -387,6 +387,10 @@ def test_a_margin_at_rest_is_said_first_where_it_is_the_least():
     assert margins.rank_margins(data)[0][0] == np.inf  # on no demand
     factor, of = alone.split(" at rest, ")
     assert of == "of the depth of its joints"
+    crown = {"block": 21, "point": [*data.case.structure.centroids[21]], "weight": "1 kN"}
+    loaded = ring(structure=structure, assessment={**SPECTRUM, "loads": [crown]})
+    (said,) = say_margin(ReportData(loaded, {}))
+    assert said == f"{alone}, without the loads of [assessment]"
     assert float(factor) == pytest.approx(0.36 / 3.0 / 0.1075, rel=0.02)
     for ratio, least in ((1.3, True), (1.05, False)):
         check = state("assessment", answers.Ratios("linear, q = 2", ["right"], ratio, ratio))

@@ -256,6 +256,31 @@ def test_a_friction_of_more_than_dry_stone_has_is_noted(friction):
     assert (note in lines) == any("dry stone" in each for each in lines) == (friction == 6.0)
 
 
+@pytest.mark.parametrize(
+    ("tables", "left_out"),
+    [
+        ({}, ""),
+        ({"assessment": {"passive": True}}, ""),  # a tie, which other results name
+        ({"assessment": {}}, ", without the loads of [assessment]"),
+        ({"assessment": {}, "limit": {}}, ", without the loads of [assessment] and limit.dead"),
+    ],
+)
+def test_lines_on_what_is_at_rest_say_which_loads_they_leave_out(tables, left_out):
+    """A constant thrust of 1 kN at the top of two stones of 14.4 kN each, which alone have none."""
+    thrust = {"force": ["1 kN", "0 kN"], "point": ["0 m", "2.4 m"], "block": "block 2"}
+    given = {name: {"loads": [thrust | own]} for name, own in tables.items()}
+    if "limit" in given:
+        given["limit"] = {"horizontal": 1.0, "dead": [{"x": "0 m", "force": ["1 kN", "0 kN"]}]}
+    case = af.Case.of({**BARE, "model": {"fidelity": "rigid"}, **given})
+    friction, depth = describe_margins_at_rest(case, case.structure)
+    assert (
+        friction
+        == f"as rigid blocks it stands from a coefficient of friction of 0.05 or less{left_out}"
+    )
+    assert depth.startswith("geometric factor of safety at rest: 20 or more")
+    assert depth.endswith(f"under the same weight{left_out}")
+
+
 def test_courses_of_other_weights_state_equal_defaults_once(tmp_path):
     """A wall of courses 4, 3 and 2 m long across its plane: three materials of one stone."""
     blocks = [af.Block(((0, -1), (4, -1), (4, 0), (0, 0)), af.STONE, "ground", fixed=True)]

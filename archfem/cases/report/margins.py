@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from archfem.cases.answers import Ratios, compare_checks, read_numbers
+from archfem.cases.defaults import say_loads_left_out
 from archfem.cases.report.demands import find_demand, name_spectrum
 from archfem.cases.report.doubts import list_checks, object_to_motions, peak_of_ground
 from archfem.cases.report.outcomes import find_worst, sentence
@@ -139,7 +140,8 @@ def rank_margins(data: ReportData, *, rests: bool = True) -> list[tuple[float, b
     for factor, of in sorted(at_rest)[:1]:
         if factor < least:  # alone it has no rank
             ranked = (factor, True) if least < np.inf else (np.inf, False)
-            margins.insert(0, (*ranked, [f"{format_ratio(factor)} at rest, of {of}"]))
+            left_out = say_loads_left_out(data.case)
+            margins.insert(0, (*ranked, [f"{format_ratio(factor)} at rest, of {of}{left_out}"]))
     push, demand = find_unchecked_push(data) or (np.nan, 0.0)
     if margins and push < demand * margins[0][0]:
         across = f"{push / demand:.3g} across the plane of the drawing, which was not checked"
