@@ -1676,3 +1676,25 @@ def test_a_pier_beside_a_door_rocks_first_across_the_plane():
     arm = (3.0 * 1.5 + 0.5 * 2.5) / 3.5
     assert found["pier"][0].rocks == pytest.approx(0.25 / arm * 9.81 / motion.pga, rel=5e-3)
     assert "under 'a' the pier falls" in describe_falls_across(found, {"a": motion})
+
+
+def test_titles_and_names_of_studies_hold_any_character(case, tmp_path, undrawn):
+    """A stack 2 m high begins to move at half its breadth [g]; clauses end at other semicolons."""
+    (tmp_path / "case.toml").write_text(
+        format_tables({**case.settings, "limit": {"horizontal": 1}})
+    )
+    study, folder = tmp_path / "study.toml", tmp_path / "out"
+    study.write_text(
+        'title = "Measures: one; two; three, or more: all"\ncase = "case.toml"\n'
+        'compute = "limit"\n[cases]\n"as: given" = {}\n'
+        '"wide; thick" = { set = ["structure.breadth=0.7"] }\n'
+    )
+    command = ["study", str(study), "--out", str(folder), "--workers", "1"]
+    assert af.commands.main(command) == 0
+    data = data_of(af.Case.read(tmp_path / "case.toml"), a=verdict_of())
+    vars(data)["study_folders"] = [folder]
+    depends = dict(conclusion.list_facts(data))["depends on"].replace("\N{NO-BREAK SPACE}", " ")
+    assert depends == (
+        "In the study 'Measures: one; two; three, or more: all' none lowers the push of "
+        "'as: given', 0.25 g. 'wide; thick' raises the push most, to 0.35 g."
+    )

@@ -162,6 +162,14 @@ def test_one_sentence_says_what_changes_the_answer(falls, words):
     assert [*study_findings.say_what_changes(study(falls, 9))] == [words]
 
 
+def test_of_a_case_that_falls_the_study_says_with_which_others_it_stands():
+    for cases, words in ((2, "'case 1'"), (3, "each of 'case 1', 'case 2'")):
+        *_, said = study_findings.say_what_changes(study([0], cases))
+        assert said == f"it stands with {words}"
+    for states in ({"falls": [0], "dislocated": [1]}, {"falls": [1]}):  # none, and no fall
+        assert "stands" not in str([*study_findings.say_what_changes(study(cases=2, **states))])
+
+
 @pytest.mark.parametrize(
     ("states", "words"),
     [
@@ -242,17 +250,24 @@ def test_a_row_has_the_largest_of_each_column_and_noise_is_no_finding():
 def test_of_factors_the_least_is_the_worst():
     table = xr.Dataset({"factor": ("case", [0.6, 0.7, np.inf, 0.5])}, {"case": [*"abcd"]})
     (text,) = study_findings.say_what_changes(study_findings.collect_findings("", "", table))
-    assert text == "in the study 'd' lowers the factor most, from 0.6 of 'a' to 0.5"
+    raised = "'b' raises the factor most, to 0.7"
+    assert text == f"in the study 'd' lowers the factor most, from 0.6 of 'a' to 0.5; {raised}"
     higher = table.isel(case=[0, 1])
     (text,) = study_findings.say_what_changes(study_findings.collect_findings("", "", higher))
-    assert text == "in the study none lowers the factor of 'a', 0.6"
+    assert text == f"in the study none lowers the factor of 'a', 0.6; {raised}"
+    (text,) = study_findings.say_what_changes(study_findings.collect_findings("", "", 1.0 / higher))
+    assert text == "in the study 'b' lowers the factor most, from 1.67 of 'a' to 1.43"
+    near = table.assign(factor=0.6 * table["factor"] ** 0 + [0.0, 0.1, 0.0, -0.01])
+    (text,) = study_findings.say_what_changes(study_findings.collect_findings("", "", near))
+    assert text == f"in the study {raised}"
     pushed = table.assign(
         push=("case", [0.25, 0.3, 0.4, 0.2], {"units": "g"}),
         least_push_over_site=("case", [1.16, 1.4, 1.9, 0.926]),
     )
     found = study_findings.collect_findings("", "", pushed)
     assert [*study_findings.say_what_changes(found)] == [
-        "in the study 'd' lowers the push most, from 0.25 g of 'a' to 0.2 g"
+        "in the study 'd' lowers the push most, from 0.25 g of 'a' to 0.2 g; 'c' raises the push "
+        "most, to 0.4 g"
     ]
     assert [*study_findings.say_below_site(found)] == [
         "1 of 4 cases begins to move below the site's acceleration: 'd', at 0.926 of it",

@@ -123,6 +123,6 @@ def list_lost(structure: Structure, names: Sequence[str], max_names: int = 4) ->
 def sentence(text: str) -> str:
     """Return a text with a capital and a full stop; clauses of a long one are sentences."""
     text, clause = text.strip(), text.partition("; ")[0]
-    if len(text.split()) > MAX_WORDS and clause != text and ":" not in clause:  # no list
+    if len(text.split()) > MAX_WORDS and clause != text and ": " not in clause:  # no list
         return " ".join(map(sentence, text.split("; ")))
     return text[:1].upper() + text[1:] + ("" if text.endswith((".", "?")) else ".")

@@ -73,7 +73,7 @@ class StudyFindings:
     # DataFrame of the cases in the order of the study; `falls`, `dislocated` and `failed` of `runs`
     worst: Any
     folder: Path = Path()
-    name: str = "the study"  # with its title in a report
+    name: str = "the study"  # with its title in a report, as `_keep_whole` returns it
     is_own: bool = True  # whether one of its cases, or their base, has the report's structure
 
     @cached_property
@@ -138,8 +138,13 @@ class StudyFindings:
     def label(self, row: Any) -> str:
         """Return the name of the case of a row."""
         if self.keys == ("case",):
-            return f"'{row['case']}'"
+            return f"'{_keep_whole(row['case'])}'"
         return ", ".join(f"{key.replace('_', ' ')} = {_format(row[key])}" for key in self.keys)
+
+
+def _keep_whole(name: str) -> str:
+    """Return a name with unbreakable spaces behind colons and semicolons, which end no clause."""
+    return re.sub(r"([:;]) ", "\\1\N{NO-BREAK SPACE}", str(name))
 
 
 def _merge_cases(doubts: Sequence[Doubt]) -> Doubt:
@@ -164,7 +169,7 @@ def read_study(place: Path, structure: Collection[str]) -> StudyFindings:
     # the plan is rewritten before its table
     fits = listed is not None and listed.inputs == hash_json(kept.get("points"))
     is_own = fits and not {*structure}.isdisjoint(kept.get("structures", ()))
-    return replace(found, folder=place, name=f"the study '{title}'", is_own=is_own)
+    return replace(found, folder=place, name=f"the study '{_keep_whole(title)}'", is_own=is_own)
 
 
 def collect_findings(title: str, text: str, table: xr.Dataset) -> StudyFindings:
@@ -277,11 +282,14 @@ def say_what_changes(found: StudyFindings) -> Iterator[str]:
         elif count == "falls" and any(row.get("fall") for row in rows):
             counted.append(f"none of {len(rows)} cases falls")
     then = ", and " if len(others) == len(rows) else "; of the others "
-    others = [row for row in others if np.isfinite(row[name])]
-    compared = _compare_cases(found, others, rows[0]) if len(others) > 1 else ""
+    known = [row for row in others if np.isfinite(row[name])]
+    compared = _compare_cases(found, known, rows[0]) if len(known) > 1 else ""
     if counted or compared:
         said = then.join(filter(None, ["; ".join(counted), compared]))
         yield f"in {found.name}{found.under} {said}"
+    if found.keys == ("case",) and rows[0]["falls"] and others:
+        each = "each of " * (len(others) > 1)
+        yield f"it stands with {each}{list_first([*map(found.label, others)], MAX_NAMES)}"
 
 
 def say_below_site(found: StudyFindings) -> Iterator[str]:
@@ -332,7 +340,10 @@ def _look_beside(found: StudyFindings, rows: list[Any], row: Any) -> tuple[list[
 
 
 def _compare_cases(found: StudyFindings, rows: list[Any], given: Any) -> str:
-    """Say which of some cases changes the finding that decides most; "" if none does by much."""
+    """Say which of some cases changes the finding that decides most; "" if none does by much.
+
+    Of factors both the least and the largest are said.
+    """
     name, first = found.decides, rows[0]
     least, words = name in _FACTORS, name.replace("_", " ")
     extreme = (min if least else max)(rows, key=lambda row: row[name])
@@ -352,15 +363,19 @@ def _compare_cases(found: StudyFindings, rows: list[Any], given: Any) -> str:
             place += f"; neighbours differ by up to {step:.0%}: take smaller steps there"
         return f"the {words} is {end}, {show(extreme)}, at {place}"
     verb = "lowers" if least else "raises"
+    changes = list[str]()
     if extreme is first:
-        return f"none {verb} the {words} of {found.label(first)}, {show(first)}"
-    if abs(extreme[name] - first[name]) < MIN_CHANGE * abs(first[name]):
-        return ""
-    change = f"from {show(first)} of {found.label(first)} to {show(extreme)}"
-    nearest = json.loads(found.table.attrs.get("nearest", "{}")).get(extreme["case"])
-    near = [row for row in rows[1:] if row["case"] == nearest]
-    change += "".join(f"; {found.label(x)}, which differs least from it, {show(x)}" for x in near)
-    return f"{found.label(extreme)} {verb} the {words} most, {change}"
+        changes.append(f"none {verb} the {words} of {found.label(first)}, {show(first)}")
+    elif abs(extreme[name] - first[name]) >= MIN_CHANGE * abs(first[name]):
+        change = f"from {show(first)} of {found.label(first)} to {show(extreme)}"
+        changes.append(f"{found.label(extreme)} {verb} the {words} most, {change}")
+        nearest = json.loads(found.table.attrs.get("nearest", "{}")).get(extreme["case"])
+        near = [row for row in rows[1:] if row["case"] == nearest]
+        changes += [f"{found.label(x)}, which differs least from it, {show(x)}" for x in near]
+    largest = max(rows, key=lambda row: row[name])
+    if least and largest[name] - first[name] >= MIN_CHANGE * abs(first[name]):
+        changes.append(f"{found.label(largest)} raises the {words} most, to {show(largest)}")
+    return "; ".join(changes)
 
 
 def list_studied(found: StudyFindings) -> set[str]:
