@@ -4,7 +4,7 @@ Numbers are SI (angles in degrees), or quantities with a unit such as "1.48 MPa/
 a wrong unit or an impossible geometry is an error that names the key and the remedy.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from copy import deepcopy
 from dataclasses import dataclass, field, replace
@@ -24,7 +24,7 @@ from archfem.cases.analysis_tables import (
     write_analysis_tables,
 )
 from archfem.cases.risk_keys import RISK_KEYS, RiskSettings, parse_risk
-from archfem.cases.structure_keys import cached_structure, write_structure
+from archfem.cases.structure_keys import cached_structure, shape_keys, write_structure
 from archfem.cases.verdict_keys import VERDICT_KEYS, parse_verdict
 from archfem.dynamics.analysis import Analysis
 from archfem.dynamics.recorder import Record
@@ -42,8 +42,8 @@ REPORT_KEYS: toml_file.Table = dict.fromkeys(
     ("project", "place", "author", "checked_by", "date", "version", "norm", "demand"), str
 )
 
-# The same, and of which pairs of a suite it shows the run: "worst" or "all"
-_REPORT_KEYS: toml_file.Table = {**REPORT_KEYS, "pairs": str}
+# The same, of which pairs of a suite it shows the run: "worst" or "all", and sources by key
+_REPORT_KEYS: toml_file.Table = {**REPORT_KEYS, "pairs": str, "sources": dict}
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ class Case:
     risk: RiskSettings | None
     verdict: dict[str, Any]
     output: dict[str, Any]
-    report: dict[str, str]
+    report: dict[str, Any]
     settings: dict[str, Any] = field(repr=False)
     folder: Path = Path()
 
@@ -109,7 +109,9 @@ class Case:
         path = Path(path)
         settings = read_settings(path, changes)
         try:
-            return cls.of(settings, path.parent)
+            case = cls.of(settings, path.parent)
+            _check_sources(settings, case.report.get("sources", ()))
+            return case
         except ArchfemError as error:
             raise type(error)(f"{path}: {error}") from error
 
@@ -305,7 +307,10 @@ class Case:
             InvalidInput: a change is of another section, or of no key of [report].
         """
         settings = sign(self.settings, changes)
-        return replace(self, report=settings.get("report", {}), settings=settings)
+        report, known = settings.get("report", {}), self.report.get("sources", {})
+        # a case in a folder of results may lack what a drawing had
+        _check_sources(settings, [x for x in report.get("sources", {}) if x not in known])
+        return replace(self, report=report, settings=settings)
 
     def hash_inputs(self, *, presentation: bool = True) -> str:
         """Return the SHA-256 of the case, its input files and the program.
@@ -385,14 +390,33 @@ def sign(settings: dict[str, Any], changes: Sequence[str]) -> dict[str, Any]:
     return signed
 
 
-def _read_report(settings: toml_file.Table) -> dict[str, str]:
+def _read_report(settings: toml_file.Table) -> dict[str, Any]:
     """Return the keys of [report]."""
     report = toml_file.check_table(settings.get("report", {}), _REPORT_KEYS, "report")
-    for key, words in report.items():
-        check_words(words, f"report.{key}")
+    texts = {key: words for key, words in report.items() if key != "sources"}
+    texts |= {f"sources.{key}": words for key, words in report.get("sources", {}).items()}
+    for key, words in texts.items():
+        check_words(words, f"report.{key}", 'give words, a key with dots in quotes: "a.b" = "…"')
     if (pairs := report.get("pairs", "worst")) not in ("worst", "all"):
         raise InvalidInput(f'report.pairs = {pairs!r} must be "worst" or "all"')
     return report
+
+
+def _check_sources(settings: toml_file.Table, paths: Iterable[str]) -> None:
+    """Refuse sources of keys that a case does not have."""
+    # results have the blocks of a drawing in place of its keys
+    structure = settings["structure"]
+    drawn = shape_keys("outlines") if "blocks" in structure else {}
+    for path in paths:
+        table: Any = {**settings, "structure": {**drawn, **structure}}
+        above = ""
+        try:
+            for name in toml_file.split_key_path(path):
+                keys = table if isinstance(table, Mapping) else ()
+                toml_file.refuse_unknown({name: None}, keys, above)
+                table, above = table[name], f"{above}.{name}".removeprefix(".")
+        except InvalidInput as error:
+            raise InvalidInput(f"report.sources: {error}") from None
 
 
 def case_of(subject: Case | Analysis, motion: Any = None, folder: Path | None = None) -> Case:

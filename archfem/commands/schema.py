@@ -116,7 +116,9 @@ def _case_sections() -> dict[str, Schema]:
         "materials": _by_name(_table(structure_keys.MATERIAL_KEYS, Material)),
         "contacts": _by_name(contact),
     }
-    return described | tables | {"motion": _MOTION, "criteria": _CRITERIA}
+    words = {"pairs": _choice("worst", "all"), "sources": _by_name({"type": "string"})}
+    report = _table(case.section_keys()["report"], **words)
+    return described | tables | {"motion": _MOTION, "criteria": _CRITERIA, "report": report}
 
 
 def _shape(name: str) -> Schema:

@@ -29,6 +29,7 @@ from archfem.cases.structure_keys import (
     list_shapes,
     shape_keys,
 )
+from archfem.cases.toml_file import format_key, split_key_path
 from archfem.dynamics.schemes import EffectiveDamping, Rayleigh, interpret_damping
 from archfem.limit.collapse import collapse_factor
 from archfem.masonry.joint_closing import FINISHED_KEYS
@@ -43,7 +44,7 @@ from archfem.statics.pushover import pushover
 from archfem.units import Ends, in_unit, kN
 from archfem.view.pages.document import Grid
 
-Row = tuple[str, str, str]  # quantity, value, mark
+Row = tuple[str, ...]  # quantity, value, mark, and the key of the case if it has one
 
 # Their arguments are keys of the sections
 _FUNCTIONS: dict[str, Callable[..., Any]] = {
@@ -106,7 +107,7 @@ def tabulate_inputs(data: ReportData) -> Grid:
         rows += [*_motion_rows(data), *_model_rows(data), *_criteria_rows(data)]
     elif data.case.target is not None and data.statements.keys() & {"limit", "assessment"}:
         rows += _target_rows(data)
-    return Grid((), rows, _CAPTION)
+    return Grid((), _add_sources(rows, _read_sources(data)), _CAPTION)
 
 
 def compare_inputs(parts: Mapping[str, ReportData]) -> list[Grid]:
@@ -118,15 +119,48 @@ def compare_inputs(parts: Mapping[str, ReportData]) -> list[Grid]:
         if len({*own}) == 1:
             same += own[0]
             continue
-        texts = (", ".join(f"{x[1]} ({x[2]})" for x in found) for found in own)
+        marked = [[(x[1], x[2].replace(" (", ": ", 1).removesuffix(")")) for x in y] for y in own]
+        texts = (", ".join(f"{value} ({mark})" for value, mark in found) for found in marked)
         differing.append((quantity, *(text or "-" for text in texts)))
     table = Grid(("", *parts), differing, "Inputs that differ between the cases", "words")
     return [Grid((), same, _CAPTION), *[table] * bool(differing)]
 
 
+def _read_sources(data: ReportData) -> dict[str, str]:
+    """Return the sources that the case states, by the paths of their keys."""
+    stated = data.case.report.get("sources", {}).items()
+    return {".".join(map(format_key, split_key_path(key))): text for key, text in stated}
+
+
+def _lies_in(key: str, above: str) -> bool:
+    """Return whether the path of a key is another one, or lies below it."""
+    return f"{key}.".startswith(f"{above}.")
+
+
+def _add_sources(rows: Sequence[Row], sources: Mapping[str, str]) -> list[Row]:
+    """Return quantity, value and mark of rows, what is given with its source."""
+    keys, added = [key for row in rows for key in row[3:]], list[Row]()
+    parts = [path for path in sources if not any(_lies_in(key, path) for key in keys)]
+    for name, value, mark, *own in rows:
+        found = list[str]()
+        # nobody but archfem is the source of a default; a drawing is that of its blocks
+        for key in own if mark == "given" or own == ["structure"] else ():
+            above = [path for path in sources if _lies_in(key, path)]
+            found += [sources[path] for path in sorted(above, key=len)[-1:]]
+            within = [path for path in parts if _lies_in(path, key)]
+            found += [f"{path.removeprefix(key)[1:]}: {sources[path]}" for path in within]
+        added.append((name, value, f"{mark} ({'; '.join(found)})" if found else mark))
+    return added
+
+
 def _mark(given: bool) -> str:
     """Return the mark of a value that is given, or a default."""
     return "given" if given else "default"
+
+
+def _mark_key(table: Mapping[str, Any], path: str) -> tuple[str, str]:
+    """Return the mark of a key, given if its table has it, and its path."""
+    return _mark(path.rpartition(".")[2] in table), path
 
 
 def _structure_rows(data: ReportData) -> Iterator[Row]:
@@ -148,7 +182,7 @@ def _structure_rows(data: ReportData) -> Iterator[Row]:
             text = "outlines" if drawn else f"{_say_key(value)}{corners * (value == 'blocks')}"
         if key in ("blocks", "joints"):
             text = f"{counts[key]}, by their corners"
-        yield key.replace("_", " "), text, mark
+        yield key.replace("_", " "), text, mark, "structure" if key in drawn else f"structure.{key}"
         if key in parts:
             own = [set(each) for each in value.values() if isinstance(each, Mapping)]
             given = set(value).union(set.intersection(*own) if own else ())
@@ -159,8 +193,8 @@ def _structure_rows(data: ReportData) -> Iterator[Row]:
         for part, words in describe_piers(structure).items():
             yield part or "pier", words, "inferred"
     yield "structure", _list_left_out(list_shapes()[table["shape"]], {*table}), "default"
-    yield "width", f"{structure.width:g} m", _mark("width" in table)
-    yield "gravity", f"{structure.gravity:g} m/s²", _mark("gravity" in table)
+    yield "width", f"{structure.width:g} m", *_mark_key(table, "structure.width")
+    yield "gravity", f"{structure.gravity:g} m/s²", *_mark_key(table, "structure.gravity")
     if "joints" not in table and table["shape"] in ("blocks", "outlines"):
         yield "joints", f"{counts['joints']}, where outlines touch", "inferred"
 
@@ -237,6 +271,7 @@ def _property_rows(data: ReportData) -> Iterator[Row]:
     groups = dict[Any, list[tuple[Material | Contact, list[Row]]]]()
     items = list_materials_and_contacts(data.case)
     names = Counter(item.name for item in items if isinstance(item, Contact))
+    sources = _read_sources(data)
     for item in items:
         rows, load = [*_list_given(data, item)], getattr(item, "stands_for", None)
         # what carries more than itself may differ in weight alone from its neighbour, and joints of
@@ -244,15 +279,17 @@ def _property_rows(data: ReportData) -> Iterator[Row]:
         finished = "finish" in find_table(data.case.settings, item)[1]
         several = isinstance(item, Contact) and names[item.name] > 1 and not finished
         varied = ("k_n", "k_s") if several else (_WEIGHT,) if load is not None else ()
-        same = tuple(row for row in rows if row[0] not in varied)
-        kind = type(item), item.name * several, varied, load, same
+        same = tuple(row[:3] for row in rows if row[0] not in varied)
+        table = _find_path(data, item)
+        sourced = table * any(_lies_in(source, table) for source in sources)
+        kind = type(item), item.name * several, varied, load, same, sourced
         groups.setdefault(kind, []).append((item, rows))
-    for (cls, _, varied, load, _), group in groups.items():
+    for (cls, _, varied, load, *_), group in groups.items():
         (first, rows), *others = group
         name = first.name + f" and {len(others)} more" * bool(others)
         if load is not None:
-            yield f"{name}: stands also for", load, "given"
-        for word, text, mark in rows:
+            yield f"{name}: stands also for", load, "given", f"{_find_path(data, first)}.stands_for"
+        for word, text, mark, *path in rows:
             if word in varied and others:
                 section, key = "materials" if cls is Material else "contacts", _VARIED[word]
                 values = [getattr(each, key) for each, _ in group]
@@ -260,36 +297,39 @@ def _property_rows(data: ReportData) -> Iterator[Row]:
                 text = " to ".join(dict.fromkeys(ends))
                 if cls is Contact and mark == "given":  # pieces of fill beside joints add to theirs
                     own = find_table(data.case.settings, first)[1][key]
-                    yield (
-                        f"{name}: {word}",
-                        value_text(section, key, in_unit(own, "Pa/m", key)),
-                        mark,
-                    )
+                    alone = value_text(section, key, in_unit(own, "Pa/m", key))
+                    yield f"{name}: {word}", alone, mark, *path
                     word, mark = f"{word} with its pieces of fill", "inferred"
-            yield f"{name}: {word}", text, mark
+            yield f"{name}: {word}", text, mark, *path
+
+
+def _find_path(data: ReportData, item: Material | Contact) -> str:
+    """Return the path of the table of a material or contact."""
+    section = "materials" if isinstance(item, Material) else "contacts"
+    return f"{section}.{format_key(find_table(data.case.settings, item)[0])}"
 
 
 def _list_given(data: ReportData, item: Material | Contact) -> Iterator[Row]:
     """Yield the values of a material or contact; stiffer ones of pieces of fill are inferred."""
     key, given = find_table(data.case.settings, item)
     known = PRESETS["materials"].get(given.get("preset", key))
-    for word, text, mark in _list_properties(data, item):
+    for word, text, mark, *path in _list_properties(data, item):
         young = given.get("young", getattr(known, "young", None))
         if word == _YOUNG and mark != "default" and young is not None:
             own = value_text("materials", "young", in_unit(young, "Pa", "young"))
             mark = _mark("young" in given)
             if own != text:  # the compliance of pieces is in their joints
-                yield word, own, mark
+                yield word, own, mark, *path
                 word, mark = f"{word} of its pieces", "inferred"
         stated = (_FURTHER_PROPERTIES["poisson"][0], *[_YOUNG] * (mark == "given"))
         text += " (unused: blocks are rigid)" * (word in stated and data.fidelity == "rigid")
-        yield word, text, mark
+        yield word, text, mark, *path
 
 
 def _list_properties(data: ReportData, item: Material | Contact) -> Iterator[Row]:
     """Yield the values of a material or contact."""
     section = "materials" if isinstance(item, Material) else "contacts"
-    defaults = list_default_keys(data.case, item)
+    defaults, path = list_default_keys(data.case, item), _find_path(data, item)
     _, given = find_table(data.case.settings, item)
     unused = _UNUSED | ({"strength"} - given.keys()) if data.is_static else set()
     follows = {*FINISHED_KEYS} if "finish" in given else set()
@@ -304,7 +344,7 @@ def _list_properties(data: ReportData, item: Material | Contact) -> Iterator[Row
         elif mark == "default" and value is not None:
             mark = "inferred"  # from the shape
         if key not in unused | follows:
-            yield word, text, mark
+            yield word, text, mark, f"{path}.{key}"
     if "finish" in given.keys() - unused and isinstance(item, Contact):
         yield from _finish_rows(data, item, given["finish"])
     for key, (word, unit, name) in _FURTHER_PROPERTIES.items():
@@ -312,9 +352,9 @@ def _list_properties(data: ReportData, item: Material | Contact) -> Iterator[Row
             preset = PRESETS[section].get(given.get("preset", item.name), type(item))
             derived = key not in given and getattr(item, key) != getattr(preset, key, None)
             mark = "inferred" if derived else _mark(key in given)
-            yield word, f"{getattr(item, key) / unit:g}{name}", mark
+            yield word, f"{getattr(item, key) / unit:g}{name}", mark, f"{path}.{key}"
     if isinstance(item, Contact) and item.law is not None:
-        yield "law", str(item.law), "given"
+        yield "law", str(item.law), "given", f"{path}.law"
 
 
 def _finish_rows(data: ReportData, contact: Contact, finish: str) -> Iterator[Row]:
@@ -323,7 +363,8 @@ def _finish_rows(data: ReportData, contact: Contact, finish: str) -> Iterator[Ro
     words = (
         "; rougher faces are stiffer under little stress, so that they may move less, and close "
     )
-    yield "finish", finish + f"{words}further" * rough, "given"
+    text = finish + f"{words}further" * rough
+    yield "finish", text, "given", f"{_find_path(data, contact)}.finish"
     for word, text in list_finish_ranges(data.case.structure, contact, finish).values():
         yield word, text, "inferred"
 
@@ -341,7 +382,8 @@ def _command_rows(data: ReportData) -> Iterator[Row]:
                 yield from _load_rows(data.case.assessment.options[key])
             elif key != "fill":
                 unit = "× the weight" * (key in ("horizontal", "vertical"))
-                yield f"{section}: {key.replace('_', ' ')}", describe_value(value, unit), "given"
+                text = describe_value(value, unit)
+                yield f"{section}: {key.replace('_', ' ')}", text, "given", f"{section}.{key}"
         if section in _FUNCTIONS:
             inherited = (
                 dict.fromkeys(data.case.assessment.of_limit) if section == "assessment" else {}
@@ -351,7 +393,7 @@ def _command_rows(data: ReportData) -> Iterator[Row]:
     if any(f"{name}.txt" in data.files for name in STATIC_RESULTS):
         for path, text, given in list_fill_values(data.case):
             section, _, key = path.split(".")
-            yield f"{section}: fill, {key.replace('_', ' ')}", text, _mark(given)
+            yield f"{section}: fill, {key.replace('_', ' ')}", text, _mark(given), path
 
 
 def _load_rows(loads: Sequence[AttachedLoad]) -> Iterator[Row]:
@@ -366,7 +408,7 @@ def _load_rows(loads: Sequence[AttachedLoad]) -> Iterator[Row]:
             words.append(f"held by {load.anchor} at {_say_pair(load.anchor_point)} m")
         elif load.passive:
             words.append("held by the ground")
-        yield f"assessment: load {number}", "; ".join(words), "given"
+        yield f"assessment: load {number}", "; ".join(words), "given", "assessment.loads"
 
 
 def _say_pair(pair: Iterable[float]) -> str:
@@ -409,29 +451,35 @@ def _motion_rows(data: ReportData) -> Iterator[Row]:
     # as the case writes them, with their units
     motion, suite = (data.case.settings.get(key) for key in ("motion", "suite"))
     if suite is not None:
-        yield "motions", f"{len(suite['pairs'])} pairs: {', '.join(suite['pairs'])}", "given"
+        names = f"{len(suite['pairs'])} pairs: {', '.join(suite['pairs'])}"
+        yield "motions", names, "given", "suite.pairs"
         before = ", before matching" if suite.get("matched") else ""
         for part, values, mark in _source_rows(list(suite["pairs"].values())):
             yield f"{part}{before}", values, mark
         yield from _target_rows(data)
         matched = "matched to the target" if suite.get("matched") else "as they are"
-        yield "motions are", matched, _mark("matched" in suite)
+        yield "motions are", matched, *_mark_key(suite, "suite.matched")
         if band := find_matched_band(data.case.suite):
-            yield "motions are matched", "from {:g} to {:g} s".format(*band), _mark("band" in suite)
+            text = "from {:g} to {:g} s".format(*band)
+            yield "motions are matched", text, *_mark_key(suite, "suite.band")
         for key, name in (("scale", "scale of the motions"), ("reduction", "reduction factor R")):
-            yield name, str(suite.get(key, 1.0)), _mark(key in suite)
+            yield name, str(suite.get(key, 1.0)), *_mark_key(suite, f"suite.{key}")
         if "reversed" in suite:
-            yield "motions are reversed", describe_value(suite["reversed"]), "given"
+            text = describe_value(suite["reversed"])
+            yield "motions are reversed", text, "given", "suite.reversed"
     elif motion is not None:
         own = {key: value for key, value in motion.items() if key != "scale"}
-        yield from _source_rows([own])
-        yield "scale of the motion", str(motion.get("scale", 1.0)), _mark("scale" in motion)
+        for row in _source_rows([own]):
+            yield *row, row[0].replace("vertical motion", "motion.vertical").replace(", ", ".")
+        scale = str(motion.get("scale", 1.0))
+        yield "scale of the motion", scale, *_mark_key(motion, "motion.scale")
 
 
 def _target_rows(data: ReportData) -> Iterator[Row]:
     """Yield the target spectrum of a suite, which may be the demand of static analyses alone."""
     target = data.case.settings.get("suite", {}).get("target")
-    yield "target spectrum", describe_value(target) if target else "none", _mark(bool(target))
+    text = describe_value(target) if target else "none"
+    yield "target spectrum", text, _mark(bool(target)), "suite.target"
     yield from _spectrum_rows(data, "suite", data.case.target)
 
 
@@ -494,48 +542,53 @@ def _model_rows(data: ReportData) -> Iterator[Row]:
     analysis, settings = data.case.analysis, data.case.settings
     model, own = settings.get("model", {}), settings.get("analysis", {})
     selected = analysis.selects_model and bool(data.runs)
-    yield "fidelity", data.fidelity, "inferred" if selected else _mark("fidelity" in model)
-    yield "displacements", analysis.displacements, _mark("displacements" in model)
+    mark = "inferred" if selected else _mark("fidelity" in model)
+    yield "fidelity", data.fidelity, mark, "model.fidelity"
+    yield "displacements", analysis.displacements, *_mark_key(model, "model.displacements")
     if not analysis.selects_model:
         follows = {"quadrature_points"} & model.keys() and "quadrature" not in model
         mark = "inferred" if follows else _mark("quadrature" in model)
-        yield "quadrature", analysis.discretisation.rule.rule, mark
+        yield "quadrature", analysis.discretisation.rule.rule, mark, "model.quadrature"
         for key, unit in {"quadrature_points": "", "max_cell_size": "m", "degree": ""}.items():
             if key in model:
-                yield key.replace("_", " "), describe_value(model[key], unit), "given"
+                text = describe_value(model[key], unit)
+                yield key.replace("_", " "), text, "given", f"model.{key}"
         if analysis.discretisation.fidelity != "rigid":
             through, along = analysis.discretisation.cells
-            yield "cells a block", f"{through} through, {along} along", _mark("cells" in model)
-            yield "cells", f"{analysis.discretisation.cell}s", _mark("cell" in model)
+            text, cell = f"{through} through, {along} along", f"{analysis.discretisation.cell}s"
+            yield "cells a block", text, *_mark_key(model, "model.cells")
+            yield "cells", cell, *_mark_key(model, "model.cell")
     if not data.case.has_motion:
         return
     scheme = type(analysis.scheme).__name__.lower()
-    yield "scheme", scheme, _mark("scheme" in own)
+    yield "scheme", scheme, *_mark_key(own, "analysis.scheme")
     if analysis.dt is None:
         error = f"by an error of {analysis.tolerance:g} in |e|"
-        yield "time step", error, _mark("tolerance" in model)
+        yield "time step", error, *_mark_key(model, "model.tolerance")
     else:
-        yield "time step", f"{1e3 * analysis.dt:g} ms", "given"
+        yield "time step", f"{1e3 * analysis.dt:g} ms", "given", "analysis.dt"
     yield from _damping_rows(data, own.get("damping"))
 
 
 def _damping_rows(data: ReportData, given: str | Mapping[str, Any] | None) -> Iterator[Row]:
     """Yield ratio, joints, kind and frequencies of damping, which a word or a table gives."""
-    damping = interpret_damping(data.case.analysis.damping)
+    damping, path = interpret_damping(data.case.analysis.damping), "analysis.damping"
     if damping is None:
-        yield "damping", "none but that of friction", _mark(given is not None)
+        yield "damping", "none but that of friction", _mark(given is not None), path
         return
     own = given if isinstance(given, Mapping) else {}
-    yield "damping", f"{100.0 * damping.ratio:g} % of critical", _mark("ratio" in own)
-    yield "damping, joints", damping.joints, _mark("joints" in own)
+    ratio = f"{100.0 * damping.ratio:g} % of critical"
+    yield "damping", ratio, *_mark_key(own, f"{path}.ratio")
+    yield "damping, joints", damping.joints, *_mark_key(own, f"{path}.joints")
     if isinstance(damping, EffectiveDamping):
-        yield "damping, kind", damping.kind, _mark("kind" in own)
-        yield "damped at", "the effective modes about dead load", "given"
+        yield "damping, kind", damping.kind, *_mark_key(own, f"{path}.kind")
+        yield "damped at", "the effective modes about dead load", "given", path
     elif isinstance(damping, Rayleigh):
         low, high = damping.frequencies
-        yield "damped at", f"{low:.3g} and {high:.3g} Hz (Rayleigh)", "given"
+        yield "damped at", f"{low:.3g} and {high:.3g} Hz (Rayleigh)", "given", path
     else:
-        yield "damped at", f"{damping.frequency:.3g} Hz, proportional to stiffness", "given"
+        text = f"{damping.frequency:.3g} Hz, proportional to stiffness"
+        yield "damped at", text, "given", path
 
 
 def _criteria_rows(data: ReportData) -> Iterator[Row]:
@@ -545,9 +598,12 @@ def _criteria_rows(data: ReportData) -> Iterator[Row]:
     own = until.get("criteria", {}) if isinstance(until, Mapping) else {}
     given = settings.get("criteria", own) or {}
     reason = "" if "hinge" in given else f" ({HINGE_REASON})"
-    yield "a joint hinges where", f"|e| ≥ {criteria.hinge:g}{reason}", _mark("hinge" in given)
+    hinge = f"|e| ≥ {criteria.hinge:g}{reason}"
+    yield "a joint hinges where", hinge, *_mark_key(given, "criteria.hinge")
     limit = "its own limit, μ + c A / N" if criteria.friction is None else f"{criteria.friction:g}"
-    yield "a joint slides where |V| / N reaches", limit, _mark("friction" in given)
+    words = "a joint slides where |V| / N reaches"
+    yield words, limit, *_mark_key(given, "criteria.friction")
     count = f"{criteria.failures} joints of rings and piers that fail at once"
-    yield "mechanism by count", count, _mark("failures" in given)
-    yield "failure lasts for", f"{1e3 * criteria.duration:g} ms", _mark("duration" in given)
+    yield "mechanism by count", count, *_mark_key(given, "criteria.failures")
+    duration = f"{1e3 * criteria.duration:g} ms"
+    yield "failure lasts for", duration, *_mark_key(given, "criteria.duration")
