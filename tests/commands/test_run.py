@@ -329,7 +329,8 @@ motion = {{ file = "tap.txt", dt = 0.01, units = "m/s2" }}
     said = again.splitlines()[0].partition(": ")[2].partition(";")[0]
     assert f"Scale of the motion: {said}" in words  # the conclusion
     met = "falls" if runs else "forms a mechanism"
-    margin = rf"is {factor[1]} on 'tap', at a PGA of [\d.]+ g(, beyond which it fails)?, under one motion"
+    margin = rf"is {factor[1]} on 'tap', at a PGA of [\d.]+ g(, beyond which it fails)?, under one "
+    margin += "motion"
     assert re.search(rf"{margin}\. Of the scales that were run it first [^.]*.*?{met} at ", words)
     shown = words.split("Scale of the motion")[-1]  # the section
     assert ("at the scales [× the motion]" if runs else head) in shown
