@@ -1067,7 +1067,7 @@ def test_a_bridge_that_does_not_stand_is_rated_for_no_vehicle(tmp_path, unplotte
     words = "does not stand under its own weight, and carries no vehicle"
     assert first == f"Rating of 'a ring pushed over': {words}"
     stated = json.loads((out / "rating.json").read_text())
-    assert stated["rows"] == [["rating", "LM1", words, "-", {"passes": False}]]
+    assert stated["rows"] == [["rating", "LM1", words, "-", {"passes": False, "least": 0.0}]]
     thin, doubt = stated["doubts"]
     assert "could hinge inside: the inner face rises by 0.42 of the depth" in thin[0]
     assert doubt[0] == "limit analysis finds no equilibrium of the bridge under its own weight"
