@@ -11,7 +11,7 @@ import numpy as np
 
 from archfem._files import group_of, read_file_list
 from archfem.cases import result_text
-from archfem.cases.answers import RESULTS, Row, Statement, read_numbers
+from archfem.cases.answers import RESULTS, Ratios, Row, Statement, read_numbers
 from archfem.cases.case import REPORT_KEYS
 from archfem.cases.report import margins
 from archfem.cases.report.demands import list_demands, name_spectrum, tabulate_demands
@@ -72,6 +72,9 @@ _BEGUN = {RESULTS["risk"]: "risk_samples.nc"}
 
 # Lines of the head with the answer, in their order
 HEAD = ("verdict", "margin", "depends on", "not checked")
+
+# What a doubt of limit analysis says of a factor that is an upper bound
+UPPER_ESTIMATE = "upper estimate"
 
 # Demands of which factors of several cases are multiples, in words
 KINDS = "the earthquake", "the vehicle", "the given load"
@@ -134,10 +137,11 @@ def list_joint_facts(parts: Mapping[str, ReportData]) -> list[tuple[str, str]]:
     worst, listed = dict[str, str](), list[str]()
     for kind in KINDS:  # factors on demands of several kinds have no order
         own = {name: least[kind] for name, (_, least) in ranks.items() if kind in least}
+        sizes = {name: _say_factor(parts[name], x, kind) for name, x in own.items()}
         order = sorted(own, key=own.__getitem__)
-        listed += [f"of {name} {format_ratio(own[name])} times {kind}" for name in order]
+        listed += [f"of {name} {sizes[name]}" for name in order]
         for name in [name for name in order if ranks[name][0] == place][:1]:
-            worst.setdefault(name, f"{name} ({format_ratio(own[name])} times {kind})")
+            worst.setdefault(name, f"{name} ({sizes[name]})")
     listed += [f"of {name} not known" for name, (_, least) in ranks.items() if not least]
     facts = [("cases", "; ".join(data.name for data in parts.values()))]
     words = f"The worst of {len(parts)} cases, each by its kind of demand, are "
@@ -148,6 +152,18 @@ def list_joint_facts(parts: Mapping[str, ReportData]) -> list[tuple[str, str]]:
         facts.append((answer, f"The worst of {len(parts)} cases is {name}: {said.pop(name)}"))
     facts.append((margin, f"The least margins are {'; '.join(listed)}."))
     return [*signed, *facts, *said.items()]
+
+
+def _say_factor(data: ReportData, factor: float, kind: str) -> str:
+    """Say a least factor of a case, with "at most" before an upper bound."""
+    pushed = data.statements.get("limit", Statement([], []))
+    doubtful = any(UPPER_ESTIMATE in str(doubt) for doubt in pushed.doubts)
+    pushes = read_numbers(PushFactors, pushed)
+    bounds = [x.least for x in pushes if doubtful or x.proved is not None]
+    checks = read_numbers(Ratios, data.statements.get("assessment"))
+    bounds += [check.decisive for check in checks if check.bounded]
+    bounds += [least for least, words, _ in margins.say_less(data) if "≤" in words]
+    return f"{'at most ' * (factor in bounds)}{format_ratio(factor)} times {kind}"
 
 
 def _rank_verdict(data: ReportData) -> tuple[int, dict[str, float]]:
