@@ -45,6 +45,9 @@ from archfem.masonry.loads import Action, AttachedLoad, PointLoad, list_loads
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import HasStructure, Structure, join_joint_names, structure_of
 
+# How the events of ties begin
+TIE_AT = "the tie at "
+
 
 class PathEnd(ExplainedWord):
     """Reason for which the path of a mechanism ends."""
@@ -54,6 +57,7 @@ class PathEnd(ExplainedWord):
     COLLIDES = "collides", "at the end it runs into blocks that it has no joint with"
     ENDURES = "endures", "it still needs a force where the path is cut off"
     UNRESOLVED = "unresolved", "at the end no mechanism was found whose faces slide flat"
+    RELEASED = "released", "at the end a tie yields or slackens, and no equilibrium follows"
     SLIDES = "slides", "it slides without turning, up to the ends of the faces as drawn"
 
 
@@ -527,6 +531,9 @@ class PathFollower:
         try:
             mechanism = find_mechanism(blocks, self.joints, self.friction, flat=flat)
         except NoEquilibrium as error:
+            # without the length that a tie kept, two motions are free, and one factor holds neither
+            if self.events and self.events[-1].text.startswith(TIE_AT):
+                raise _Stop(PathEnd.RELEASED) from error
             self._record(blocks, 0.0)
             raise _Stop(PathEnd.FALLS) from error
         if mechanism is None:
@@ -642,7 +649,7 @@ class PathFollower:
         of_contacts, of_ties = np.split(others, [2 * len(state.contacts)])
         for way, changed in zip(("slackens", "yields"), of_ties.reshape(2, -1), strict=True):
             for number in state.linkage.held[changed]:
-                return f"the tie at {state.blocks.ties[number].name} {way}"
+                return f"{TIE_AT}{state.blocks.ties[number].name} {way}"
         changes = of_contacts.reshape(2, -1)
         for contact, opens, is_off in zip(state.contacts, *changes, strict=True):
             if opens:

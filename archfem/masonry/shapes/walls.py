@@ -7,7 +7,7 @@ near a jamb, the end of a lintel or another head joint moves a little, or is lef
 """
 
 from bisect import bisect
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from dataclasses import dataclass, replace
 from itertools import combinations, pairwise, permutations
 
@@ -79,8 +79,8 @@ class Floor:
     on their stones by horizontal length.
 
     Attributes:
-        level: height of the bed above the ground, up to the eaves; that of the ridge for a roof on
-            slopes [m].
+        level: height above the ground, up to the eaves, where a bed is laid, more than half a
+            course from those of openings, or at one; the ridge for a roof on slopes [m].
         load: weight per horizontal metre of the whole breadth of the wall [N/m].
         name: thing that these stones stand for besides themselves.
     """
@@ -114,10 +114,10 @@ def wall(  # noqa: PLR0913  (all are lengths and properties of one structure)
 ) -> Structure:
     """Return a wall in running bond on fixed ground, in its plane.
 
-    Courses are of equal height between the levels of eaves, sills, heads and ridge, stones of equal
-    length between jambs. Head joints of a course are half a stone beside those of the next one, or
-    a quarter where jambs or lintels need it. Every course begins its numbers at the left: "course
-    3, stone 1".
+    Courses are of equal height between the levels of eaves, sills, heads, floors and ridge, stones
+    of equal length between jambs. Head joints of a course are half a stone beside those of the next
+    one, or a quarter where jambs or lintels need it. Every course begins its numbers at the left:
+    "course 3, stone 1".
 
     Args:
         breadth: breadth at the ground [m].
@@ -169,7 +169,7 @@ def wall(  # noqa: PLR0913  (all are lengths and properties of one structure)
     ground = ((-side, -GROUND_DEPTH), (side, -GROUND_DEPTH), (side, 0.0), (-side, 0.0))
     blocks = [Block(ground, material, "ground", fixed=True, part="ground", role="other")]
     stops = {0.0, shoulder, height}.union(*((each.sill, each.head) for each in openings))
-    levels = _divide(sorted(stops), course)
+    levels = _divide(sorted(stops | _find_beds(floors, stops, shoulder, course)), course)
     for each in openings:
         if each.bearing is not None:
             top = levels[levels.index(each.head) + 1]  # of the lintel, below a slope
@@ -189,6 +189,14 @@ def wall(  # noqa: PLR0913  (all are lengths and properties of one structure)
     return assembled(blocks, contact, width=width, gravity=gravity, name="wall")
 
 
+def _find_beds(
+    floors: Sequence[Floor], stops: Set[float], eaves: float, course: float
+) -> set[float]:
+    """Return the levels of floors where beds are laid: no course is then thinner than half."""
+    levels = {floor.level for floor in floors if 0.0 < floor.level < eaves}
+    return {level for level in levels if min(abs(level - y) for y in stops) > 0.5 * course}
+
+
 def _put_floors(
     blocks: Sequence[Block],
     floors: Sequence[Floor],
@@ -206,7 +214,7 @@ def _put_floors(
             nearest = " and ".join(f"{each:.3f}" for each in near)
             raise InvalidStructure(
                 f"'{floor.name}' at {floor.level:.4g} m is at no bed that bears floors, up to the "
-                f"eaves or at the ridge: take the nearest, {nearest} m, or change `course`"
+                f"eaves or at the ridge: take the nearest, {nearest} m"
             )
         lengths = []  # of each block at the bed, and along the slopes below a ridge
         for block in blocks:
