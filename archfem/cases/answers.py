@@ -407,9 +407,8 @@ def note_ties(case: Case) -> list[str]:
             size = scale * float(np.hypot(*ties[0].force)) / kN
             of = f"{size:.3g} kN of the tie at {ties[0].block}"
         bounded = ", one by an upper bound alone," * solve(scale, sense)[2]
-        return f"all its checks are just passed{bounded} with {of} " + describe_tied_length(
-            case.structure
-        )
+        length = describe_tied_length(case.structure)
+        return f"all its checks are just passed{bounded} with {of} {length}"
 
     for sense in settings.directions if ties else ():
         with suppress(InvalidInput):  # without its ties it may not stand

@@ -74,6 +74,11 @@ class Tie(NamedTuple):
     force: Array  # largest, towards the other end (2,) [N]
     length: float  # between two blocks, 0 to the ground [m]
 
+    @property
+    def size(self) -> float:
+        """Size of its largest force [N]."""
+        return float(np.hypot(*self.force))
+
 
 @dataclass(frozen=True, eq=False)
 class PlacedBlocks:
@@ -400,7 +405,7 @@ class Bodies:
     def find_held_ties(self, velocity: Array) -> Numbers:
         """Return the ties that a velocity neither stretches nor slackens, between two bodies."""
         far, near = self.tied_bodies.T
-        sizes = np.array([np.hypot(*tie.force) for tie in self.blocks.ties])
+        sizes = np.array([tie.size for tie in self.blocks.ties])
         return np.flatnonzero((np.abs(self.tie_forces @ velocity) <= STILL * sizes) & (far != near))
 
     def dead_forces(self, velocity: Array | None = None, held: Numbers | None = None) -> Array:

@@ -92,12 +92,14 @@ class Linkage:
     @cached_property
     def held(self) -> Numbers:
         """Numbers of the ties that keep their length, where the contacts alone do not keep it."""
+        kept = list[int]()
+        if not self.start.ties:
+            return np.array(kept, dtype=np.intp)
         bodies, contacts = Bodies(self.start, self.mechanism.body), self.mechanism.contacts
-        ties, kept = bodies.find_held_ties(self.first_velocity), list[int]()
         normal, along = bodies.rates(contacts) * bodies.units
         rows = np.vstack([normal, along[[not contact.slip for contact in contacts]]])
-        for k in ties:
-            rate = bodies.tie_forces[[k]].toarray() / np.hypot(*self.start.ties[k].force)
+        for k in bodies.find_held_ties(self.first_velocity):
+            rate = bodies.tie_forces[[k]].toarray() / self.start.ties[k].size
             more = np.vstack([rows, rate * bodies.units])
             if np.linalg.matrix_rank(more, tol=1e-9) > np.linalg.matrix_rank(rows, tol=1e-9):
                 rows = more
@@ -156,18 +158,20 @@ class LinkageState:
         found = []
         for k in self.linkage.held:
             start, tie = self.linkage.start.ties[k], self.blocks.ties[k]
-            moved = (tie.place - start.place) @ start.force / np.hypot(*start.force)
+            moved = (tie.place - start.place) @ start.force / start.size
             found.append(float(moved if tie.anchor is None else start.length - tie.length))
         return found
 
     @cached_property
     def held_sizes(self) -> Array:
         """Largest forces of the held ties (n_held,) [N]."""
-        return np.array([np.hypot(*self.blocks.ties[k].force) for k in self.linkage.held])
+        return np.array([self.linkage.start.ties[k].size for k in self.linkage.held])
 
     @cached_property
     def shortening_rates(self) -> Array:
         """Rates at which the held ties become shorter (n_held, 3 n_bodies)."""
+        if not len(self.linkage.held):  # sparse matrices without rows would take a fifth of a path
+            return np.zeros((0, 3 * self.bodies.count))
         forces = self.bodies.tie_forces[self.linkage.held].toarray()
         return np.asarray(forces / self.held_sizes[:, None])
 

@@ -115,8 +115,10 @@ def find_weakest_body(
     its weight, with the moment of forces and ties over the weight. None unless it is a stack.
     """
     stack = None if find_yielding_blocks(structure) else list_stack(structure)
+    if stack is None:
+        return None
     placed, found = PlacedBlocks.at_rest(structure, loads, direction), []
-    for k, (bed, _) in enumerate(stack := stack or []):
+    for k, (bed, _) in enumerate(stack):
         own = [block for _, block in stack[k:]]
         toe = max(structure.ends[bed], key=lambda end: direction * end[0])
         masses = [
@@ -130,7 +132,7 @@ def find_weakest_body(
             moment += max(resists, 0.0) if load.passive else resists
         curve = [0.0, moment / weight.sum()], [structure.gravity * moment / (weight @ y), 0.0]
         found.append((check(*map(np.array, curve)).ratio, bed, own))
-    return min(found, key=lambda each: each[0])[1:] if found else None
+    return min(found, key=lambda each: each[0])[1:]
 
 
 def find_first_mechanism(
@@ -227,7 +229,7 @@ def describe_ties(
         return ""
     shares, needs = find_tie_shares(placed, joints, coefficient, factor), []
     for share, tie in zip(shares, placed.ties, strict=True):
-        size = np.hypot(*tie.force) / kN
+        size = tie.size / kN
         need = f"{share * size:.4g}" if share > 1e-4 else "none"
         needs.append(f"{need} of the {size:.4g} kN of the tie at {tie.name}")
     side, listed = name_side(placed.direction), join_names(needs)
@@ -260,7 +262,7 @@ def find_stretches(
         away = np.array([each[k].length - tie.length for each in ties])
         if tie.anchor is None:
             places = np.array([each[k].place for each in ties])
-            away = (tie.place - places) @ tie.force / np.hypot(*tie.force)
+            away = (tie.place - places) @ tie.force / tie.size
         size = float(np.interp(share * moved[-1], np.maximum.accumulate(moved), away))
         # a hundredth of a millimetre is round-off
         found.append((tie.name, max(0.0, round(size, 5))))
@@ -291,7 +293,7 @@ def doubt_opposed_ties(placed: PlacedBlocks) -> list[Doubt]:
     for one, other in combinations(placed.ties, 2):
         chord = other.place - one.place
         pulls = np.array([one.force @ chord, -(other.force @ chord)]) / np.hypot(*chord)
-        sizes = [np.hypot(*tie.force) for tie in (one, other)]
+        sizes = [tie.size for tie in (one, other)]
         held = one.anchor is other.anchor is None and one.block != other.block
         if held and (pulls > 0.99 * np.array(sizes)).all():  # within 8° of the chord
             remedy = "give one tie with `anchor` and `anchor_point`"
