@@ -9,6 +9,7 @@ from backfilled import arch_bridge
 from granite import granite_wall
 
 import archfem as af
+from archfem.limit import displaced_blocks
 from archfem.limit.displaced_blocks import PlacedBlocks, find_corners, find_mechanism
 from archfem.limit.finite_mechanism import LinkageState, PathEnd, PathFollower
 
@@ -478,3 +479,16 @@ def test_paths_that_cannot_be_followed_are_refused():
     for options, structure, live, words in refused:
         with pytest.raises(af.InvalidInput, match=words):
             af.limit.collapse_path(structure, live=live, **options)
+
+
+@pytest.mark.parametrize(("bound", "found"), [(1.0, True), (0.99, False)])
+def test_a_factor_of_flat_sliding_is_not_beyond_that_with_dilatancy(monkeypatch, bound, found):
+    """One that repeats beyond its bound, as forces still change, is no solution."""
+    repeated = 1.0, np.zeros(3), np.array([1.0])
+    monkeypatch.setattr(displaced_blocks, "_solve_static", lambda *_: repeated)
+    given = None, [None], np.array([0.5]), bound, np.array([2.0])
+    if found:
+        assert displaced_blocks._solve_flat(*given)[0] == 1.0
+        return
+    with pytest.raises(af.DidNotConverge, match="whose faces slide without dilatancy"):
+        displaced_blocks._solve_flat(*given)
