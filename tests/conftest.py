@@ -165,6 +165,19 @@ second = { synthetic = { seed = 2, duration = 1.0, pga = 1.0, vertical_ratio = 0
 
 
 @pytest.fixture
+def unlike_weights():
+    """Tables of three stones that stand also for a wall and differ in weight alone."""
+    blocks = [
+        {"outline": [[0, k], [1, k], [1, k + 1], [0, k + 1]], "name": f"b{k}", "material": f"m{k}"}
+        for k in range(4)
+    ]
+    blocks[0] |= {"fixed": True, "material": "stone"}
+    load = {"young": 3e10, "poisson": 0.2, "stands_for": "the wall above"}
+    materials = {f"m{k}": {**load, "unit_weight": f"{20 * k} kN/m³"} for k in (1, 2, 3)}
+    return {"structure": {"shape": "blocks", "blocks": blocks}, "materials": materials}
+
+
+@pytest.fixture
 def at2():
     """A function that writes accelerations [g] at steps dt [s] to a file of format AT2."""
 

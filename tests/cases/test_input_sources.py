@@ -83,17 +83,9 @@ def test_pairs_of_a_suite_have_their_sources_in_the_row_of_all():
     assert mark == 'given ("the 2nd": Amatrice; first: Norcia)'
 
 
-def test_materials_with_sources_of_their_own_have_rows_of_their_own():
+def test_materials_with_sources_of_their_own_have_rows_of_their_own(unlike_weights):
     """Which stand in one row else, as stones that stand also for a wall."""
-    blocks = [
-        {"outline": [[0, k], [1, k], [1, k + 1], [0, k + 1]], "name": f"b{k}", "material": f"m{k}"}
-        for k in range(4)
-    ]
-    blocks[0] |= {"fixed": True, "material": "stone"}
-    load = {"young": 3e10, "poisson": 0.2, "stands_for": "the wall above"}
-    materials = {f"m{k}": {**load, "unit_weight": f"{20 * k} kN/m³"} for k in (1, 2, 3)}
-    structure = {"shape": "blocks", "blocks": blocks}
-    tables = tables_with({}, structure=structure, materials=materials)
+    tables = tables_with({}, **unlike_weights)
     assert marks_of(tables)["m1 and 2 more: weight"] == "given"
     tables["report"]["sources"] = {"materials.m2.unit_weight": "weighed"}
     marks = marks_of(tables)

@@ -703,16 +703,9 @@ def test_the_lengths_of_a_wall_are_named_by_its_plane():
         assert words in text
 
 
-def test_materials_that_differ_in_weight_alone_stand_once():
-    blocks = [
-        {"outline": [[0, k], [1, k], [1, k + 1], [0, k + 1]], "name": f"b{k}", "material": f"m{k}"}
-        for k in range(4)
-    ]
-    blocks[0] |= {"fixed": True, "material": "stone"}
-    load = {"young": 3e10, "poisson": 0.2, "stands_for": "the wall above"}
-    weights = {f"m{k}": {**load, "unit_weight": f"{20 * k} kN/m³"} for k in (1, 2, 3)}
-    tables = {"structure": {"shape": "blocks", "blocks": blocks}, "materials": weights}
-    data = report_data.ReportData(af.Case.of({**tables, "model": {"fidelity": "rigid"}}), {})
+def test_materials_that_differ_in_weight_alone_stand_once(unlike_weights):
+    tables = {**unlike_weights, "model": {"fidelity": "rigid"}}
+    data, weights = report_data.ReportData(af.Case.of(tables), {}), tables["materials"]
     rows = [row for row in tabulate_inputs(data).rows if row[0].startswith("m")]
     assert rows[:3] == [
         ("m1 and 2 more: stands also for", "the wall above", "given"),
