@@ -25,7 +25,7 @@ from archfem.masonry.structure import Structure, join_words
 from archfem.models.model import Doubt, read_doubts, write_doubts
 from archfem.motion.hazard import DESIGN_PERIOD, MEASURES
 from archfem.motion.motion import Motion
-from archfem.statics.assessment_checks import AssessmentCheck, describe_difference
+from archfem.statics.assessment_checks import AssessmentCheck, describe_difference, doubt_assumed
 from archfem.statics.first_mechanism import describe_tied_length
 from archfem.statics.mechanism_assessment import KinematicAssessment
 from archfem.units import STANDARD_GRAVITY, Ends, format_ratio, kN
@@ -358,10 +358,8 @@ def describe_margin(found: Iterable[KinematicAssessment]) -> str:
 
 def doubt_fill(site: PushFactors | None) -> list[Doubt]:
     """Return the doubt of a push that exceeds the site's acceleration on some fills alone."""
-    if site is None or not site.least < 1.0 <= site.most:
-        return []
-    words = "what is assumed of the fill decides whether the ground sets it in motion"
-    return [Doubt(words, "measure it, or run motions on fill in pieces")]
+    decide = site is not None and site.least < 1.0 <= site.most
+    return doubt_assumed("the ground sets it in motion", decide=decide)
 
 
 def note_across(structure: Structure, found: Iterable[KinematicAssessment]) -> list[str]:

@@ -349,8 +349,14 @@ def measure_blocks(*blocks: Block) -> float:
     return float(np.ptp(np.concatenate([block.points for block in blocks]), axis=0).max())
 
 
+def doubt_assumed(decided: str, *, decide: bool) -> list[Doubt]:
+    """Return the doubt of what is decided by what is assumed of a fill."""
+    words = f"what is assumed of the fill decides whether {decided}"
+    return [Doubt(words, "measure it, or run motions on fill in pieces")] if decide else []
+
+
 def add_fill_ranges(found: Any, others: Mapping[FillAssumption, Any]) -> Any:
-    """Return a `KinematicAssessment` with decisive ratios by assumption on a fill, and the least.
+    """Return a `KinematicAssessment` with ratios and doubt by assumption on a fill, and the least.
 
     Args:
         found: assessment under the assumption that is given.
@@ -367,6 +373,8 @@ def add_fill_ranges(found: Any, others: Mapping[FillAssumption, Any]) -> Any:
             ranges[name] = FillRange(ratios)
     if not ranges:
         return found
+    unsure = doubt_assumed("it passes", decide=any(each.needed for each in ranges.values()))
+    found = replace(found, doubts=(*found.doubts, *unsure))
     values = [*ranges.values()][-1].values
     least = others[min(values, key=values.__getitem__)] or found
     changed = [

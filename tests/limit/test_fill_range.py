@@ -14,6 +14,7 @@ from archfem.cases.analysis_keys import LimitAnalysis
 from archfem.cases.answers import list_ratios
 from archfem.cases.result_folder import limit_files
 from archfem.cases.result_text import describe_collapse
+from archfem.commands.tools import doubt_code
 from archfem.limit import collapse
 from archfem.limit.fill_range import FillAssumption, FillRange, vary_fill
 from archfem.statics.assessment_checks import BY_SPLIT, AssessmentCheck, add_fill_ranges
@@ -252,6 +253,7 @@ class Assessed:
 
     linear: AssessmentCheck
     displacement: AssessmentCheck | None = None
+    doubts: tuple = ()
     least: "Assessed | None" = None
 
 
@@ -277,6 +279,8 @@ def test_a_range_and_what_it_needs_are_of_one_weight_a_body(apart, bodies, outco
     given, least = found.linear, found.least.linear
     outcome = outcome if of_given else f"passes only with {outcome}"
     assert (given.outcome, least.outcome) == (of_given or outcome, outcome)
+    assert doubt_code(found.doubts) == 3 * ("only with" in outcome)
+    assert all("fill decides whether it passes; measure" in str(x) for x in found.doubts)
     for check in (given, least):
         assert (*check.over_fill.values.values(),) == bodies
         assert not check.passes
