@@ -23,7 +23,7 @@ STACK = {
     "record": {"fields_every": 4},
 }
 
-MESSAGE = r"{} was written by another version of archfem \(format '.*', not '.* 5'\): "
+MESSAGE = r"{} was written by another version of archfem \(format '.*', not '.* 6'\): "
 """Begin of the message, behind the name of the file."""
 
 READERS = {
@@ -34,7 +34,7 @@ READERS = {
 }
 """Readers of datasets, and the remedy, by the kind of file."""
 
-LAYOUTS = {5: "7037b525e0bab986"}
+LAYOUTS = {6: "ec4684df1d9f6baf"}
 """Digests of the names in result files, by the number of their format."""
 
 

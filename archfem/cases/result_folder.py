@@ -202,7 +202,7 @@ def limit_files(
     # without a site the factor of a push would be read as one on a demand
     demand = NO_DEMAND if collapse.push else "the given load"
     if not collapse.push and collapse.outcome is Outcome.COLLAPSES:
-        site = PushFactors(*collapse.range)
+        site = PushFactors(*collapse.range, bounded=collapse.bounded)
     remarks: list[Remark] = list(doubts)
     remarks += note_collapse(case.structure, collapse, case.limit, case.parapets)
     given = collapse.sentence, remarks, demand, site

@@ -297,8 +297,7 @@ def describe_dead_load(result: DeadLoadResult, *, explain: bool = False) -> str:
     across = describe_transverse_push(structure)
     if result.case.has_motion and structure.heads.any():
         across = across.replace(UNCHECKED_ACROSS, CHECKED_ACROSS)
-    lines += filter(None, [structure.assessment, across])
-    lines += filter(None, [say_defaults(result.case)])
+    lines += filter(None, [structure.assessment, across, say_defaults(result.case)])
     if result.strength_use is not None:
         lines.append(f"dead load: {strength_use_text(result.strength_use)}")
     return "\n".join([*lines, *mark_remarks(result.doubts)])
@@ -521,10 +520,11 @@ class PushFactors(NamedTuple):
     most: float
     site: str = ""  # the site's acceleration, of which they are multiples, in words
     proved: float | None = None  # bound from below, where a search may have missed the least
+    bounded: bool = False  # whether they are upper estimates, as `Collapse.bounded`
 
     def __str__(self) -> str:
         """Return both factors in words, and the bound from below where the search has one."""
-        text = f"{Ends((self.least, self.most)):.{3 if self.site else 4}g}"
+        text = f"{'≤ ' * self.bounded}{Ends((self.least, self.most)):.{3 if self.site else 4}g}"
         if self.proved is None:
             return text
         proved = f"proved ≥ {self.proved:.3g}" if self.proved else "no lower bound is known"
@@ -547,7 +547,7 @@ def compare_with_site(case: Case, *senses: Collapse | None) -> PushFactors | Non
     if factors and searched:  # the search may have missed a weaker solution
         proved = min(each.bracket[0] for each in searched) * factors.least / low
         factors = factors._replace(proved=max(proved, 0.0))
-    return factors
+    return factors and factors._replace(bounded=any(x.bounded for x in ends))
 
 
 def compare_push(case: Case, low: float, high: float, dead: Iterable[Action]) -> PushFactors | None:

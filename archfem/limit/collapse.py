@@ -110,6 +110,8 @@ class Collapse(ResultDisplay):
         least: the result under the assumption with the least factor, the fall at rest where nothing
             stands under it; None where it is this one.
         notes: what is in doubt about this factor, and not about the least.
+        bounded: whether the factor is an upper estimate: where joints slide by associated flow, or
+            fail by bonds, or partly open by cohesion.
         strength: compressive strength at which joints crush [Pa]; infinite where they do not.
         live: the growing actions, or the settlement.
         dead: the actions beside self-weight that do not grow.
@@ -129,6 +131,7 @@ class Collapse(ResultDisplay):
     over_fill: FillRange | None = None
     least: "Collapse | None" = None
     notes: tuple[str, ...] = ()
+    bounded: bool = False
     strength: float = np.inf
     live: tuple[Action | Settlement, ...] = ()
     dead: tuple[Action, ...] = ()
@@ -418,7 +421,7 @@ def _solve_loads(
     actions = (loads,) if isinstance(loads, Settlement) else tuple(loads)
     crushes = check_options(structure, friction, strength)
     result = replace(result, strength=crushes, live=actions, dead=stays, structure=structure)
-    warn_bonds(structure, result)
+    result = replace(result, bounded=warn_bonds(structure, result) or result.bounded)
     if result.outcome is Outcome.BRACKETED:
         logger.warning(
             "%s: the mechanism is of the bound, and dilates; %s; a pushover finds a state of "
@@ -544,16 +547,16 @@ def _solve_collapse(
         result = _read_without_optimum(stones, dead, unbounded, fall, solutions, shown)
         return replace(result, solutions=solutions)
     result = _read_result(stones, programme, bounded, scale * optimum.value, optimum, support)
-    result = replace(result, solutions=solutions)
+    above = False
     if solutions is not None:
         warn_lost_solution(solutions)
     if not isinstance(live, Settlement):
         failing = {*result.sliding, *(joint for joint, _ in result.hinges)}
         if friction is not None and not structure.tension.any():  # bonds that hold stay closed
-            warn_cohesion(structure, tuple(failing), result.joints, result.factor)
+            above = warn_cohesion(structure, tuple(failing), result.joints, result.factor)
     if friction == "coulomb":
-        warn_sliding(structure, result.sliding, result.factor)
-    return result
+        above |= warn_sliding(structure, result.sliding, result.factor)
+    return replace(result, solutions=solutions, bounded=above)
 
 
 def _vary_assumptions(
@@ -617,9 +620,9 @@ def read_bounds(structure: Structure, bounds: FillBounds, friction: str | None) 
     hinges, slides = _find_failing(blocks, regions, motion)
     joints = _read_joints(structure, blocks, regions, bounds.below.forces)
     result = Collapse(lower, outcome, hinges, slides, joints, regions.expand_motion(motion))
-    if friction is not None:
-        warn_sliding(structure, result.sliding, result.factor)
-    return replace(result, soil=bounds.contact_stress, fill_motion=bounds.fill_motion, upper=upper)
+    bounded = friction is not None and warn_sliding(structure, result.sliding, result.factor)
+    soil, moved = bounds.contact_stress, bounds.fill_motion
+    return replace(result, soil=soil, fill_motion=moved, upper=upper, bounded=bounded)
 
 
 def _without_forces(optimum: Optimum) -> Optimum:
@@ -734,8 +737,8 @@ def warn_idle_joints(result: Collapse) -> None:
         )
 
 
-def warn_bonds(structure: Structure, result: Collapse) -> None:
-    """Warn of failing joints that are held by bonds."""
+def warn_bonds(structure: Structure, result: Collapse) -> bool:
+    """Warn of failing joints that are held by bonds; return whether there are any."""
     if bonded := result.bonded:
         logger.warning(
             "%d joints such as '%s' fail by bonds that yield, up to %.3g Pa in tension: bonds are "
@@ -744,12 +747,13 @@ def warn_bonds(structure: Structure, result: Collapse) -> None:
             *(len(bonded), structure.joints[bonded[0]].name, structure.tension.max()),
             result.upper,
         )
+    return bool(bonded)
 
 
 def warn_cohesion(
     structure: Structure, failing: Sequence[int], joints: xr.Dataset, factor: float
-) -> None:
-    """Warn of failing joints whose shear exceeds the strength of their closed part."""
+) -> bool:
+    """Warn of failing joints whose shear exceeds that of their closed part; return if any does."""
     normal, shear, moment = (joints[key].values for key in "NVM")
     strength = structure.cohesion * contact_fractions(structure, normal, moment)
     holds = np.isfinite(structure.friction) & (structure.cohesion > 0.0)
@@ -764,3 +768,4 @@ def warn_cohesion(
             "part in a state, such as the end of a pushover",
             *(len(overstrained), structure.joints[overstrained[0]].name, factor),
         )
+    return bool(overstrained)

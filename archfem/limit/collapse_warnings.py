@@ -31,14 +31,15 @@ def warn_dilatancy(structure: Structure) -> None:
         )
 
 
-def warn_sliding(structure: Structure, sliding: Sequence[int], factor: float) -> None:
-    """Warn of joints that slide and, by associated flow, dilate; of curved faces as one."""
+def warn_sliding(structure: Structure, sliding: Sequence[int], factor: float) -> bool:
+    """Warn of joints that slide and dilate, of curved faces as one; return if there are any."""
     if names := [*dict.fromkeys(structure.face_names[k] for k in sliding)]:
         logger.warning(
             "joints slide (%s): with the dilatancy of associated flow the factor %.4g is an "
             "upper estimate; friction='nonassociated' does without it",
             *(join_joint_names(names), factor),
         )
+    return bool(names)
 
 
 def warn_locking(structure: Structure, friction: str | None, fill: object) -> None:

@@ -214,7 +214,7 @@ def evaluate_limit(case: Case) -> Findings:
     }
     if collapse.outcome is Outcome.BRACKETED:
         findings["factor_at_most"] = float(collapse.upper)
-    searched = [x.bonded or (x.solutions and x.solutions.may_be_less) for x in senses]
+    searched = [x.bounded or (x.solutions and x.solutions.may_be_less) for x in senses]
     bounds = ["factor"] * bool(searched[0])
     if push := abs(collapse.push):
         factors = [x.factor if x.over_fill is None else x.range[0] for x in senses]

@@ -237,9 +237,10 @@ def test_limit_analysis_in_words(ring):
         (af.motion.TableSpectrum([0.0, 1.0], [0.1, 0.2]), "0.1 g"),
     ):
         ratio = pushed.factor / float(case.target.horizontal(0.0))
-        assert describe_limit(case, mirrored, None)[1].endswith(
-            f"\nit begins to move at {ratio:.3g} times the site's {named}"
-        )
+        for bounded in (False, True):
+            words = describe_limit(case, replace(mirrored, bounded=bounded), None)[1]
+            most = f"{'≤ ' * bounded}{ratio:.3g} times the site's {named}"
+            assert words.endswith(f"\nit begins to move at {most}")
     case.target = None
     least = replace(pushed, solutions=SimpleNamespace(may_be_less=True))
     words = describe_limit(case, least, mirrored)[1]
@@ -251,6 +252,7 @@ def test_limit_analysis_in_words(ring):
     assert describe_limit(case, pushed, None)[1].endswith(f"{DEFAULTS}, backing strength 1 MPa")
     slab = af.column(breadth=4.0, heights=[1.0])  # slides before it turns
     slid, lifted = (af.collapse_factor(slab, live=af.BodyForce(*g)) for g in ((1.0,), (0.0, -1.0)))
+    assert (slid.bounded, lifted.bounded, pushed.bounded) == (True, False, False)
     words = describe_collapse(slab, slid, parse_limit({})).splitlines()
     assert words[1] == f"sliding: {slab.joints[0].name}"
     first = "limit analysis: this load never overturns it"

@@ -314,6 +314,7 @@ def test_a_bond_that_yields_turns_about_the_toe(strength, caplog):
         moment = 0.5 * (strength + TENSION) * width * x * (BREADTH - x)
     assert found.factor == pytest.approx(moment / (weight * HEIGHT / 2.0), rel=1e-6)
     assert "bonds are brittle" in caplog.text
+    assert found.bounded
     # the resultants are those of the joint: nothing but the weight is above it
     assert float(found.joints["N"][0]) == pytest.approx(weight, rel=1e-6)
 

@@ -73,9 +73,6 @@ _BEGUN = {RESULTS["risk"]: "risk_samples.nc"}
 # Lines of the head with the answer, in their order
 HEAD = ("verdict", "margin", "depends on", "not checked")
 
-# What a doubt of limit analysis says of a factor that is an upper bound
-UPPER_ESTIMATE = "upper estimate"
-
 # Demands of which factors of several cases are multiples, in words
 KINDS = "the earthquake", "the vehicle", "the given load"
 
@@ -156,10 +153,8 @@ def list_joint_facts(parts: Mapping[str, ReportData]) -> list[tuple[str, str]]:
 
 def _say_factor(data: ReportData, factor: float, kind: str) -> str:
     """Say a least factor of a case, with "at most" before an upper bound."""
-    pushed = data.statements.get("limit", Statement([], []))
-    doubtful = any(UPPER_ESTIMATE in str(doubt) for doubt in pushed.doubts)
-    pushes = read_numbers(PushFactors, pushed)
-    bounds = [x.least for x in pushes if doubtful or x.proved is not None]
+    pushes = read_numbers(PushFactors, data.statements.get("limit"))
+    bounds = [x.least for x in pushes if x.bounded or x.proved is not None]
     checks = read_numbers(Ratios, data.statements.get("assessment"))
     bounds += [check.decisive for check in checks if check.bounded]
     bounds += [least for least, words, _ in margins.say_less(data) if "≤" in words]

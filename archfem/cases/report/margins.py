@@ -190,7 +190,7 @@ def describe_push(data: ReportData, name: str, push: PushFactors) -> Iterator[st
     of = " with elastic joints" if elastic else " as rigid blocks" * bounded
     over = OVER_FILL * (push.most > push.least)
     size = f"{Ends((push.least, push.most)):ratio} times {push.site}{over}"
-    text = f"pushed sideways{of} it begins to move at {size}"
+    text = f"pushed sideways{of} it begins to move {'at most ' * push.bounded}at {size}"
     if bounded:
         proved = push.proved and f"is proved to stand up to {format_ratio(push.proved)} times"
         text += f"; it is the least that a search found, and {proved or NO_PROOF}"
