@@ -45,9 +45,6 @@ from archfem.masonry.loads import Action, AttachedLoad, PointLoad, list_loads
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import HasStructure, Structure, join_joint_names, structure_of
 
-# How the events of ties begin
-TIE_AT = "the tie at "
-
 
 class PathEnd(ExplainedWord):
     """Reason for which the path of a mechanism ends."""
@@ -275,7 +272,9 @@ class PathEvent:
     """A change of the mechanism along its path, or its end."""
 
     place: int  # number of the place where it happens
-    text: str
+    text: str  # or the end
+    closes: bool = False  # whether joints close
+    of_tie: bool = False  # whether a tie slackens or yields
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -536,7 +535,7 @@ class PathFollower:
             mechanism = find_mechanism(blocks, self.joints, self.friction, flat=flat)
         except NoEquilibrium as error:
             # without the length that a tie kept, two motions are free, and one factor holds neither
-            if self.events and self.events[-1].text.startswith(TIE_AT):
+            if self.events and self.events[-1].of_tie:
                 raise _Stop(PathEnd.RELEASED) from error
             self._record(blocks, 0.0)
             raise _Stop(PathEnd.FALLS) from error
@@ -595,15 +594,16 @@ class PathFollower:
         step = min(way for way, share in shares.items() if share < 0.0)
         if (trial := tried[step]) is None:
             raise _Stop(PathEnd.LOCKS)
-        event = self._name_event(trial[0], self._margins(*trial, step) <= 0.0)
+        first = self._margins(*trial, step) <= 0.0
+        event = self._name_event(len(self.factors), trial[0], first)
         self.travel += step
-        if event.endswith("closes"):  # just before, where the corner is within the tolerance
+        if event.closes:  # just before, where the corner is within the tolerance
             trial = tried[max(way for way in shares if way < step)] or trial
         blocks = trial[0].blocks
         self._record(blocks, max(trial[0].balance(trial[1], self.friction)[0], 0.0))
-        self.events.append(PathEvent(len(self.factors) - 1, event))
-        if isinstance(event, PathEnd):
-            raise _Stop(event)
+        self.events.append(event)
+        if isinstance(event.text, PathEnd):
+            raise _Stop(event.text)
         return blocks
 
     def _margins(
@@ -641,26 +641,29 @@ class PathFollower:
         return float(min(share, length - share))
 
     @staticmethod
-    def _name_event(state: LinkageState, happened: Flags) -> str:
+    def _name_event(place: int, state: LinkageState, happened: Flags) -> PathEvent:
         """Return the first of the events that have happened at a state."""
         names = [joint.name for joint in state.blocks.structure.joints]
         if happened[0]:
-            return PathEnd.FALLS
+            return PathEvent(place, PathEnd.FALLS)
         closes = happened[1 : 4 * len(names) + 1].reshape(2, -1, 2).any(axis=(0, 2))
         if closes.any():
-            return f"{join_joint_names([names[k] for k in np.flatnonzero(closes)])} closes"
+            closing = join_joint_names([names[k] for k in np.flatnonzero(closes)])
+            return PathEvent(place, f"{closing} closes", closes=True)
         others = happened[4 * len(names) + 1 : -1]
         of_contacts, of_ties = np.split(others, [2 * len(state.contacts)])
         for way, changed in zip(("slackens", "yields"), of_ties.reshape(2, -1), strict=True):
             for number in state.linkage.held[changed]:
-                return f"{TIE_AT}{state.blocks.ties[number].name} {way}"
+                name = state.blocks.ties[number].name
+                return PathEvent(place, f"the tie at {name} {way}", of_tie=True)
         changes = of_contacts.reshape(2, -1)
         for contact, opens, is_off in zip(state.contacts, *changes, strict=True):
             if opens:
-                return f"a contact of {names[contact.joint]} opens"
+                return PathEvent(place, f"a contact of {names[contact.joint]} opens")
             if is_off:
-                return f"a corner slides off its face at {names[contact.joint]}"
-        return PathEnd.COLLIDES
+                name = names[contact.joint]
+                return PathEvent(place, f"a corner slides off its face at {name}")
+        return PathEvent(place, PathEnd.COLLIDES)
 
     def last_equilibrium(self, path: MechanismPath, samples: int = 9) -> int:
         """Return the last place up to which no mechanism has a lower factor than the path."""

@@ -23,7 +23,7 @@ from archfem.cases.report.conclusion import list_facts
 from archfem.cases.report.report_data import ReportData
 from archfem.cases.result_text import note_ties_left_out
 from archfem.cases.toml_file import read_object
-from archfem.limit.finite_mechanism import PathEnd
+from archfem.limit.finite_mechanism import PathEnd, PathFollower
 from archfem.statics import LIMIT_STATES, AssessmentCheck, LimitState, mechanism_assessment
 from archfem.statics.assessment_checks import (
     BY_MECHANISM,
@@ -505,6 +505,19 @@ def test_a_tie_holds_its_point_along_the_motion():
     assert turns[-1] > 0.1
     assert found.path.factors[-1] < 2e-3
     assert assess_tied(4.0, 5e3).alpha_0 == pytest.approx((10.0 + 5.0 * 4.0) / 80.0, rel=1e-4)
+
+
+def test_the_end_of_a_path_by_a_tie_is_read_from_no_text(monkeypatch):
+    name_event = PathFollower._name_event
+
+    def reword(*given):
+        event = name_event(*given)
+        return event if isinstance(event.text, PathEnd) else replace(event, text="in other words")
+
+    monkeypatch.setattr(PathFollower, "_name_event", staticmethod(reword))
+    path = assess_tied(4.0, 2e4).path
+    assert path.end is PathEnd.RELEASED
+    assert path.events[-1].text == "in other words"
 
 
 def test_a_bar_between_posts_that_turn_alike_changes_nothing():
