@@ -75,6 +75,20 @@ def test_a_source_stands_beside_the_mark_of_what_is_given_at_or_below_its_key():
     assert found == {name: f"given ({text})" for name, text in expected.items()}
 
 
+def test_a_source_of_a_key_without_a_row_has_a_row_of_its_own():
+    """Of results that are not in the report, and of a table whose keys have other sources."""
+    sources = {"limit.friction": "tilt test", "model": "as agreed", "model.fidelity": "the client"}
+    tables = tables_with(sources | {"output": "none"}, limit={"friction": "coulomb"}, output={})
+    rows = tabulate_inputs(ReportData(af.Case.of(tables), {})).rows
+    assert [tuple(row) for row in rows[-3:]] == [
+        ("limit.friction", "coulomb", "given (tilt test)"),
+        ("model", "fidelity rigid", "given (as agreed)"),
+        ("output", "-", "given (none)"),
+    ]
+    assert ("fidelity", "rigid", "given (the client)") in rows
+    assert sum("given (" in row[2] for row in rows) == len(sources) + 1
+
+
 def test_pairs_of_a_suite_have_their_sources_in_the_row_of_all():
     pairs = {name: {"synthetic": {"seed": k}} for k, name in enumerate(("first", "the 2nd"), 1)}
     tables = tables_with({"suite.pairs.the 2nd": "Amatrice", "suite.pairs.first": "Norcia"})

@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import reduce
 from inspect import Parameter, signature
 from typing import Any
 
@@ -107,7 +108,7 @@ def tabulate_inputs(data: ReportData) -> Grid:
         rows += [*_motion_rows(data), *_model_rows(data), *_criteria_rows(data)]
     elif data.case.target is not None and data.statements.keys() & {"limit", "assessment"}:
         rows += _target_rows(data)
-    return Grid((), _add_sources(rows, _read_sources(data)), _CAPTION)
+    return Grid((), _add_sources(rows, _read_sources(data), data.case.settings), _CAPTION)
 
 
 def compare_inputs(parts: Mapping[str, ReportData]) -> list[Grid]:
@@ -137,19 +138,29 @@ def _lies_in(key: str, above: str) -> bool:
     return f"{key}.".startswith(f"{above}.")
 
 
-def _add_sources(rows: Sequence[Row], sources: Mapping[str, str]) -> list[Row]:
-    """Return quantity, value and mark of rows, what is given with its source."""
-    keys, added = [key for row in rows for key in row[3:]], list[Row]()
+def _add_sources(
+    rows: Sequence[Row], sources: Mapping[str, str], settings: Mapping[str, Any]
+) -> list[Row]:
+    """Return quantity, value and mark of rows, what is given with its source; then other sources.
+
+    Those are of keys without a row, such as ones of a result that is not in the report.
+    """
+    keys, added, left = [key for row in rows for key in row[3:]], list[Row](), [*sources]
     parts = [path for path in sources if not any(_lies_in(key, path) for key in keys)]
     for name, value, mark, *own in rows:
         found = list[str]()
         # nobody but archfem is the source of a default; a drawing is that of its blocks
         for key in own if mark == "given" or own == ["structure"] else ():
-            above = [path for path in sources if _lies_in(key, path)]
-            found += [sources[path] for path in sorted(above, key=len)[-1:]]
+            above = sorted((path for path in sources if _lies_in(key, path)), key=len)[-1:]
+            found += [sources[path] for path in above]
             within = [path for path in parts if _lies_in(path, key)]
+            left = [path for path in left if path not in (*above, *within)]
             found += [f"{path.removeprefix(key)[1:]}: {sources[path]}" for path in within]
         added.append((name, value, f"{mark} ({'; '.join(found)})" if found else mark))
+    for path in left:
+        stated = reduce(lambda table, key: table.get(key, {}), split_key_path(path), settings)
+        text = "-" if stated == {} else describe_value(stated)  # that of a drawing is not kept
+        added.append((path, text, f"given ({sources[path]})"))
     return added
 
 
