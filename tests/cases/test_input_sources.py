@@ -6,6 +6,7 @@ from copy import deepcopy
 import pytest
 
 import archfem as af
+from archfem.cases.case import case_of
 from archfem.cases.report.inputs import compare_inputs, tabulate_inputs
 from archfem.cases.report.report_data import ReportData
 
@@ -87,6 +88,18 @@ def test_a_source_of_a_key_without_a_row_has_a_row_of_its_own():
     ]
     assert ("fidelity", "rigid", "given (the client)") in rows
     assert sum("given (" in row[2] for row in rows) == len(sources) + 1
+
+
+def test_the_inputs_say_that_python_may_have_given_what_is_marked_a_default():
+    """An analysis does not know which of its values were given."""
+    column = af.column(breadth=1.0, heights=[1.0])
+    given = af.Analysis(column, fidelity="rigid", criteria=af.Criteria(failures=4))
+    plain = af.Analysis(column, fidelity="rigid")
+    tables = [tabulate_inputs(ReportData(case_of(each), {})) for each in (given, plain)]
+    assert tables[0] == tables[1]
+    assert "Default: archfem's, since the case does not, or Python was given the same" in str(
+        tables
+    )
 
 
 def test_pairs_of_a_suite_have_their_sources_in_the_row_of_all():

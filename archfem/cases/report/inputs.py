@@ -95,8 +95,8 @@ _FURTHER_PROPERTIES = {
 }
 
 _CAPTION = (
-    "Inputs. Given: the case states it. Default: archfem's, since the case does not. Inferred: it "
-    "follows from the others."
+    "Inputs. Given: the case states it. Default: archfem's, since the case does not, or Python was "
+    "given the same. Inferred: it follows from the others."
 )
 
 
