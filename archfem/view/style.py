@@ -359,12 +359,12 @@ def save(figure: Figure, path: str | Path) -> Path:
         raise InvalidInput(f"{target} has suffix '{target.suffix}': use one of {kinds}")
     if not isinstance(figure, Page):  # it disables math itself whenever it is drawn
         disable_math(figure)
-    # text stays text, which can be searched and edited
-    fonts = {"pdf.fonttype": 42, "svg.fonttype": "none"}
+    # text stays text, which can be searched and edited; names of parts are the same at every run
+    fixed = {"pdf.fonttype": 42, "svg.fonttype": "none", "svg.hashsalt": "archfem"}
     # a tenth larger than by the default level, in two thirds of the time
-    options = {"pil_kwargs": {"compress_level": 3}} if kind == "png" else {}
-    with atomic_write(target) as draft, matplotlib.rc_context(fonts):
-        figure.savefig(draft, format=kind, dpi=300, **options)
+    own: Any = {"png": {"pil_kwargs": {"compress_level": 3}}, "svg": {"metadata": {"Date": None}}}
+    with atomic_write(target) as draft, matplotlib.rc_context(fixed):
+        figure.savefig(draft, format=kind, dpi=300, **own.get(kind, {}))
     return target
 
 

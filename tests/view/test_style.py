@@ -32,6 +32,12 @@ def test_a_figure_is_saved_whole(ring, low_resolution, tmp_path, suffix, start):
     assert [each.name for each in path.parent.iterdir()] == [path.name]
 
 
+def test_a_vector_graphic_is_the_same_at_every_run(ring, tmp_path):
+    paths = [save(af.view.draw_structure(ring), tmp_path / f"{name}.svg") for name in "ab"]
+    assert paths[0].read_bytes() == paths[1].read_bytes()
+    assert b"<dc:date>" not in paths[0].read_bytes()
+
+
 def test_coordinates_of_a_survey_are_shown_whole():
     outlines = (((45230.0 + x, y) for x, y in ((0, z), (2, z), (2, z + 1), (0, z + 1)))
                 for z in (237.0, 238.0))  # fmt: skip
