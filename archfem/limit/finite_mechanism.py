@@ -291,6 +291,7 @@ class MechanismPath:
         end: reason for which the path ends; `end.sentence` gives its meaning.
         holds: last place up to which no other mechanism has a lower factor; beyond it the factors
             are upper bounds. None where that was not examined.
+        pulls: largest force of each tie on the way, while it keeps its length (n_ties,) [N].
     """
 
     blocks: PlacedBlocks
@@ -301,6 +302,7 @@ class MechanismPath:
     events: tuple[PathEvent, ...]
     end: PathEnd
     holds: int | None = None
+    pulls: Array = field(default_factory=lambda: np.zeros(0))
 
     @cached_property
     def curve(self) -> xr.Dataset:
@@ -435,11 +437,13 @@ class PathFollower:
     displacements: list[Array] = field(default_factory=list)
     events: list[PathEvent] = field(default_factory=list)
     travel: float = 0.0  # of the fastest corner, so far [m]
+    pulls: Array = field(default_factory=lambda: np.zeros(0))  # as of the path (n_ties,) [N]
 
     def follow(self, mechanism: KinematicChain, max_events: int = 20) -> MechanismPath:
         """Follow a mechanism until it falls, locks, collides, or the path is cut off."""
         mechanisms: list[KinematicChain] = [mechanism]
         motion, stuck = np.zeros_like(self.blocks.displacement), 0
+        self.pulls = np.zeros(len(self.blocks.ties))
         try:
             mechanisms[0], state, velocity = self._start(self.blocks, mechanism)
             motion = state.bodies.spread(velocity)
@@ -461,7 +465,7 @@ class PathFollower:
             end = PathEnd.UNRESOLVED
         places = np.array(self.factors), np.array(self.displacements)
         changes = tuple(mechanisms), tuple(self.events)
-        return MechanismPath(self.blocks, *places, motion, *changes, end)
+        return MechanismPath(self.blocks, *places, motion, *changes, end, pulls=self.pulls)
 
     def _start(
         self, blocks: PlacedBlocks, mechanism: KinematicChain
@@ -529,6 +533,11 @@ class PathFollower:
         self.factors.append(factor)
         self.displacements.append(blocks.displacement)
 
+    def _record_state(self, state: LinkageState, factor: float, forces: Array) -> None:
+        """Append the place of a state to the path, and compare the forces of its held ties."""
+        np.fmax.at(self.pulls, state.linkage.held, forces[len(state.contacts) :])
+        self._record(state.blocks, factor)
+
     def _renew(self, blocks: PlacedBlocks, *, flat: bool = False) -> KinematicChain:
         """Return the mechanism of limit analysis at the present places."""
         try:
@@ -549,8 +558,8 @@ class PathFollower:
     def _follow_linkage(self, state: LinkageState, velocity: Array) -> PlacedBlocks:
         """Follow a linkage to its next event and return the blocks there."""
         size = self.blocks.structure.size
-        factor = state.balance(velocity, self.friction)[0]
-        self._record(state.blocks, factor)
+        factor, pressures = state.balance(velocity, self.friction)
+        self._record_state(state, factor, pressures)
         step = 1e-3 * size
         while self.travel <= size:
             trial = state.advanced(velocity, step)
@@ -567,7 +576,7 @@ class PathFollower:
                 return self._finish(state, velocity, step, trial)
             (state, velocity), factor = trial, forces[0]
             self.travel += step
-            self._record(state.blocks, factor)
+            self._record_state(state, *forces)
             step = min(1.5 * step, 0.01 * size)
         raise _Stop(PathEnd.ENDURES)
 
@@ -599,12 +608,12 @@ class PathFollower:
         self.travel += step
         if event.closes:  # just before, where the corner is within the tolerance
             trial = tried[max(way for way in shares if way < step)] or trial
-        blocks = trial[0].blocks
-        self._record(blocks, max(trial[0].balance(trial[1], self.friction)[0], 0.0))
+        factor, forces = trial[0].balance(trial[1], self.friction)
+        self._record_state(trial[0], max(factor, 0.0), forces)
         self.events.append(event)
         if isinstance(event.text, PathEnd):
             raise _Stop(event.text)
-        return blocks
+        return trial[0].blocks
 
     def _margins(
         self,

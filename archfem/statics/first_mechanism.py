@@ -302,13 +302,13 @@ def doubt_opposed_ties(placed: PlacedBlocks) -> list[Doubt]:
 
 
 def describe_loads(
-    placed: PlacedBlocks,
+    path: MechanismPath,
     loads: Sequence[AttachedLoad],
     ties: str,
     stretches: Sequence[tuple[str, float]],
 ) -> list[str]:
     """Describe loads along the motion: fill, ties and constant forces; and masses far away."""
-    found = list[str]()
+    found, placed, pulls = list[str](), path.blocks, path.pulls
     if placed.fill is not None:
         found.append(
             "all along the motion the pressures of the fill on the stones are those of the "
@@ -316,10 +316,13 @@ def describe_loads(
         )
     if ties:
         at = ", ".join(f"{format_mm(size)} at {name}" for name, size in stretches)
+        each = zip(pulls, placed.ties, strict=len(pulls) > 0)  # none where nothing moves on
+        held = [f"{pull / kN:.4g} kN at {x.name}" for pull, x in each if pull > 1e-4 * x.size]
         found.append(
             f"{ties}; along the motion a tie pulls with all of its force where it is stretched"
             f"{f', at the capacity by {at},' * bool(at)} with what equilibrium needs where it "
-            "keeps its length, and else with none: verify bar and anchor"
+            f"keeps its length{f', up to {join_names(held)}' * bool(held)}, and else with none: "
+            "verify bar and anchor"
         )
     if forces := [load.force for load in loads if any(load.force) and not load.passive]:
         pushes = any(force[0] * placed.direction > 0.0 for force in forces)

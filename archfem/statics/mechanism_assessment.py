@@ -252,7 +252,9 @@ class KinematicAssessment(ResultDisplay):
                 f"a_0* = {self.a_0_star:.4g} m/s² ({self.a_0_star / STANDARD_GRAVITY:.3f} g)"
                 f"{divided}{vanishes if np.isfinite(self.d_0_star) else ''}",
             ]
-            changes = [event.text for event in self.path.events if event.text != self.path.end]
+            moved = abs(self.curve["d"].values.round(5))
+            events = [event for event in self.path.events if event.text != self.path.end]
+            changes = [f"{event.text} at d* = {moved[event.place]:.3g} m" for event in events]
             changed = f"along the path the mechanism changes: {join_names(changes, '; ')}"
             lines += [*self._setbacks, *[changed] * bool(changes)]
             lines += [self.path.end.sentence] if self.displacement else []
@@ -595,7 +597,7 @@ class _Oscillator:
         """Return the assumptions of the curve, and its omissions on the safe side."""
         if self.path is None:
             return []
-        found = describe_loads(self.placed, self.given.loads, self.ties, self.stretches)
+        found = describe_loads(self.path, self.given.loads, self.ties, self.stretches)
         collapse = self.path.mechanisms[0].factor
         if factor < (1.0 - 1e-3) * collapse:
             found.append(

@@ -1,5 +1,6 @@
 """Kinematic assessment: six cases worked by hand, the checks of the codes, and refused input."""
 
+import re
 from dataclasses import replace
 from functools import partial
 from itertools import pairwise
@@ -388,6 +389,37 @@ def test_a_bar_between_two_blocks_pulls_both(verified):
     assert f"at the capacity by {1e3 * stretch:.3g} mm at left and right" in found.notes[0]
     slack = af.kinematic_assessment(structure, SPECTRUM, loads=loads, direction=-1.0)
     assert slack.alpha_0 == pytest.approx(0.5 / height, rel=1e-4)
+
+
+def test_the_pull_of_a_bar_that_grows_and_where_it_yields_are_said():
+    """From the left top to the middle of the right block: moments about its toe, all the way."""
+    structure, (level,) = two_tied_blocks(1e3)
+    chord, weight, toe = np.array([3.0, -1.5]), 30e3, (4.5, 0.0)
+
+    def assess(force):
+        pull = tuple(force * chord / np.hypot(*chord))
+        bar = replace(level, anchor_point=(4.0, 1.5), force=pull)
+        return af.kinematic_assessment(structure, SPECTRUM, loads=[bar])
+
+    found, pulls = assess(1e6), []
+    for moved, factor in zip(found.path.displacements, found.path.factors, strict=True):
+        (left, right), ends = moved[[1, 3], 2], []
+        for turn, about, point in ((left, (1.0, 0.0), (0.0, 3.0)), (right, toe, (-0.5, 1.5))):
+            turned = [[cos(turn), -sin(turn)], [sin(turn), cos(turn)]]
+            ends.append(np.array(turned) @ point + about)
+        bar = ends[0] - ends[1]
+        assert np.hypot(*bar) == pytest.approx(np.hypot(*chord), rel=1e-9)
+        along, (x, y) = bar / np.hypot(*bar), ends[1] - toe
+        from_toe = moved[3, :2] + (-0.25, 1.5)
+        pulls.append(weight * (from_toe @ (1.0, factor)) / (x * along[1] - y * along[0]))
+    assert max(pulls) > 1.1 * pulls[0]
+    assert found.path.pulls == pytest.approx([max(pulls)], rel=1e-6)
+    assert f"keeps its length, up to {max(pulls) / 1e3:.4g} kN at left and right, and" in str(found)
+    assert "yields" not in str(found)
+    force = np.mean([pulls[0], max(pulls)])
+    yields = float(np.interp(force, pulls, found.curve["d"]))
+    said = re.search(r"the tie at left and right yields at d\* = ([\d.]+) m", str(assess(force)))
+    assert float(said[1]) == pytest.approx(yields, rel=0.02)
 
 
 def test_two_ties_to_the_ground_are_no_bar():
