@@ -99,9 +99,11 @@ def list_fill_values(case: Case) -> Iterator[tuple[str, str, bool]]:
         # an assessment may have the fill of the limit analysis
         if (given := case.settings.get(section, {}).get("fill")) is None:
             continue
-        replaced = {"backing": "backing_height", "backing_height": "backing"}
+        backed = given.keys() & {"backing", "backing_height"}
+        unused = {"backing_height", "backing"} - backed if backed else {"backing_height"}
+        unused |= set() if backed else {"backing_strength"}
         for key, unit in {"law": "", **declared_keys(type(fill))}.items():
-            if replaced.get(key) in given:
+            if key in unused - given.keys():
                 continue
             value = getattr(fill, key, given.get("law", "pressure"))  # the law is a class
             number = isinstance(value, float)
@@ -209,7 +211,6 @@ def describe_fill_defaults(case: Case) -> str:
         (path.rpartition(".")[2], text, given) for path, text, given in list_fill_values(case)
     ]
     has = {key for key, text, _ in values if text != "none"}
-    has -= set() if has & {"backing", "backing_height"} else {"backing_strength"}
     words = dict.fromkeys(
         f"{key.replace('_', ' ')} {text}" for key, text, given in values if key in has and not given
     )

@@ -247,8 +247,6 @@ class Structure(ResultDisplay):
         name: name in titles and files.
         origin: name and arguments of the shape function that made it, or None; not compared, and
             of a changed copy still that of the original.
-        above: height above the ground of the foot of a column that `columns_across` has made; None
-            of other structures [m].
         above: height of the foot of a column of a wall across its plane, `columns_across`, above
             the ground; None of what is no such column [m].
     """

@@ -298,11 +298,16 @@ def test_courses_of_other_weights_state_equal_defaults_once(tmp_path):
 
 
 @pytest.mark.parametrize("key", ["backing", "backing_height"])
-def test_a_given_backing_has_no_default_of_the_other_key(key):
+def test_a_given_backing_has_no_default_of_the_other_key_but_a_strength(key):
     limit = {"horizontal": 1.0, "fill": {"friction_angle": 30.0, key: 0.5}}
     listed = [*list_fill_values(af.Case.of({**BARE, "limit": limit}))]
-    backings = {"limit.fill.backing", "limit.fill.backing_height"}
-    assert [row for row in listed if row[0] in backings] == [(f"limit.fill.{key}", "0.5 m", True)]
+    strength = "limit.fill.backing_strength", "1 MPa", False
+    of_backing = [row for row in listed if "backing" in row[0]]
+    assert of_backing == [(f"limit.fill.{key}", "0.5 m", True), strength]
+    del limit["fill"][key]
+    listed = [*list_fill_values(af.Case.of({**BARE, "limit": limit}))]
+    of_backing = [row for row in listed if "backing" in row[0]]
+    assert of_backing == [("limit.fill.backing", "none", False)]
 
 
 def test_forces_that_a_run_leaves_out_are_doubted_once():

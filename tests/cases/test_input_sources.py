@@ -132,6 +132,25 @@ def test_cases_that_differ_in_a_source_show_it_in_their_columns():
     assert ("radius", "2.95 m", "given (survey of May 2026)") in same.rows
 
 
+def test_inputs_of_one_case_alone_stand_in_a_table_without_columns_of_the_others():
+    cases = {label: tables_with({}) for label in "ABC"}
+    del cases["A"]["motion"], cases["B"]["motion"]
+    cases["B"]["model"] = {"fidelity": "rigid", "quadrature": "lobatto"}
+    data = {label: ReportData(af.Case.of(tables), {}) for label, tables in cases.items()}
+    same, several, alone = compare_inputs(data)
+    assert [row[0] for row in several.rows] == ["quadrature"]
+    assert {row[0] for row in alone.rows} == {"C"}
+    own = {row[0] for row in tabulate_inputs(data["C"]).rows}
+    rows = {row[1] for row in alone.rows}, {row[0] for row in same.rows}, {"quadrature"}
+    assert own == set.union(*rows)
+    assert sum(map(len, rows)) == len(own)
+    assert ("C", "scale of the motion", "1.5", "given") in alone.rows
+    # cases that are alike need one table
+    assert [each.caption for each in compare_inputs({"A": data["A"], "B": data["A"]})] == [
+        same.caption
+    ]
+
+
 @pytest.mark.parametrize(
     ("key", "words"),
     [

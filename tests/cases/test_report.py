@@ -1031,6 +1031,13 @@ def test_a_report_of_several_folders_has_the_worst_verdict_and_the_inputs_once(
         assert words.index("place, date signature") < words.index(drawn)
         assert words.index(drawn) < words.index("Inputs. Given")
     assert words.count("with its assessed joints") == 2
+    # cases of one structure have one drawing, and the project is the title of all
+    given = ["report", *folders, folders[0], "--set", "report.project=A tower"]
+    assert af.commands.main([*given, "--out", str(page)]) == 0
+    assert words_of(page).split("project")[0].split()[-2:] == ["A", "tower"]
+    words = " ".join(words_of(page).split())
+    assert "Figure 1. A and C: the structure" in words
+    assert words.count("with its assessed joints") == 2
     # a study of one case, that of the file, is shown with that
     study, shown = tmp_path / "study.toml", tmp_path / "study"
     text = 'title = "Heights"\ncase = "column.toml"\ncompute = "assessment"\n'

@@ -112,19 +112,30 @@ def tabulate_inputs(data: ReportData) -> Grid:
 
 
 def compare_inputs(parts: Mapping[str, ReportData]) -> list[Grid]:
-    """Tabulate inputs of several cases that are the same, and others with a column for each."""
-    tables = [tabulate_inputs(data).rows for data in parts.values()]
+    """Tabulate inputs of several cases: those of all, of one alone, and a column for each."""
+    tables = {label: tabulate_inputs(data).rows for label, data in parts.items()}
     same, differing = list[Sequence[str]](), list[Sequence[str]]()
-    for quantity in dict.fromkeys(row[0] for rows in tables for row in rows):
-        own = [tuple(x for x in rows if x[0] == quantity) for rows in tables]
-        if len({*own}) == 1:
-            same += own[0]
-            continue
-        marked = [[(x[1], x[2].replace(" (", ": ", 1).removesuffix(")")) for x in y] for y in own]
-        texts = (", ".join(f"{value} ({mark})" for value, mark in found) for found in marked)
-        differing.append((quantity, *(text or "-" for text in texts)))
-    table = Grid(("", *parts), differing, "Inputs that differ between the cases", "words")
-    return [Grid((), same, _CAPTION), *[table] * bool(differing)]
+    alone: dict[str, list[Sequence[str]]] = {label: [] for label in parts}
+    for quantity in dict.fromkeys(row[0] for rows in tables.values() for row in rows):
+        own = {label: tuple(x for x in tables[label] if x[0] == quantity) for label in parts}
+        having = [label for label, rows in own.items() if rows]
+        if len({*own.values()}) == 1:
+            same += own[having[0]]
+        elif len(having) == 1:
+            alone[having[0]] += [(having[0], *row) for row in own[having[0]]]
+        else:
+            texts = ("; ".join(map(_join_mark, rows)) for rows in own.values())
+            differing.append((quantity, *(text or "-" for text in texts)))
+    several = Grid(("", *parts), differing, "Inputs that differ between the cases", "words")
+    rows = [row for own in alone.values() for row in own]
+    single = Grid(("case", "", "", ""), rows, "Inputs of one case alone", "words")
+    return [each for each in (Grid((), same, _CAPTION), several, single) if each.rows]
+
+
+def _join_mark(row: Sequence[str]) -> str:
+    """Return value and mark of a row as one text."""
+    mark = row[2].replace(" (", ": ", 1).removesuffix(")")
+    return f"{row[1]} ({mark})"
 
 
 def _read_sources(data: ReportData) -> dict[str, str]:

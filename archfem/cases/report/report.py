@@ -44,7 +44,8 @@ def write_report(data: ReportData, path: str | Path, *others: ReportData) -> Pat
     with limit_width(FIGURE_WIDTH):
         facts = list_joint_facts(parts) if others else list_facts(data)
         sections = build_joint_sections(parts) if others else build_sections(data)
-    title = join_words([*dict.fromkeys(each.case.title for each in cases)])
+    titles = dict.fromkeys(each.case.title for each in cases)
+    title = (others and data.case.report.get("project")) or join_words([*titles])
     document = Document(title, origin, facts, number_captions(sections), footer)
     if Path(path).suffix.lower() == ".docx":
         return write_word(path, document)

@@ -83,10 +83,11 @@ _METHODS = (
 
 def build_joint_sections(parts: Mapping[str, ReportData]) -> list[Section]:
     """Build the sections of a report of several cases: drawings, inputs, and each case."""
-    report, labels = next(iter(parts.values())).case.report, dict[Structure, list[str]]()
+    report, labels = next(iter(parts.values())).case.report, dict[str, list[str]]()
     for label, data in parts.items():
-        labels.setdefault(data.case.structure, []).append(label)
-    drawn = [_draw_assessed(each, f"{join_words(own)}: the") for each, own in labels.items()]
+        labels.setdefault(data.case.structure.fingerprint, []).append(label)
+    firsts = {join_words(own): parts[own[0]].case.structure for own in labels.values()}
+    drawn = [_draw_assessed(each, f"{own}: the") for own, each in firsts.items()]
     sections = [Section("Signatures and drawings", [build_signatures(report), *drawn])]
     sections.append(Section("Inputs of all cases", compare_inputs(parts)))
     for data in parts.values():
