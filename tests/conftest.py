@@ -54,7 +54,6 @@ def pytest_make_collect_report(collector):
 
 def pytest_collection_finish():
     """Look for garbage among what tests make alone: a twentieth of their time."""
-    gc.collect()
     gc.freeze()
 
 

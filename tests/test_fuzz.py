@@ -5,7 +5,7 @@ import importlib
 import pytest
 from fuzz.trial import BAD
 
-COUNTS = {"case_files": 25, "records": 100, "drawings": 40, "calls": 100, "shakes": 1}
+COUNTS = {"case_files": 12, "records": 50, "drawings": 20, "calls": 50, "shakes": 1}
 
 
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
