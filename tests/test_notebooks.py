@@ -120,21 +120,10 @@ def test_a_script_of_the_gallery_draws_its_figure(name, monkeypatch, tmp_path):
     assert os.listdir(tmp_path) == []
 
 
-LONG = (
-    "02_how_thin_can_it_be",
-    "03_a_roman_bridge",
-    "04_from_first_hinge_to_the_ground",
-    "05_the_papers_system_by_fenicsx_alone",
-    "06_how_a_joint_closes",
-)
-"""Notebooks whose results other tests check as well."""
-
-
-@pytest.mark.parametrize(
-    "name",
-    [pytest.param(name, marks=pytest.mark.slow if name in LONG else ()) for name in EXPECTED],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("name", EXPECTED)
 def test_notebook_arrives_at_its_number(name, monkeypatch, tmp_path):
+    """The default tests check results of them as well."""
     monkeypatch.setenv("MPLBACKEND", "Agg")
     monkeypatch.setenv("ARCHFEM_QUICK", "1")
     monkeypatch.chdir(tmp_path)

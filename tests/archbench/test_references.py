@@ -108,7 +108,7 @@ def admissible(opens, first):
     return -signs[0] if np.all(signs == signs[0]) else 0.0
 
 
-@pytest.mark.parametrize("name", ["S03", "S04"])
+@pytest.mark.parametrize("name", ["S03", pytest.param("S04", marks=pytest.mark.slow)])
 def test_four_hinges_sideways(name):
     number, half = reference(name)
     assert four_hinges(read_scene(name)) == pytest.approx(number, abs=half)

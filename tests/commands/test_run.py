@@ -718,7 +718,7 @@ def test_sliding_is_in_doubt_once_with_the_factor_that_is_shown(push, tmp_path, 
     assert re.findall(r"in doubt: joints slide .* the factor (\S+) is", said) == ["0.01667"]
 
 
-@pytest.mark.parametrize("command", ["limit", "run"])
+@pytest.mark.parametrize("command", ["limit", pytest.param("run", marks=pytest.mark.slow)])
 def test_limit_analysis_cut_short_keeps_the_first_sense(
     command, tmp_path, unplotted, monkeypatch, capsys
 ):

@@ -54,7 +54,13 @@ def misspelt(table):
 
 @pytest.mark.parametrize(
     "name",
-    ["ring", "ring_suite", pytest.param("prusias", marks=pytest.mark.slow), "survey", "new wall"],
+    [
+        "ring",
+        "ring_suite",
+        pytest.param("prusias", marks=pytest.mark.slow),
+        pytest.param("survey", marks=pytest.mark.slow),
+        "new wall",
+    ],
 )
 def test_a_misspelt_key_is_refused_where_the_reader_refuses_it(name, validator):
     settings, folder, refused = read(FILES[name]), FILES[name].parent, 0

@@ -57,7 +57,10 @@ def test_errors_are_the_largest_difference_to_the_reference(settings):
         compare_runs(settings, [TimedRun(7, 1.0, None), *runs[1:]], 10.0, 0.003)
 
 
-@pytest.mark.parametrize("longest", [0.4, pytest.param(9.0, marks=pytest.mark.slow), 300.0])
+@pytest.mark.parametrize(
+    "longest",
+    [0.4, pytest.param(9.0, marks=pytest.mark.slow), pytest.param(300.0, marks=pytest.mark.slow)],
+)
 def test_labels_of_computing_times_stay_apart(settings, longest):
     """Numbers of seconds, over one decade up to four; the setting that was chosen is named."""
     seconds = [0.05, longest, 0.06, 0.1, 0.2, longest]

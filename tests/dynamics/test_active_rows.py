@@ -63,7 +63,8 @@ RUNS = {
 @pytest.fixture(
     scope="module",
     params=[
-        pytest.param(name, marks=pytest.mark.slow if name == "many rows" else ()) for name in RUNS
+        pytest.param(name, marks=pytest.mark.slow if name in ("many rows", "stiff joints") else ())
+        for name in RUNS
     ],
 )
 def case(request):

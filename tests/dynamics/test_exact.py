@@ -16,6 +16,7 @@ def test_a_step_that_fails_is_halved(model, motion, breaking):
     assert found.time[-1] == pytest.approx(0.25)
 
 
+@pytest.mark.slow
 def test_balance_of_a_step_taken_in_halves(ring, breaking):
     """Work and loss of both halves count."""
     model, newmark = af.build(glued(ring), fidelity="rigid"), af.dynamics.Newmark()

@@ -54,6 +54,7 @@ def test_file_and_back(run, tmp_path):
     assert [each.name for each in path.parent.iterdir()] == ["run.nc"]
 
 
+@pytest.mark.slow
 def test_file_of_a_bridge_whose_fill_lies_on_chords(tmp_path):
     arch = af.shapes.Arch(span=4.0, rise=1.6, thickness=0.3, voussoirs=5)
     bridge = af.bridge(arches=[arch], backfill=af.shapes.Backfill(cover=0.5), chords=2)

@@ -61,6 +61,7 @@ def test_snes_and_solvers_take_the_same_steps(ring):
     np.testing.assert_allclose(peaks(one), peaks(other), atol=0.005)
 
 
+@pytest.mark.slow
 def test_a_run_to_the_plain_call_keeps_its_energy(ring):
     """Undamped, through impacts: the drift is that of the solves, not of the steps."""
     model, _ = ring

@@ -53,7 +53,9 @@ def closed_loop():
     return af.Structure(blocks, tuple(joints))
 
 
-@pytest.mark.parametrize("damping", [DAMPING, af.Rayleigh(0.05, (8.0, 16.0))])
+@pytest.mark.parametrize(
+    "damping", [pytest.param(DAMPING, marks=pytest.mark.slow), af.Rayleigh(0.05, (8.0, 16.0))]
+)
 def test_history_equals_that_of_the_general_solver(monkeypatch, damping):
     motion = af.Motion.synthetic(duration=1.0, pga=7.0, seed=3)
     runs = []

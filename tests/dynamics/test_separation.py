@@ -200,9 +200,10 @@ def test_springers_that_meet_leave_the_rest_of_the_motion_to_rigid_blocks():
     assert " until " not in str(apart.verdict)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("thickness", "voussoirs", "friction", "peak"),
-    [(0.48, 9, 0.6, 0.6), pytest.param(0.48, 17, 0.6, 0.6, marks=pytest.mark.slow)],
+    [(0.48, 9, 0.6, 0.6), (0.48, 17, 0.6, 0.6)],
 )
 def test_a_ring_that_folds_meets_itself(thickness, voussoirs, friction, peak, verified):
     """It hands over at 0.3 rad, before stones without a joint meet; then many of them do."""

@@ -53,7 +53,8 @@ def slid(built, motion, **steps):
     return run, slip[-1] - slip[0], *slide(motion.horizontal, motion.dt, LIMIT)
 
 
-@pytest.mark.parametrize("displacements", ["small", pytest.param("large", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("displacements", ["small", "large"])
 def test_default_steps_follow_cyclic_sliding(displacements, verified):
     """A few millimetres in each of ten to thirty half cycles, most of which cancel."""
     for peak, frequency, cycles, dt in ((4.0, 2.0, 6, 0.01), (4.5, 5.0, 15, 0.02)):
@@ -68,7 +69,10 @@ def test_default_steps_follow_cyclic_sliding(displacements, verified):
     verified(case, abs(expected), "Newmark (1965), integrated", abs(slip))
 
 
-@pytest.mark.parametrize("frequency", [pytest.param(1.0, marks=pytest.mark.slow), 2.0, 4.0])
+@pytest.mark.parametrize(
+    "frequency",
+    [pytest.param(1.0, marks=pytest.mark.slow), pytest.param(2.0, marks=pytest.mark.slow), 4.0],
+)
 def test_the_error_of_a_slide_that_turns_without_rest_is_stated(frequency):
     """Twice what friction holds: the velocity errs from turn to turn, 2.9 mm of 200 mm at 2 Hz."""
     times = np.arange(0.0, 3.0 / frequency + 0.5, 0.002)

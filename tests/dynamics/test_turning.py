@@ -48,7 +48,7 @@ def model(fidelity="rigid", friction=0.6, displacements="large", quadrature="exa
     ("fidelity", "friction", "quadrature"),
     [
         ("rigid", 0.4, "nodal"),
-        ("faces", 0.4, "exact"),
+        pytest.param("faces", 0.4, "exact", marks=pytest.mark.slow),
         ("faces", None, "nodal"),
         pytest.param("rigid", 0.4, "exact", marks=pytest.mark.slow),
         pytest.param("rigid", None, "exact", marks=pytest.mark.slow),
@@ -81,7 +81,7 @@ def test_the_tangent_is_the_derivative_far_from_rest(fidelity, friction):
     assert tangent == pytest.approx(found, abs=1e-6 * np.abs(tangent).max())
 
 
-@pytest.mark.parametrize("fidelity", ["rigid", "faces"])
+@pytest.mark.parametrize("fidelity", ["rigid", pytest.param("faces", marks=pytest.mark.slow)])
 def test_the_strategy_gives_the_history_of_snes(fidelity):
     """N to 1e-8 of the largest; slips, openings and rotations to 1e-9 m and rad."""
     built, brief = model(fidelity), SHAKE.cut(0.4, 0.6)

@@ -289,7 +289,10 @@ def test_the_share_of_damping_by_mass_is_that_of_the_energy_lost():
 
 
 @pytest.mark.parametrize("fidelity", ["rigid", pytest.param("faces", marks=pytest.mark.slow)])
-@pytest.mark.parametrize("scheme", [af.dynamics.Conserving(), af.dynamics.Newmark()])
+@pytest.mark.parametrize(
+    "scheme",
+    [pytest.param(af.dynamics.Conserving(), marks=pytest.mark.slow), af.dynamics.Newmark()],
+)
 def test_openings_follow_from_displacements_whatever_steps(ring, motion, fidelity, scheme):
     """Every method has those of SNES, and each frame those of its coordinates."""
     slides = scheme == af.dynamics.Conserving()
@@ -365,7 +368,7 @@ def bonded_wall(first=0.25):
     return af.masonry.assembled(blocks, replace(DRY, friction=0.3))
 
 
-@pytest.fixture(scope="module", params=["small", "large"])
+@pytest.fixture(scope="module", params=["small", pytest.param("large", marks=pytest.mark.slow)])
 def wall_model(request):
     return af.build(bonded_wall(), fidelity="rigid", displacements=request.param)
 

@@ -231,6 +231,7 @@ def test_compiled_steps_are_those_of_snes():
     assert np.abs(compiled - found).max() < 1e-6 * np.ptp(found)
 
 
+@pytest.mark.slow
 def test_steps_of_elastic_stones_that_begin_with_an_earlier_factor_are_those_of_snes():
     model, given = thin_ring("small", fidelity="condensed"), {"end": 0.06}
     given["damping"] = af.StiffnessDamping(0.05, 11.0)

@@ -292,7 +292,7 @@ def test_facets_are_the_same_in_numpy_and_compiled(lag):
     assert 0.2 < partly.mean() < 0.9
 
 
-@pytest.mark.parametrize("lag", [0.0, 0.3])
+@pytest.mark.parametrize("lag", [pytest.param(0.0, marks=pytest.mark.slow), 0.3])
 def test_a_facet_at_rest_presses_by_closed_form_and_loses_nothing(each_way, lag):
     """Partly closed, with gaps that differ by rounding from the start to the end of a step."""
     random, count = np.random.default_rng(6), 2000 if each_way is interpreted else 20000

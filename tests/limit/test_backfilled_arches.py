@@ -212,7 +212,11 @@ def test_an_arch_carries_the_load_of_its_line_of_thrust(fill):
     assert [side for _, side in found.hinges] == ["intrados", "extrados"] * 2
 
 
-@pytest.mark.parametrize("live", [QUARTER, SIDEWAYS, af.BodyForce(-0.5, 0.2)], ids=str)
+@pytest.mark.parametrize(
+    "live",
+    [QUARTER, SIDEWAYS, pytest.param(af.BodyForce(-0.5, 0.2), marks=pytest.mark.slow)],
+    ids=str,
+)
 def test_static_and_kinematic_factors_are_equal(live):
     """Hinges do no work: loads, weights and pressures do none together on the mechanism."""
     structure = arch_bridge(cover=0.6, width=2.5)

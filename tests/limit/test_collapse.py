@@ -313,6 +313,7 @@ def test_capacity_of_rings_grows_with_thickness_and_falls_with_embrace():
     assert (np.nan_to_num(np.diff(factors, axis=0), nan=-1.0) < 0.0).all()
 
 
+@pytest.mark.slow
 def test_five_hundred_voussoirs_take_seconds():
     begun = time.perf_counter()
     found = collapse_factor(ring(voussoirs=500), live=SIDEWAYS)

@@ -357,6 +357,7 @@ def steps_of(breadth, height):
     return np.diff(turn) * hypot(breadth, height) / block.size, path.factors
 
 
+@pytest.mark.slow
 def test_steps_grow_by_half_from_a_thousandth_to_a_hundredth_of_the_size():
     """The factor of a squat block changes by less than 4 %; the last step ends at its fall."""
     steps, _ = steps_of(2.0, 1.0)

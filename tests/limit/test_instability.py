@@ -126,7 +126,16 @@ def test_a_block_on_a_slope_stands_with_the_friction_that_is_printed(slope):
     assert af.stands(on_a_bed(cube, friction=said, tilt=np.arctan(slope)))
 
 
-@pytest.mark.parametrize("friction", [0.351, 0.3604, 0.5, 0.65, np.inf])
+@pytest.mark.parametrize(
+    "friction",
+    [
+        0.351,
+        pytest.param(0.3604, marks=pytest.mark.slow),
+        0.5,
+        pytest.param(0.65, marks=pytest.mark.slow),
+        np.inf,
+    ],
+)
 def test_the_least_friction_does_not_depend_on_that_given(friction):
     """Of a block on a slope of 0.3504, in thousandths, as from a friction that is too small."""
     cube = [[0.0, 0.0], [1.0, 0.0], [1.0, 0.5], [0.0, 0.5]]
@@ -144,6 +153,7 @@ def test_a_block_that_leans_out_needs_a_bed_up_to_its_centroid():
     assert "no friction helps" in text
 
 
+@pytest.mark.slow
 def test_a_smooth_ring_is_not_helped_by_thickness():
     """The message of a failed dead load; by `stands` it holds from the coefficient named."""
 
@@ -295,6 +305,7 @@ def test_fill_that_falls_out_of_a_free_end_is_held_by_higher_walls(above, named)
     assert "thickness" not in text
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "above",
     [

@@ -260,7 +260,7 @@ def bonded_wall():
     ("structure", "states", "apart"),
     [
         (piers(chords=1), 40, 0.04),
-        (filled(), 50, 0.04),
+        pytest.param(filled(), 50, 0.04, marks=pytest.mark.slow),
         pytest.param(beside("side wall"), 40, 0.04, marks=pytest.mark.slow),
         # its stones seldom move where none of their joints comes apart
         pytest.param(bonded_wall(), 60, 0.34, marks=pytest.mark.slow),

@@ -620,10 +620,9 @@ def test_states_of_a_surveyed_gateway_are_found(push):
     assert found.solutions.gap < EXACT
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("few_starts")
-@pytest.mark.parametrize(
-    "solved", [*(pytest.param(n, marks=pytest.mark.slow) for n in (0, 3)), None]
-)
+@pytest.mark.parametrize("solved", [0, 3, None])
 def test_an_interrupted_search_leaves_the_least_factor_so_far(monkeypatch, caplog, solved):
     """Each solution is an upper bound; without any it is the factor with dilatancy."""
     structure, find, made = wall(HALVES, 0.5), nonassociated.find_solution, []
@@ -903,6 +902,7 @@ def test_a_wall_without_a_solution_by_any_start_has_one_below_the_nearest_state(
     assert smooth.factor < rougher.factor
 
 
+@pytest.mark.slow
 def test_round_off_is_no_cost(monkeypatch, few_starts):
     """Slips of joints that stick are 1e-16: as costs they led the simplex method astray.
 

@@ -57,7 +57,7 @@ def test_a_footing_is_between_its_bounds(footing, angle, exact, gap):
     assert found.motion[4, 1] < 0.0  # it goes down
 
 
-@pytest.mark.parametrize("cohesion", [0.0, 2e3])
+@pytest.mark.parametrize("cohesion", [0.0, pytest.param(2e3, marks=pytest.mark.slow)])
 def test_a_smooth_wall_has_the_passive_pressure_of_rankine(cohesion):
     """Its linear stresses are in equilibrium, so that the lower bound is the closed form."""
     passive = tan(radians(45.0 + 15.0)) ** 2
@@ -285,7 +285,7 @@ def test_half_of_the_load_that_stays_is_no_longer_live(live, half):
     assert rest.upper == pytest.approx(whole.upper - 0.5 * whole.lower, abs=size)
 
 
-@pytest.mark.parametrize("strength", [None, 2e6])
+@pytest.mark.parametrize("strength", [None, pytest.param(2e6, marks=pytest.mark.slow)])
 def test_bonds_of_a_pier_beside_the_fill_yield_as_in_linear_programmes(footing, strength):
     """The fill has no part in it: both bounds are the factor of the pier alone."""
     bond = replace(af.masonry.STONE_TO_STONE, cohesion=40e3, tension=20e3)

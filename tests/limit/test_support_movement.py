@@ -254,11 +254,12 @@ def centroid_along(start, end):
     return line @ arm / length, cross(line, arm) / length, length
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("friction", "slides"),
     [
         (0.05, ("left base to left", "right base to right")),
-        pytest.param(0.1, None, marks=pytest.mark.slow),
+        (0.1, None),
     ],
 )
 def test_leaning_stones_that_part_slide_where_their_thrust_is_beyond_friction(
@@ -379,7 +380,8 @@ def test_steps_are_a_hundredth_of_the_movement():
     assert shares == pytest.approx(0.01 * np.arange(held))
 
 
-@pytest.mark.parametrize("settlement", [SPREAD, pytest.param(SINK, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("settlement", [SPREAD, SINK])
 def test_blocks_neither_overlap_nor_slide_at_the_end_of_a_movement(settlement):
     """To rounding, by the places of their corners, after large steps of the support."""
     ring = semicircle(0.15, 7, contact=rough(np.inf))

@@ -102,9 +102,10 @@ def test_a_least_thickness_far_below_the_greatest_that_can_be_built_is_found():
     assert not af.stands(build(0.99 * least), friction=None)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("voussoirs", "expected"),
-    [(8, 5.2052e-4), pytest.param(16, 1.38943e-4, marks=pytest.mark.slow)],
+    [(8, 5.2052e-4), (16, 1.38943e-4)],
 )
 def test_the_least_thickness_of_a_catenary_is_found(voussoirs, expected):
     """A half span of 3 m and a rise of 4 m: the thrust line leaves it by the stones' size alone."""

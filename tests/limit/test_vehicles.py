@@ -46,7 +46,9 @@ def over(structure, axles, spacings=(), **given):
     return af.moving_load(structure, axles, spacings=spacings, **given)
 
 
-@pytest.mark.parametrize("fill", [GRAVEL, None], ids=["fill", "bare"])
+@pytest.mark.parametrize(
+    "fill", [pytest.param(GRAVEL, marks=pytest.mark.slow), None], ids=["fill", "bare"]
+)
 def test_a_symmetric_bridge_is_as_strong_from_either_side(fill):
     structure = arch_bridge(cover=0.3 if fill else None)
     middle = structure.blocks[0].points[:, 0].min() / 2 + max(
@@ -158,6 +160,7 @@ def test_two_axles_on_one_spot_are_one():
     np.testing.assert_allclose(two, one, rtol=1e-5)  # they are 1e-7 m apart
 
 
+@pytest.mark.slow
 def test_twice_the_weight_has_half_the_factor():
     once, twice = (
         over(arch_bridge(), [k * w for w in LORRY[0]], LORRY[1], positions=FEW[::3], fill=GRAVEL)

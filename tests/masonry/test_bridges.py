@@ -374,7 +374,7 @@ def test_inconsistent_parts_are_refused(change, says):
         af.bridge(**PAIR | change)
 
 
-@pytest.mark.parametrize("thickness", [0.35, 0.45])
+@pytest.mark.parametrize("thickness", [0.35, pytest.param(0.45, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("measured", ["intrados", "centre line"])
 def test_a_pier_by_its_breadth_keeps_it_between_the_clear_spans(measured, thickness):
     """Whatever the thickness of the rings; a gap is thickness × sin(embrace / 2) narrower."""

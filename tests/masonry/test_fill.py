@@ -120,7 +120,7 @@ def test_an_oedometer_is_as_compliant_as_a_bar(rows):
         pytest.param(20.0, 4, marks=pytest.mark.slow),
         (30.0, 1),
         pytest.param(30.0, 2, marks=pytest.mark.slow),
-        (40.0, 1),
+        pytest.param(40.0, 1, marks=pytest.mark.slow),
         pytest.param(40.0, 4, marks=pytest.mark.slow),
     ],
 )
@@ -372,6 +372,7 @@ def test_pieces_are_counted_by_their_area():
         cut(1.9)
 
 
+@pytest.mark.slow
 def test_the_tiling_goes_with_a_long_fill_wherever_it_lies():
     """Six metres by 0.3 m, cut at two places: the same pieces, which are the whole fill."""
     smooth = af.Contact(1e10, 1e10, 0.0)

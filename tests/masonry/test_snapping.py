@@ -173,7 +173,7 @@ def draw_ring(path, gap, off):
     return shapely.MultiPolygon([shapely.Polygon(points) for points in stones])
 
 
-@pytest.mark.parametrize("kind", ["dxf", "svg"])
+@pytest.mark.parametrize("kind", ["dxf", pytest.param("svg", marks=pytest.mark.slow)])
 @pytest.mark.parametrize(
     ("gap", "off", "problem"),
     [

@@ -72,7 +72,7 @@ def test_cells_of_second_order_count_by_their_corners(tmp_path, quads, incomplet
     assert {joint.name for joint in structure.joints} == {"pier, base", "waist"}
 
 
-@pytest.mark.parametrize("curve", ["waist", None])
+@pytest.mark.parametrize("curve", ["waist", pytest.param(None, marks=pytest.mark.slow)])
 def test_a_model_on_that_mesh(tmp_path, curve):
     """Its own cells carry it: the weight above each joint, from triangles of the file."""
     path = own(tmp_path / "own.msh", curve=curve)

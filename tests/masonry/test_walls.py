@@ -97,7 +97,7 @@ def lay_opening(left, right, sill, head, name="opening"):
     ("opening", "area"),
     [
         ((-0.45, 0.45, 0.9, 2.7), 17.1),  # its head is a third of a course below the eaves
-        ((-0.45, 0.45, 2.9, 4.1), 17.64),
+        pytest.param((-0.45, 0.45, 2.9, 4.1), 17.64, marks=pytest.mark.slow),
         ((-2.3, -1.4, 0.9, 2.1), None),  # beside the edge there is no room for a jamb
         ((1.5, 2.6, 0.9, 2.1), None),
     ],
@@ -281,7 +281,9 @@ def test_a_course_is_no_taller_than_the_wall():
         ([(0.2, 1.0, 1.0)], 2.0, 2.4),
         pytest.param([(0.2, 1.0, 0.75)], 2.0, 2.4, marks=pytest.mark.slow),
         pytest.param([(-0.5, 0.5, 1.0)], 1.75, 2.5, marks=pytest.mark.slow),
-        ([(-1.9, -0.9, 0.0), (0.4, 1.5, 0.9)], 2.0, 2.5),  # a door and a window
+        pytest.param(
+            [(-1.9, -0.9, 0.0), (0.4, 1.5, 0.9)], 2.0, 2.5, marks=pytest.mark.slow
+        ),  # a door and a window
     ],
 )
 def test_walls_are_in_running_bond(openings, head, eaves):

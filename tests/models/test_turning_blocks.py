@@ -23,7 +23,9 @@ def pushed(structure, fidelity, displacements):
 @pytest.mark.parametrize(
     "structure",
     [
-        af.column(breadth=0.4, heights=[0.8, 0.8, 0.8], material=SOFT),
+        pytest.param(
+            af.column(breadth=0.4, heights=[0.8, 0.8, 0.8], material=SOFT), marks=pytest.mark.slow
+        ),
         af.circular_arch(
             radius=2.95, thickness=0.55, embrace=159.0, voussoirs=5, chords=1, material=SOFT
         ),

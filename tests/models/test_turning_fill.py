@@ -106,7 +106,9 @@ def test_the_tangent_of_a_step_is_the_derivative_of_its_force(structures, name, 
     assert np.abs(difference / (2.0 * step) - rate).max() < 1e-3 * np.abs(rate).max()
 
 
-@pytest.mark.parametrize(("name", "fidelity"), [CASES[0], CASES[2]])
+@pytest.mark.parametrize(
+    ("name", "fidelity"), [CASES[0], pytest.param(*CASES[2], marks=pytest.mark.slow)]
+)
 def test_energy_is_kept(structures, name, fidelity):
     """Without damping: the work of the ground is stored, kinetic, or lost by friction."""
     model = af.build(structures[name], fidelity=fidelity, displacements="large", cells=(2, 2))

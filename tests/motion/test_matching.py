@@ -113,12 +113,13 @@ def test_motions_and_bands_that_cannot_be_matched_are_refused(shaking):
     assert caught.value.last.misfit["horizontal"] > 0.02
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name",
     [
-        pytest.param("peer_at2/RSN126_GAZLI_GAZ-UP.AT2", marks=pytest.mark.slow),
+        "peer_at2/RSN126_GAZLI_GAZ-UP.AT2",
         "plain_columns/erzikan.txt",
-        pytest.param("other_formats/0111a.smc", marks=pytest.mark.slow),
+        "other_formats/0111a.smc",
     ],
 )
 def test_real_records_match(name):

@@ -136,7 +136,7 @@ def cracked(moment, tension):
     return depth, (2.0 * WEIGHT / depth + 2.0 * tension) / (STIFFNESS * depth)
 
 
-@pytest.mark.parametrize("fidelity", ["rigid", "faces"])
+@pytest.mark.parametrize("fidelity", ["rigid", pytest.param("faces", marks=pytest.mark.slow)])
 def test_a_crack_stops_where_the_rest_bears_the_load(fidelity):
     """f_t = 10 kPa, M = 6 kN m: a crack of a quarter of the depth, to one of 32 facets.
 

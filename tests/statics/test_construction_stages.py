@@ -96,6 +96,7 @@ def test_a_ring_that_leaves_its_centring_stands_as_if_built_at_once(fidelity, di
     assert staged.q == pytest.approx(direct.q, abs=1e-7 * np.abs(direct.q).max())
 
 
+@pytest.mark.slow
 def test_a_bridge_built_in_stages_is_in_balance(bridge, built):
     found = built
     weight = self_weight(found.model)
@@ -135,7 +136,9 @@ def test_supports_that_moved_do_so_after_building(column, displacements):
     assert upward(column, staged.q) == pytest.approx(expected)
 
 
-@pytest.mark.parametrize(("fidelity", "cells"), [("rigid", (2, 1)), ("full", (1, 1))])
+@pytest.mark.parametrize(
+    ("fidelity", "cells"), [("rigid", (2, 1)), pytest.param("full", (1, 1), marks=pytest.mark.slow)]
+)
 def test_blocks_that_move_far_go_on_from_where_they_were_built(fidelity, cells):
     """Courses sink as if displacements were small, and then stay at rest."""
     column = af.column(breadth=1.0, heights=[1.0, 1.0, 1.0], material=af.Material(30e9, 0.0, 20e3))

@@ -162,6 +162,7 @@ def overturning(weights, points, edge=0.0):
     return factor, np.arctan(factor), arms, heights
 
 
+@pytest.mark.slow
 def test_a_wall_of_two_storeys_with_floors(storeys, verified):
     found, (_, _, weights, points) = storeys, two_storeys()
     factor, turn, arms, heights = overturning(np.array(weights), points)
@@ -660,6 +661,7 @@ def test_a_portal(verified):
     np.testing.assert_allclose(found.curve["alpha"], np.tan(beta - turn), atol=1e-7)
 
 
+@pytest.mark.slow
 def test_the_ring_of_the_readme(ring, verified):
     """Values of its four hinges moved as a four-bar by another program."""
     found = ring
@@ -716,7 +718,7 @@ def test_the_linear_check_multiplies_by_q_and_divides_by_confidence():
     ("name", "share", "factor", "secant", "damping"),
     [
         ("NTC-2018 SLV", 0.4, 1.68, 1.0, 0.08),
-        ("NTC-2018 SLC", 0.6, 1.56, 1.0, 0.10),
+        pytest.param("NTC-2018 SLC", 0.6, 1.56, 1.0, 0.10, marks=pytest.mark.slow),
         ("NTC-2008 SLV", 0.4, 2.0, 0.4, 0.05),
     ],
 )
@@ -835,6 +837,7 @@ def test_sliding_has_no_capacity_of_displacement(friction):
     assert "one of many" not in str(turning)
 
 
+@pytest.mark.slow
 def test_without_a_displacement_check_the_spectrum_of_the_start_is_said():
     """A slab slides from μ g on, over FC and the ground acceleration; q raises all above it."""
     slab = af.column(breadth=2.0, heights=[1.0], contact=af.Contact(1e9, 1e9, friction=0.6))

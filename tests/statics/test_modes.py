@@ -97,7 +97,9 @@ def test_column_against_a_chain_of_springs(fidelity):
     assert found.effective_masses[upright, 1][:count] == pytest.approx(effective, rel=10.0 * near)
 
 
-@pytest.mark.parametrize("fidelity", ["rigid", "faces", "condensed", "full"])
+@pytest.mark.parametrize(
+    "fidelity", ["rigid", pytest.param("faces", marks=pytest.mark.slow), "condensed", "full"]
+)
 def test_effective_masses_add_up_to_all_that_moves(fidelity, verified):
     shape = af.column(breadth=1.0, heights=[1.0, 0.5, 0.7])
     model = af.build(shape, fidelity=fidelity, cells=(2, 2))
@@ -113,8 +115,7 @@ def test_effective_masses_add_up_to_all_that_moves(fidelity, verified):
     "fidelity",
     [
         "rigid",
-        "faces",
-        *(pytest.param(each, marks=pytest.mark.slow) for each in ("condensed", "full")),
+        *(pytest.param(each, marks=pytest.mark.slow) for each in ("faces", "condensed", "full")),
     ],
 )
 def test_as_dense_lapack_about_dead_load(ring, fidelity, verified):

@@ -106,7 +106,8 @@ def test_every_fidelity_reaches_the_limit_of_its_polygon(fidelity, load, verifie
     verified(case, limit, "limit analysis of its polygon", found.factor)
 
 
-@pytest.mark.parametrize("fidelity", ["rigid", pytest.param("faces", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("fidelity", ["rigid", "faces"])
 def test_exact_facets_only_approach_it_and_their_extrapolation_reaches_it(fidelity):
     """The compressed strip never vanishes: 2 % are missing after 10 % of the span and rise."""
     limit = limit_of("eccentric")
@@ -274,7 +275,8 @@ def test_a_support_that_moves_finds_the_limit_state_that_resists_it_least(motion
     assert factor.attrs["units"] == "N m"
 
 
-@pytest.mark.parametrize("fidelity", [pytest.param("faces", marks=pytest.mark.slow), "full"])
+@pytest.mark.slow
+@pytest.mark.parametrize("fidelity", ["faces", "full"])
 def test_spreading_supports_bring_meshed_fidelities_to_the_least_thrust(fidelity):
     settlement = af.Settlement("left abutment", (-1.0, 0.0, 0.0))
     limit = af.collapse_factor(RING, live=settlement, friction=None).factor

@@ -70,7 +70,7 @@ def test_a_block_that_flows_down_a_plane_is_given_up_soon():
         relax(EquilibriumSolver(model.size), model, self_weight(model), np.zeros(model.size))
 
 
-@pytest.mark.parametrize("fidelity", ["faces", "full"])
+@pytest.mark.parametrize("fidelity", [pytest.param("faces", marks=pytest.mark.slow), "full"])
 def test_soil_joints_slide_and_newton_finds_the_dead_load(bridge, fidelity):
     model = af.build(bridge, fidelity={"backfill": "full", "rest": fidelity}, cells=(2, 2))
     found = af.dead_load(model)

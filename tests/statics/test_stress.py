@@ -101,7 +101,7 @@ def test_corners_have_the_peak_where_centres_miss_it(ring, ring_model, dead):
     assert abs(centres / exact - 1.0) > 0.12
 
 
-@pytest.mark.parametrize("fidelity", ["faces", "condensed"])
+@pytest.mark.parametrize("fidelity", [pytest.param("faces", marks=pytest.mark.slow), "condensed"])
 def test_reduced_models_recover_stress(ring, ring_model, dead, fidelity):
     """Their peak is within 4 % of that with all nodes; a block's peak within 13 %."""
     model = af.build(ring, fidelity=fidelity, cells=(4, 4))

@@ -93,7 +93,12 @@ def test_a_rate_from_beyond_the_last_point_of_the_hazard_is_in_doubt(last):
         (7, 2.0, None),
         (6, 2.0, "6 records: the interval is that of these"),
         (20, 1.05, "20 records, of spectra as of matched ones (dispersion 0.03): the interval"),
-        (3, 1.05, "3 records, of spectra as of matched ones (dispersion 0.05): the interval"),
+        pytest.param(
+            3,
+            1.05,
+            "3 records, of spectra as of matched ones (dispersion 0.05): the interval",
+            marks=pytest.mark.slow,
+        ),
     ],
 )
 def test_few_or_matched_records_are_doubted_with_the_rate_of_usual_ones(records, spectra, words):

@@ -54,7 +54,7 @@ def same(first, second):
     ("displacements", "method"),
     [
         pytest.param("small", "newton", marks=pytest.mark.slow),
-        ("small", "compliance"),
+        pytest.param("small", "compliance", marks=pytest.mark.slow),
         ("large", "newton"),
     ],
 )

@@ -73,6 +73,7 @@ def test_workers_compile_every_function_once(small_ring, tmp_path):
     assert len(saved) == len(set(saved))
 
 
+@pytest.mark.slow
 def test_deaths_of_workers_are_reported_and_nothing_is_inherited(
     small_ring, tmp_path, finders, monkeypatch, caplog
 ):

@@ -73,7 +73,7 @@ def law(row):
     return closing_arch.Law(stiffness, closure, SHEAR, FRICTION, lag=DAMPING.stiffness)
 
 
-@pytest.mark.parametrize("row", [ROWS[STIFF], ROWS[MEASURED]])
+@pytest.mark.parametrize("row", [ROWS[STIFF], pytest.param(ROWS[MEASURED], marks=pytest.mark.slow)])
 def test_static_peak_is_that_of_the_independent_code(row, verified):
     found = static_peak(model(row))
     assert found == pytest.approx(row["static"], rel=STATIC)

@@ -27,13 +27,14 @@ def curve(load, rule, control, stiff=1.0):
     return af.pushover(built, load, control=control, stop=stop).curve
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("load", "rule", "peak"),
     [
-        pytest.param(POINT, "nodal", 53.53, marks=pytest.mark.slow),
-        pytest.param(SIDEWAYS, "nodal", 0.4427, marks=pytest.mark.slow),
+        (POINT, "nodal", 53.53),
+        (SIDEWAYS, "nodal", 0.4427),
         (POINT, "exact", 44.93),
-        pytest.param(SIDEWAYS, "exact", 0.3818, marks=pytest.mark.slow),
+        (SIDEWAYS, "exact", 0.3818),
     ],
 )
 def test_peaks(load, rule, peak, verified):

@@ -4,6 +4,9 @@ import pytest
 from hard.table import CASES
 
 LONG = (
+    "pulse of one step",
+    "three very wide voussoirs",
+    "blocks and joints renumbered",
     "joints 1000 × softer",
     "ring under 1.5 g vertical",
     "rocking block, HHT(-0.1), 1 ms",

@@ -31,7 +31,7 @@ TRIAL = {  # cells, rule, points: crown eccentricity as found in a trial of join
 @pytest.mark.parametrize(
     "setting",
     # other tests have meshes as fine
-    [pytest.param(each, marks=pytest.mark.slow if each[0] == 16 else ()) for each in TRIAL],
+    [pytest.param(each, marks=pytest.mark.slow if each[0] >= 8 else ()) for each in TRIAL],
     ids=str,
 )
 def test_crown_eccentricity(ring, setting):
@@ -41,14 +41,15 @@ def test_crown_eccentricity(ring, setting):
     assert float(found["eccentricity"][8]) == pytest.approx(TRIAL[setting], abs=6e-5)
 
 
-@pytest.fixture(params=CONVERGED)
+@pytest.fixture(params=["sliding", pytest.param("glued", marks=pytest.mark.slow)])
 def lawful(ring, request):
     """The ring with either law of its joints, and the crown eccentricity that it approaches."""
     return {"sliding": ring, "glued": glued(ring)}[request.param], CONVERGED[request.param]
 
 
 @pytest.mark.parametrize(
-    "rule", ["lobatto", "nodal", pytest.param("gauss", marks=pytest.mark.slow)]
+    "rule",
+    ["nodal", *(pytest.param(rule, marks=pytest.mark.slow) for rule in ("lobatto", "gauss"))],
 )
 @pytest.mark.parametrize("law", ["sliding", pytest.param("glued", marks=pytest.mark.slow)])
 def test_converges_under_refinement(ring, law, rule):
@@ -151,7 +152,7 @@ def test_results_per_width_do_not_depend_on_the_width(ring):
         assert found["N"].values / width == pytest.approx(reference["N"].values, rel=1e-9)
 
 
-@pytest.mark.parametrize("fidelity", ["rigid", "full"])
+@pytest.mark.parametrize("fidelity", ["rigid", pytest.param("full", marks=pytest.mark.slow)])
 def test_numbering_changes_nothing_physical(ring, fidelity):
     """Blocks renumbered at random and joints listed the other way round."""
     order = np.random.default_rng(3).permutation(len(ring.blocks))

@@ -44,7 +44,7 @@ def filled():
     ("joints", "scheme"),
     [
         pytest.param("closed", CONSERVING, marks=pytest.mark.slow),
-        ("closed", NEWMARK),
+        pytest.param("closed", NEWMARK, marks=pytest.mark.slow),
         ("initial", af.HHT(-0.1)),
         pytest.param("none", CONSERVING, marks=pytest.mark.slow),
         pytest.param("none", af.HHT(-0.2), marks=pytest.mark.slow),

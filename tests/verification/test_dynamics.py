@@ -39,7 +39,11 @@ def swinging(model, dead, mode):
 
 @pytest.mark.parametrize(
     ("scheme", "bound"),
-    [pytest.param(NEWMARK, 1.05, marks=pytest.mark.slow), (CONSERVING, 1.05), (af.HHT(-0.1), 2.5)],
+    [
+        pytest.param(NEWMARK, 1.05, marks=pytest.mark.slow),
+        (CONSERVING, 1.05),
+        pytest.param(af.HHT(-0.1), 2.5, marks=pytest.mark.slow),
+    ],
     ids=["newmark", "conserving", "hht"],
 )
 def test_second_order_in_time(model, dead, scheme, bound, verified):

@@ -201,7 +201,7 @@ def jump_error(cells, degree, cell):
 @pytest.mark.parametrize(
     ("degree", "cell", "bound"),
     [
-        (1, "quadrilateral", 1.5e-4),
+        pytest.param(1, "quadrilateral", 1.5e-4, marks=pytest.mark.slow),
         pytest.param(1, "triangle", 1.7e-4, marks=pytest.mark.slow),
         pytest.param(2, "quadrilateral", 5e-7, marks=pytest.mark.slow),
         (2, "triangle", 7e-7),

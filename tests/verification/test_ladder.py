@@ -50,7 +50,9 @@ def test_static_condensation_is_exact_for_statics(ring, full, verified):
         assert off < 1e-9
 
 
-@pytest.mark.parametrize("rule", ["lobatto", "nodal", "gauss"])
+@pytest.mark.parametrize(
+    "rule", ["lobatto", "nodal", pytest.param("gauss", marks=pytest.mark.slow)]
+)
 def test_monolithic_is_full(ring, rule):
     """UFL forms assembled at each iteration, with joint tractions integrated as forms too."""
     full = af.build(ring, cells=(2, 2), quadrature=rule)
@@ -63,6 +65,7 @@ def test_monolithic_is_full(ring, rule):
     assert full.energy(dead[0].q) == pytest.approx(slow.energy(dead[0].q), rel=1e-10)
 
 
+@pytest.mark.slow
 def test_monolithic_history_is_that_of_full(ring):
     short, given = MOTION.cut(1.0, 1.1), {"newton": TIGHT, "method": "snes", "dt": 0.005}
     runs = []
@@ -93,6 +96,7 @@ def test_errors_fall_up_the_ladder(ring, law):
     assert off["condensed"] < 1.5e-5 < off["faces"] < 0.0035 < off["rigid"] < 0.012
 
 
+@pytest.mark.slow
 def test_one_facet_does_not_see_where_a_joint_begins_to_slide(ring):
     """Found are 0.043 with one facet and 0.007 with four; where joints hold the number is idle."""
     for structure, least, most in ((ring, 0.03, 0.06), (glued(ring), 0.0, 1e-9)):

@@ -161,7 +161,7 @@ def test_two_blocks_on_a_support_that_sinks_a_little():
     assert change[0, 1] == pytest.approx(change[2, 1], abs=1e-5)
 
 
-@pytest.mark.parametrize("rule", ["lobatto", "exact"])
+@pytest.mark.parametrize("rule", [pytest.param("lobatto", marks=pytest.mark.slow), "exact"])
 def test_two_blocks_on_a_support_that_sinks_far_are_carried_by_three_hinges(rule):
     """Moments about the hinges alone give the thrust between the blocks, at any stiffness.
 

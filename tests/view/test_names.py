@@ -197,6 +197,7 @@ def test_numbers_of_stones_beside_those_of_joints_are_marked():
     assert "; #" in figure.axes[0].get_title()
 
 
+@pytest.mark.slow
 def test_small_stones_at_a_slope_have_no_number_and_all_others_do():
     wall = bonded(courses=6)
     tips = [

@@ -25,7 +25,10 @@ from archfem.view.style import (
 )
 
 
-@pytest.mark.parametrize(("suffix", "start"), [(".png", b"\x89PNG"), (".pdf", b"%PDF")])
+@pytest.mark.parametrize(
+    ("suffix", "start"),
+    [(".png", b"\x89PNG"), pytest.param(".pdf", b"%PDF", marks=pytest.mark.slow)],
+)
 def test_a_figure_is_saved_whole(ring, low_resolution, tmp_path, suffix, start):
     path = save(af.view.draw_structure(ring), tmp_path / "new" / f"ring{suffix}")
     assert path.read_bytes().startswith(start)
@@ -109,7 +112,16 @@ def test_titles_of_capitals_fit_the_figure():
     assert 0.0 <= box.x0 < box.x1 <= figure.bbox.x1
 
 
-@pytest.mark.parametrize("breadth", [5.0, 5.7, 6.4, 7.1, 8.2])  # of higher and of wider figures
+@pytest.mark.parametrize(
+    "breadth",
+    [
+        5.0,
+        pytest.param(5.7, marks=pytest.mark.slow),
+        6.4,
+        pytest.param(7.1, marks=pytest.mark.slow),
+        8.2,
+    ],
+)  # of higher and of wider figures
 def test_a_title_of_two_lines_and_a_legend_fit_a_drawing_true_to_scale(breadth):
     page = af.column(breadth=breadth, heights=[1.0] * 4).plot()
     axes = page.axes[0]

@@ -142,7 +142,7 @@ def test_the_legend_names_the_drawn_states(setup, toppled, falls):
         assert legend.get_visible() is named
 
 
-@pytest.mark.parametrize("size", [(480, 320), (1280, 720)])
+@pytest.mark.parametrize("size", [(480, 320), pytest.param((1280, 720), marks=pytest.mark.slow)])
 def test_names_of_instants_do_not_overlap(setup, hinged_late, size):
     layout = FrameLayout(setup, size, hinged_late.joints, hinged_late)
     texts = {text.get_text(): text for axes in layout._figure.axes for text in axes.texts}

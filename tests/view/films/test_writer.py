@@ -21,8 +21,7 @@ def cut_short(count):
     ("count", "suffix"),
     [
         *each_once((0, 1), (".mp4", ".gif")),
-        (5, ".mp4"),
-        pytest.param(5, ".gif", marks=pytest.mark.slow),
+        *(pytest.param(5, suffix, marks=pytest.mark.slow) for suffix in (".mp4", ".gif")),
     ],
 )
 def test_a_killed_film_leaves_the_old_one(tmp_path, count, suffix):

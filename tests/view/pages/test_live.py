@@ -40,7 +40,10 @@ def structures():
     }
 
 
-@pytest.fixture(scope="module", params=structures())
+@pytest.fixture(
+    scope="module",
+    params=["ring", "column", "on piers", pytest.param("pointed", marks=pytest.mark.slow)],
+)
 def computed(request):
     """A structure, and what the page computes of it."""
     structure = structures()[request.param]
