@@ -1452,7 +1452,9 @@ def test_a_wall_that_slides_before_it_rocks_is_not_checked_across_its_plane(capl
 
 
 @pytest.mark.parametrize("demand", [pytest.param(None, marks=pytest.mark.slow), "0.2 g"])
-def test_a_push_is_compared_with_a_demand_in_numbers_and_words_are_not_read(demand, tmp_path):
+def test_a_push_is_compared_with_a_demand_in_numbers_and_words_are_not_read(
+    demand, tmp_path, unplotted
+):
     """A stone 0.5 m broad and 1 m high, which a push of 0.5 g overturns."""
     tables = {
         "title": "a stone",

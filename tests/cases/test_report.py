@@ -687,7 +687,7 @@ def test_the_paper_is_cited_where_a_value_is_its_own_alone():
     ]
 
 
-def test_the_lengths_of_a_wall_are_named_by_its_plane():
+def test_the_lengths_of_a_wall_are_named_by_its_plane(undrawn):
     """A wall of 2 m, 0.4 m thick, and a metre of it across: its thickness is in the plane then."""
     wall = {"shape": "wall", "breadth": 2.0, "height": 1.0, "course": 0.25, "stone": 0.5}
     structure = af.Case.of({"structure": {**wall, "width": 0.4}}).structure
@@ -703,7 +703,7 @@ def test_the_lengths_of_a_wall_are_named_by_its_plane():
         assert words in text
 
 
-def test_materials_that_differ_in_weight_alone_stand_once(unlike_weights):
+def test_materials_that_differ_in_weight_alone_stand_once(unlike_weights, unplotted):
     tables = {**unlike_weights, "model": {"fidelity": "rigid"}}
     data, weights = report_data.ReportData(af.Case.of(tables), {}), tables["materials"]
     rows = [row for row in tabulate_inputs(data).rows if row[0].startswith("m")]
@@ -999,7 +999,7 @@ def test_a_kinematic_assessment_alone_has_a_report(unplotted, tmp_path, capsys):
 
 
 def test_a_report_of_several_folders_has_the_worst_verdict_and_the_inputs_once(
-    undrawn, tmp_path, capsys
+    unplotted, tmp_path, capsys
 ):
     """A column of 0.3 m fails a check that one of 0.9 m passes."""
     folders, ratios = [str(tmp_path / name) for name in ("broad", "slender")], []

@@ -70,7 +70,7 @@ def test_parts_are_listed_with_the_weight_that_moves(piers):
     assert pier["of them fixed"] == "1"
 
 
-def test_the_names_of_a_wall_do_not_fill_pages():
+def test_the_names_of_a_wall_do_not_fill_pages(undrawn):
     """Stones are numbered in the picture; of 30 joints the caption would list each."""
     blocks = [af.Block(((0, -1), (6, -1), (6, 0), (0, 0)), af.STONE, "ground", fixed=True)]
     for level in range(4):
@@ -155,7 +155,7 @@ def test_falls_by_property_are_a_table_whose_cells_wrap(piers, tmp_path):
     assert table.manner == "words"
 
 
-def test_a_part_without_a_name_has_a_dash():
+def test_a_part_without_a_name_has_a_dash(unplotted):
     """A block of no part, which is a ring, and its foundation."""
     stack = af.column(breadth=1.0, heights=[1.0])
     bare = [
@@ -263,7 +263,7 @@ def test_a_report_of_several_runs_has_a_section_for_each(runs, piers, monkeypatc
     assert (first.level, second.level) == (3, 3)
 
 
-def test_a_report_of_several_runs_shows_the_worst_of_them(runs, piers, monkeypatch):
+def test_a_report_of_several_runs_shows_the_worst_of_them(runs, piers, undrawn, monkeypatch):
     """The first is pushed twice as hard as the second; an outcome counts before a displacement."""
     monkeypatch.setattr(response, "build_player", lambda *given: f"one of {given[-1]} players")
     case = SimpleNamespace(**vars(made_case(piers)) | {"suite": {}})
@@ -278,7 +278,7 @@ def test_a_report_of_several_runs_shows_the_worst_of_them(runs, piers, monkeypat
     assert outcomes.find_worst_run(data) == "second"
 
 
-def test_a_report_of_many_runs_draws_the_worst_beside_the_others(runs, piers):
+def test_a_report_of_many_runs_draws_the_worst_beside_the_others(runs, piers, undrawn):
     """There are fewer line styles than runs."""
     many = {"first": runs["first"], **{f"{k}": runs["second"] for k in range(6)}}
     case = SimpleNamespace(structure=piers, suite={}, report={})
