@@ -67,7 +67,7 @@ def matches(case, folder):
     import archfem as af
     from archfem.studies import cache
 
-    def matched(suite, target):
+    def matched(suite, target, band):
         time.sleep(0.05)
         (Path(folder) / f"{suite.pairs[0].name} {time.monotonic_ns()}").touch()
         return replace(suite, pairs=tuple(pair.scaled(1.0 / 3.0) for pair in suite.pairs))
