@@ -14,7 +14,8 @@ from archfem.limit.instability import describe_friction, describe_geometric_fact
 from archfem.masonry.joint_closing import finish_range
 from archfem.masonry.materials import Contact, Material
 from archfem.masonry.structure import Structure, join_names, join_words
-from archfem.units import GPa, MPa, kN, kPa, mm
+from archfem.models.builder import list_fidelities
+from archfem.units import GPa, MPa, in_unit, kN, kPa, mm
 
 HINGE_REASON = "8 % short of the edge, as in Demirel and Aldemir (2021)"
 
@@ -88,8 +89,16 @@ def list_default_keys(case: Case, item: Material | Contact) -> list[str]:
         for key in DECIDING_VALUES[section]
         if key not in given
         and getattr(item, key) is not None
-        and getattr(item, key) == getattr(preset, key, None)
+        # E of the pieces of a fill is that of its preset in their joints
+        and (key == "young" or getattr(item, key) == getattr(preset, key, None))
     ]
+
+
+def read_young(case: Case, item: Material) -> float:
+    """Return E as the case or a preset gives it, of pieces of a fill that of their joints [Pa]."""
+    key, given = find_table(case.settings, item)
+    known = PRESETS["materials"].get(given.get("preset", key), item)
+    return in_unit(given.get("young", known.young), "Pa", "young")
 
 
 def list_fill_values(case: Case) -> Iterator[tuple[str, str, bool]]:
@@ -121,11 +130,21 @@ def list_defaults(case: Case) -> list[Default]:
 
 def _list_properties(case: Case) -> Iterator[Default]:
     """List the default values of materials, contacts and the width."""
+    fidelities = list_fidelities(case.structure, case.analysis.fidelity)
+    blocks = zip(case.structure.blocks, fidelities, strict=True)
+    # the E of rigid blocks is not used, but for that of a fill in the joints of its pieces
+    elastic = {block.material for block, x in blocks if x != "rigid" or block.grain}
     for item in list_materials_and_contacts(case):
         section = "materials" if isinstance(item, Material) else "contacts"
         for key in list_default_keys(case, item):
             word, *_, reason = DECIDING_VALUES[section][key]
-            words = f"{word} {value_text(section, key, getattr(item, key))}"
+            value = getattr(item, key)
+            if key == "young" and isinstance(item, Material):
+                if item not in elastic:
+                    continue
+                value = read_young(case, item)
+                reason = reason if value == item.young else f"{_PAPER}; displacements depend on it"
+            words = f"{word} {value_text(section, key, value)}"
             path = f"{section}.{format_key(find_table(case.settings, item)[0])}.{key}"
             yield Default(item.name, words, path, reason)
     if "width" not in case.settings["structure"]:
@@ -280,7 +299,7 @@ def describe_margins_at_rest(case: Case, structure: Structure) -> list[str]:
     if not (sentence := describe_friction(structure)):
         return high
     least, left_out = least_friction(structure) or 0.0, say_loads_left_out(case)
-    open_ones = [each.name for each in contacts if "friction" in list_default_keys(case, each)]
+    open_ones = {each.name for each in contacts if "friction" in list_default_keys(case, each)}
     lines = [
         f"as rigid blocks {sentence}{left_out}",
         f"{describe_geometric_factor(structure, case.limit.strength)}{left_out}",

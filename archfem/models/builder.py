@@ -26,7 +26,7 @@ def build(structure: Structure, settings: Discretisation) -> Model:
         from archfem.models.large.model import LargeDisplacementModel
 
         model = LargeDisplacementModel(model)
-    fidelities = _block_fidelities(structure, settings.fidelity)
+    fidelities = list_fidelities(structure, settings.fidelity)
     model.doubts = tuple(_doubt_soft_blocks(structure, fidelities))
     for doubt in model.doubts:
         logger.warning("%s", doubt)
@@ -37,7 +37,7 @@ def _build_small(structure: Structure, settings: Discretisation) -> Model:
     """Build a model of small displacements."""
     if structure.has_own_laws:
         settings = _use_quadrature_points(settings)
-    fidelities = _block_fidelities(structure, settings.fidelity)
+    fidelities = list_fidelities(structure, settings.fidelity)
     if settings.fidelity == "monolithic":
         _check_plain_joints(structure)
     if settings.fidelity == "rigid":
@@ -58,7 +58,7 @@ def _build_small(structure: Structure, settings: Discretisation) -> Model:
     )
 
 
-def _block_fidelities(structure: Structure, fidelity: str | Mapping[str, str]) -> list[str]:
+def list_fidelities(structure: Structure, fidelity: str | Mapping[str, str]) -> list[str]:
     """Return the fidelity of each block."""
     if isinstance(fidelity, str):
         return [fidelity] * len(structure.blocks)

@@ -18,6 +18,7 @@ from archfem.cases.defaults import (
     list_finish_ranges,
     list_materials_and_contacts,
     list_spectrum_defaults,
+    read_young,
     value_text,
 )
 from archfem.cases.motion_keys import MADE, find_matched_band
@@ -333,15 +334,13 @@ def _find_path(data: ReportData, item: Material | Contact) -> str:
 
 def _list_given(data: ReportData, item: Material | Contact) -> Iterator[Row]:
     """Yield the values of a material or contact; stiffer ones of pieces of fill are inferred."""
-    key, given = find_table(data.case.settings, item)
-    known = PRESETS["materials"].get(given.get("preset", key))
     for word, text, mark, *path in _list_properties(data, item):
-        young = given.get("young", getattr(known, "young", None))
-        if word == _YOUNG and mark != "default" and young is not None:
-            own = value_text("materials", "young", in_unit(young, "Pa", "young"))
-            mark = _mark("young" in given)
-            if own != text:  # the compliance of pieces is in their joints
+        if isinstance(item, Material) and word == _YOUNG:
+            own = value_text("materials", "young", read_young(data.case, item))
+            if not text.startswith(own):
                 yield word, own, mark, *path
+                text = f"{value_text('materials', 'young', item.young)}, practically rigid"
+                text += ", as their joints have the E of the fill"
                 word, mark = f"{word} of its pieces", "inferred"
         stated = (_FURTHER_PROPERTIES["poisson"][0], *[_YOUNG] * (mark == "given"))
         text += " (unused: blocks are rigid)" * (word in stated and data.fidelity == "rigid")
