@@ -25,6 +25,7 @@ from archfem.masonry.loads import (
     Settlement,
     name_side,
 )
+from archfem.masonry.materials import check_strength
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import Structure, join_names
 from archfem.motion.design_spectra import DesignSpectrum
@@ -226,6 +227,8 @@ def parse_limit(table: Any, strength: float | None = None) -> LimitAnalysis:
     given = values.get("strength", strength)
     if "strength" in values and given is None:  # "none"
         given = np.inf
+    if given not in (None, np.inf):
+        check_strength(given, "limit.strength")
     if (demand := values.get("demand")) is not None:
         check_number(demand, "limit.demand [m/s²]", minimum=1e-3)
         if words := describe_if_in_g(demand, "limit.demand"):

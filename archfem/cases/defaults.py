@@ -11,6 +11,7 @@ from archfem.cases.case import Case
 from archfem.cases.structure_keys import PRESETS, find_table
 from archfem.cases.toml_file import Table, format_key
 from archfem.limit.instability import describe_friction, describe_geometric_factor, least_friction
+from archfem.masonry.backfill import describe_held_ends
 from archfem.masonry.joint_closing import finish_range
 from archfem.masonry.materials import Contact, Material
 from archfem.masonry.structure import Structure, join_names, join_words
@@ -26,6 +27,11 @@ _PAPER = "table 2 of Demirel and Aldemir (2021)"
 
 _OF_STRESS = (
     "of stress alone, as only a strength that is given counts in limit analyses and ratings"
+)
+
+_OF_HELD = (
+    "so that a ring stands longer: state its limits by `archfem limit` too, with all and a third "
+    "of the passive pressure"
 )
 
 _OF_DRY = "dry stone has {:g} to {:g}".format(*DRY_FRICTION)
@@ -292,20 +298,24 @@ def say_loads_left_out(case: Case) -> str:
 
 
 def describe_margins_at_rest(case: Case, structure: Structure) -> list[str]:
-    """Describe from which friction and depth of joints it stands, with a note on friction."""
+    """Describe from which friction and depth of joints it stands, with notes on these and fill."""
     contacts = {joint.contact for joint in structure.joints}
     most = max((x.coefficient for x in contacts if x.coefficient < inf), default=0.0)
-    high = [f"{NOTE_MARK}a coefficient of friction is {most:g}, and {_OF_DRY}"] * (most > 1.0)
+    notes = [f"{NOTE_MARK}a coefficient of friction is {most:g}, and {_OF_DRY}"] * (most > 1.0)
+    if held := describe_held_ends(structure):
+        notes.append(f"{NOTE_MARK}{held} and do not yield, {_OF_HELD}")
     if not (sentence := describe_friction(structure)):
-        return high
+        return notes
     least, left_out = least_friction(structure) or 0.0, say_loads_left_out(case)
+    in_pieces = any(block.grain for block in structure.blocks)
+    of_fill = ", that of the fill too" * in_pieces
     open_ones = {each.name for each in contacts if "friction" in list_default_keys(case, each)}
     lines = [
-        f"as rigid blocks {sentence}{left_out}",
+        f"as rigid blocks {sentence}{of_fill}{left_out}",
         f"{describe_geometric_factor(structure, case.limit.strength)}{left_out}",
-        *high,
+        *notes,
     ]
-    if open_ones and least > DRY_FRICTION[0]:
+    if open_ones and least > DRY_FRICTION[0] and not in_pieces:
         names = join_names([f'contacts."{name}"' for name in sorted(open_ones)])
         words = f"friction decides whether it stands: {_OF_DRY}"
         lines.append(f"{NOTE_MARK}{words}, and the case gives none in {names}")

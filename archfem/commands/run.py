@@ -486,7 +486,7 @@ def print_results(case: Case, found: Iterable[Result], folder: Path) -> tuple[st
             del doubts[supports:]  # they are not of the next result
     if case.suite is not None:
         _print_pairs(suite, runs, at_rest, folder)
-    verdict = result_text.describe_verdicts(runs.values()) if runs else ""
+    verdict = result_text.describe_verdicts(runs.values(), case.structure) if runs else ""
     across, falls = check_across(case.structure, motions)
     if across:
         print(across)

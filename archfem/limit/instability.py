@@ -163,16 +163,19 @@ def describe_geometric_factor(structure: Structure, strength: float | None) -> s
     """Describe the geometric factor of safety at rest, of a structure that stands."""
     factor = geometric_factor(structure, strength) or 1.0
     more = " or more" if factor >= 1.0 / _LITTLE_DEPTH else ""
+    fill = ", those of the fill too," * any(block.grain for block in structure.blocks)
     return (
-        f"geometric factor of safety at rest: {factor:.3g}{more}, as it stands with all joints "
-        f"{1.0 / factor:.3g} times as deep under the same weight"
+        f"geometric factor of safety at rest: {factor:.3g}{more}, as it stands with all joints"
+        f"{fill} {1.0 / factor:.3g} times as deep under the same weight"
     )
 
 
 def list_margins_at_rest(
     structure: Structure, strength: float | None
 ) -> Iterator[tuple[float, str]]:
-    """Yield the factors of safety at rest that are known, and what they are of."""
+    """Yield the factors of safety at rest of stones that are known, and what they are of."""
+    if any(block.grain for block in structure.blocks):
+        return
     if (depth := geometric_factor(structure, strength)) and depth < 1.0 / _LITTLE_DEPTH:
         yield depth, "the depth of its joints"
     if (least := least_friction(structure)) and least > _LITTLE_FRICTION:

@@ -36,7 +36,7 @@ def check_options(structure: Structure, friction: str | None, strength: float | 
         return min(filter(None, own), default=np.inf)
     if strength != np.inf:
         check_between(strength, "strength [Pa]", 0.0, remedy="leave it out for no limit")
-        check_strength(strength, "strength")
+        check_strength(strength, "strength", np.inf)
     return strength
 
 

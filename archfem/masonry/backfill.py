@@ -186,6 +186,21 @@ def _merge_slivers(pieces: list[_Piece], min_area: float, grid: float) -> list[_
     return [*pieces, *alone]
 
 
+def describe_held_ends(structure: Structure) -> str:
+    """Say that fixed walls hold the ends of a fill in pieces over most of its height; or ""."""
+    pieces = [block.points for block in structure.blocks if block.grain]
+    heights: dict[float, float] = {}
+    for joint in structure.joints:
+        owners = [structure.blocks[number] for number in joint.blocks]
+        wide, high = np.ptp(joint.ends, axis=0)
+        if any(x.fixed for x in owners) and any(x.grain for x in owners) and wide < 1e-6 * high:
+            place = round(float(joint.middle[0]), 3)
+            heights[place] = heights.get(place, 0.0) + float(high)
+    if not heights or max(heights.values()) < 0.5 * np.ptp(np.concatenate(pieces)[:, 1]):
+        return ""
+    return f"fixed walls hold the ends of the fill over {max(heights.values()):.3g} m"
+
+
 def stiffen(material: Material) -> Material:
     """Return the material of pieces, a thousand times stiffer: the compliance is in the joints."""
     return replace(material, young=min(1e3 * material.young, 1e13))

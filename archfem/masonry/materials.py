@@ -74,10 +74,10 @@ class Material:
             check_strength(self.strength, f"strength of '{self.name}'")
 
 
-def check_strength(strength: float, name: str) -> None:
+def check_strength(strength: float, name: str, most: float = 5e8) -> None:
     """Refuse a compressive strength that no masonry has, by a wrong unit [Pa]."""
-    # lumps of dry clay have ten times as much (from memory)
-    check_number(strength, f"{name} [Pa], of which 5 MPa are 5e6,", minimum=5e4)
+    # lumps of dry clay have ten times the least, and basalt up to 400 MPa (from memory)
+    check_number(strength, f"{name} [Pa], of which 5 MPa are 5e6,", minimum=5e4, maximum=most)
 
 
 @dataclass(frozen=True)

@@ -110,7 +110,8 @@ def find_ring(structure: Structure, part: str | None = None) -> Ring:
             raise InvalidInput(
                 f"'{structure.blocks[k].name}' has {len(numbers)} joints ({names}): a ring whose "
                 "thickness changes is one layer of stones, none missing, that carry nothing else; "
-                "leave out what is on them, of a drawing by ignore = true of its layers"
+                "leave out what is on them: of a bridge by remove = ['structure.backfill'], of a "
+                "drawing by ignore = true of its layers"
             )
     if len(stones) < 3:
         raise InvalidInput(

@@ -273,6 +273,23 @@ def test_a_friction_of_more_than_dry_stone_has_is_noted(friction):
     assert (note in lines) == any("dry stone" in each for each in lines) == (friction == 6.0)
 
 
+def test_contacts_of_one_name_are_named_once_where_friction_decides():
+    """Two stones on a slope of 1 in 2, on contacts that differ in stiffness alone."""
+    slope = af.Block(((0, 0), (4, 0), (4, 2)), af.STONE, "slope", fixed=True)
+    blocks = [slope]
+    for x in (1.0, 2.5):
+        corners = ((x, x / 2), (x + 1, (x + 1) / 2), (x + 0.8, x / 2 + 0.9), (x - 0.2, x / 2 + 0.4))
+        blocks.append(af.Block(corners, af.STONE, f"{x}", part="wall", role="pier"))
+    soft, stiff = (replace(af.masonry.STONE_TO_STONE, normal_stiffness=k * 1e9) for k in (1, 2))
+    law = lambda one, other: soft if "1.0" in (one.name, other.name) else stiff  # noqa: E731
+    stones = af.masonry.assembled(blocks, law)
+    *_, note = describe_margins_at_rest(af.Case.of(BARE), stones)
+    assert note == (
+        "note: friction decides whether it stands: dry stone has 0.4 to 0.8, and the case gives "
+        'none in contacts."stone to stone"'
+    )
+
+
 @pytest.mark.parametrize(
     ("tables", "left_out"),
     [

@@ -12,6 +12,7 @@ from mechanisms import FOUR, twitching
 
 import archfem as af
 from archfem.cases.analysis_keys import parse_limit
+from archfem.cases.defaults import describe_margins_at_rest
 from archfem.cases.result_folder import limit_files
 from archfem.cases.result_text import (
     _count_mechanisms,
@@ -31,6 +32,7 @@ from archfem.cases.toml_file import format_tables
 from archfem.commands.cli import main
 from archfem.limit.collapse import Outcome, describe_fill
 from archfem.limit.fill_range import FillAssumption, FillRange
+from archfem.limit.instability import list_margins_at_rest
 from archfem.limit.mechanism_count import duration_text
 
 
@@ -327,9 +329,35 @@ def test_point_loads_without_a_strength_are_stated_by_an_assumed_one_too(ring):
 
 
 def test_verdicts_of_several_runs_are_counted(run):
-    assert describe_verdicts([run]) == run.verdict.headline
+    ring = af.circular_arch(radius=1.0, thickness=0.2, embrace=180.0, voussoirs=5)
+    assert describe_verdicts([run], ring) == run.verdict.headline
     outcome, doubtful = run.verdict.outcome, "2" if run.verdict.doubts else "none"
-    assert describe_verdicts([run, run]) == f"{outcome} in 2 of 2 runs; doubts in {doubtful}"
+    assert describe_verdicts([run, run], ring) == f"{outcome} in 2 of 2 runs; doubts in {doubtful}"
+
+
+@pytest.mark.parametrize(("above", "state"), [(0.9, "fixed"), (0.9, "free"), (0.2, "fixed")])
+def test_verdicts_and_notes_name_fixed_walls_that_hold_the_ends_of_pieces(run, above, state):
+    """Of a fill of 1.2 m; walls that yield, or end low, do not hold it."""
+    ring = af.shapes.Arch(span=2.0, rise=0.5, thickness=0.3, voussoirs=5)
+    wall = {"length": 1.5, "height": 1.0, "above": above, "setback": 0.0, "state": state}
+    sides = [af.shapes.Sidewall(name=f"{side} wall", **wall) for side in ("left", "right")]
+    whole = af.bridge(
+        arches=[ring], sidewalls=sides, backfill=af.shapes.Backfill(cover=0.4), width=1.0
+    )
+    soil = {"friction_angle": 30.0, "cohesion": 1e5}
+    structure = af.masonry.jointed_fill(whole, 0.45, **soil)
+    words = "fixed walls hold the ends of the fill over 0.9 m"
+    held = f"; {words}" * (above == 0.9 and state == "fixed")
+    assert describe_verdicts([run], structure) == run.verdict.headline + held
+    assert describe_verdicts([run, run], structure).endswith(f"doubts in 2{held}")
+    case = af.Case.of({"structure": {"shape": "column", "breadth": 0.6, "heights": [1.2]}})
+    friction, depth, *notes = describe_margins_at_rest(case, structure)
+    assert friction.endswith(", that of the fill too")
+    assert "all joints, those of the fill too, " in depth
+    begin = f"note: {words} and do not yield, so that a ring stands longer: "
+    assert [note.startswith(begin) for note in notes] == [True] * bool(held)
+    assert [*list_margins_at_rest(structure, np.inf)] == []
+    assert describe_verdicts([run], whole) == run.verdict.headline
 
 
 @pytest.mark.parametrize(

@@ -221,6 +221,9 @@ def test_a_thickness_names_a_stone_on_a_wrong_layer(moved, code, tmp_path, capsy
     assert ("least thickness" in said) == (code == 3)
 
 
+_TWO_STRENGTHS = "note: joints crush at 12 MPa of [limit], and stones of [materials] at 60 MPa"
+
+
 def test_a_strength_in_another_unit_is_refused_by_a_check(tmp_path, capsys):
     """As by a rating, though the case has no load of a limit analysis."""
     path = tmp_path / "ring.toml"
@@ -230,4 +233,15 @@ def test_a_strength_in_another_unit_is_refused_by_a_check(tmp_path, capsys):
     )
     assert af.commands.main(["check", str(path)]) == 1
     assert "strength [Pa], of which 5 MPa are 5e6, = 12.0 is below" in capsys.readouterr().err
-    assert af.commands.main(["check", str(path), "--set", "limit.strength=12 MPa"]) in (0, 3)
+    command = ["check", str(path), "--set", "limit.strength=12 MPa"]
+    stones = "--set", 'materials.stone.strength="60 {}"'
+    for given, code, words in (
+        ([], (0, 3), ""),
+        ([stones[0], stones[1].format("GPa")], (1,), "= 60000000000.0 is above 5e+08"),
+        (["--set", "limit.strength=12 GPa"], (1,), "= 12000000000.0 is above 5e+08"),
+        ([stones[0], stones[1].format("MPa")], (0, 3), _TWO_STRENGTHS),
+    ):
+        assert af.commands.main([*command, *given]) in code
+        said = capsys.readouterr()
+        assert words in said.out + said.err
+        assert (_TWO_STRENGTHS in said.out) == (words == _TWO_STRENGTHS)
