@@ -45,6 +45,9 @@ RESULTS = {
 }
 
 
+# Split of weights of a ratio that is less than with the weights apart
+_OF_BODIES = "with one weight a body"
+
 # Demand of a push that is compared with none
 NO_DEMAND = "compared with no demand in numbers"
 
@@ -61,6 +64,9 @@ class Row(NamedTuple):
 
 # Largest multiple of the forces of ties that is tried, and largest ratio of interest [-]
 MOST_TIED = 4.0
+
+# Outcome of a check by displacements that is passed at rest
+AT_REST = "for the mechanism does not begin to move"
 
 # Begin of a note on motions that are matched up to a shorter period than that of a check
 MATCHED = "the motions of the suite are matched from"
@@ -281,8 +287,9 @@ def state_assessments(
     for (text, _), (check, shown, ratios, directions) in checks.items():
         ways, outcome = " and ".join(directions), check.words
         if check.passes and check.at_rest:
-            outcome += ", for the mechanism does not begin to move"
+            outcome += f", {AT_REST}"
         demand, capacity = (f"{x:.4g} {check.unit}" for x in (shown.demand, shown.capacity))
+        capacity += f" {_OF_BODIES}" * (shown is not check and ratios.floor is None)
         name, numbers = f"assessment: {check.name}, {ways}", ratios._replace(directions=directions)
         rows.append(Row(name, demand, f"{capacity}, {outcome}", str(ratios), numbers._asdict()))
         sentences += [f"kinematic assessment, {ways}: {text}"] if text in last else []
@@ -343,7 +350,7 @@ def describe_margin(found: Iterable[KinematicAssessment]) -> str:
     same = [x.over_fill for x, _ in alike if x.over_fill is not None]
     if same:
         over = FillRange.least_of(same)
-        of = " with one weight a body" * (ratios.bodies is not None)
+        of = f" {_OF_BODIES}" * (ratios.bodies is not None)
         of = of if ratios.floor is None else " with e* = 1"
         outcome = over.outcome if ratios.needed else check.words
         return f"least margin{of} {over.describe(digits=3)}, by {check.name}: {outcome}"

@@ -2,14 +2,16 @@
 
 from collections.abc import Iterator
 from itertools import groupby
-from math import inf
+from math import inf, isclose
 from typing import NamedTuple
 
 from archfem._display import NOTE_MARK
 from archfem._validation import declared_keys
+from archfem.cases.analysis_keys import find_given_strength
 from archfem.cases.case import Case
 from archfem.cases.structure_keys import PRESETS, find_table
 from archfem.cases.toml_file import Table, format_key
+from archfem.limit.fill_strength import has_backing
 from archfem.limit.instability import describe_friction, describe_geometric_factor, least_friction
 from archfem.masonry.backfill import describe_held_ends
 from archfem.masonry.joint_closing import finish_range
@@ -295,6 +297,16 @@ def say_loads_left_out(case: Case) -> str:
     loads = {"[assessment]": attached, "limit.dead": case.limit.dead}
     named = join_words([section for section, own in loads.items() if own])
     return f", without the loads of {named}" if named else ""
+
+
+def note_limit(case: Case) -> Iterator[str]:
+    """Yield notes on what [limit] gives, and dead load and runs do not count, or other tables."""
+    if has_backing(case.limit.fill):
+        yield f"{NOTE_MARK}the backing of [limit] is fill here, in dead load and runs"
+    given, crushing = find_given_strength(case.structure, case.settings), case.limit.strength or inf
+    if given and crushing < inf and not isclose(given, crushing):
+        words = f"{crushing / MPa:g} MPa of [limit], and stones of [materials] at {given / MPa:g}"
+        yield f"{NOTE_MARK}joints crush at {words} MPa"
 
 
 def describe_margins_at_rest(case: Case, structure: Structure) -> list[str]:

@@ -14,7 +14,7 @@ import xarray as xr
 from archfem._display import DOUBT_MARK, NOTE_MARK
 from archfem._files import align_columns
 from archfem.cases import defaults
-from archfem.cases.analysis_keys import LimitAnalysis, find_given_strength
+from archfem.cases.analysis_keys import LimitAnalysis
 from archfem.cases.case import Case
 from archfem.cases.run import DeadLoadResult
 from archfem.dynamics.accuracy import Accuracy
@@ -25,7 +25,7 @@ from archfem.errors import filter_log
 from archfem.joints.criteria import assessed_joints, envelope, first_time, longest_duration
 from archfem.limit.collapse import Collapse, Outcome, describe_fill
 from archfem.limit.fill_range import FillRange
-from archfem.limit.fill_strength import Fill, PlasticFill, as_pressure, has_backing
+from archfem.limit.fill_strength import Fill, PlasticFill, as_pressure
 from archfem.limit.mechanism_count import Mechanism, duration_text
 from archfem.limit.rating import Rating
 from archfem.masonry.backfill import describe_held_ends
@@ -47,7 +47,7 @@ from archfem.motion.response_spectra import measure_intensity
 from archfem.statics.equilibrium import structure_doubts
 from archfem.statics.pushover import Pushover
 from archfem.statics.stress import strength_use_text, utilisation_text
-from archfem.units import STANDARD_GRAVITY, Ends, MPa, format_mm, kN
+from archfem.units import STANDARD_GRAVITY, Ends, format_mm, kN
 
 # A doubt, or a line with a note
 Remark = Doubt | str
@@ -191,11 +191,10 @@ def _count_mechanisms(verdicts: Sequence[Verdict], definition: str) -> str:
 def describe_verdicts(runs: Iterable[History], structure: Structure) -> str:
     """Describe the verdict of a run, or how many of several runs have each outcome, in one line."""
     verdicts = [run.verdict for run in runs]
-    held = "".join(f"; {text}" for text in [describe_held_ends(structure)] if text)
-    if len(verdicts) == 1:
-        return verdicts[0].headline + held
     doubtful = sum(bool(verdict.doubts) for verdict in verdicts)
-    return f"{count_outcomes(verdicts)}; doubts in {doubtful or 'none'}{held}"
+    counts = f"{count_outcomes(verdicts)}; doubts in {doubtful or 'none'}"
+    words = verdicts[0].headline if len(verdicts) == 1 else counts
+    return "; ".join(filter(None, [words, describe_held_ends(structure)]))
 
 
 def count_outcomes(verdicts: Sequence[Verdict]) -> str:
@@ -293,16 +292,7 @@ def describe_dead_load(result: DeadLoadResult, *, explain: bool = False) -> str:
         *defaults.describe_margins_at_rest(result.case, structure),
         *note_masses(structure, parapets=result.case.parapets),
     ]
-    if has_backing(result.case.limit.fill):
-        lines.append(f"{NOTE_MARK}the backing of [limit] is fill here, in dead load and runs")
-    given, crushing = (
-        find_given_strength(structure, result.case.settings),
-        result.case.limit.strength,
-    )
-    if given and crushing and not np.isclose(given, crushing) and crushing < np.inf:
-        words = f"crush at {crushing / MPa:g} MPa of [limit], and stones of [materials] at"
-        lines.append(f"{NOTE_MARK}joints {words} {given / MPa:g} MPa")
-    lines += note_ties_left_out(result.case)
+    lines += [*defaults.note_limit(result.case), *note_ties_left_out(result.case)]
     across = describe_transverse_push(structure)
     if result.case.has_motion and structure.heads.any():
         across = across.replace(UNCHECKED_ACROSS, CHECKED_ACROSS)

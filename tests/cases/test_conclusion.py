@@ -1179,6 +1179,45 @@ def test_ratings_that_disagree_are_all_in_the_headline(case, norm, needed):
     assert all(f"{name}: factor" in verdict or name in says for name in found)
 
 
+def test_a_stricter_code_that_passes_only_on_some_fills_stands_beside_that_of_the_norm(case):
+    """By CS 454 it fails without the pressure of the fill, and passes with it."""
+    found = {
+        "lorry by Eurocodes": ("passes", "1.5", 1.1),
+        "lorry by CS 454": ("passes only with the pressure of the fill; 0.7 to 1.5", "1.005", 0.7),
+    }
+    rows = [
+        answers.Row("rating", name, words, x, {"passes": True, "least": least})
+        for name, (words, x, least) in found.items()
+    ]
+    settings = {key: value for key, value in case.settings.items() if key != "motion"}
+    data = ReportData(af.Case.of(settings | {"report": {"norm": "EN 1991-2"}}), {})
+    vars(data)["statements"] = {"rating": answers.Statement([], rows)}
+    assert head_of(conclusion.list_facts(data)) == (
+        "Rating for lorry by Eurocodes: factor 1.1, 1 is required, passes. It passes only with the "
+        "pressure of the fill for lorry by CS 454 (else 0.7)."
+    )
+
+
+def test_a_joint_head_states_what_differs_and_of_which_check_a_margin_is(case):
+    """Three norms and one author; one check that is passed as nothing moves."""
+    norms, parts = {"A": "EN 1991-2", "B": "EN 1998-1", "C": "EN 1998-1"}, {}
+    for name, norm in norms.items():
+        report = {"author": "A. Mason", "norm": norm} | ({"place": "Vale"} if name == "B" else {})
+        data = parts[name] = ReportData(af.Case.of(case.settings | {"report": report}), {})
+        check = answers.Ratios("damage", ["right"], 1.4, 1.4)
+        outcome = f"0.09 m, passes, {answers.AT_REST}" if name == "B" else "passes"
+        row = answers.Row("assessment", "0.08 m", outcome, "1.4", check._asdict())
+        vars(data)["statements"] = {"assessment": answers.Statement([], [row])}
+        vars(data)["transverse_push"] = np.nan
+    facts = dict(conclusion.list_joint_facts(parts))
+    signed = {key: facts[key] for key in ("author", "norm", "place")}
+    expected = {"author": "A. Mason", "norm": "EN 1991-2 (A); EN 1998-1 (B and C)"}
+    assert signed == expected | {"place": "Vale (B)"}
+    earth = "1.4 times the earthquake"
+    rest = f"of B {earth} until it begins to move, by damage, right"
+    assert facts["margin"] == f"The least margins are of A {earth}; {rest}; of C {earth}."
+
+
 def test_without_a_norm_a_rating_without_a_code_comes_first(case):
     """Ratings by codes stand in the head where they fail."""
     codes = {"lorry by CS 454": ("1.6", True), "lorry": ("4.1", True)}

@@ -117,6 +117,8 @@ def test_a_suite_has_a_report_with_a_player_for_each_pair(kept, capsys):
     assert f"{float(run.joints['friction'].max()):.3f}" in words
 
 
+# Of the second check, the ratio that decides and the other
+APART = "0.45 (0.5 with the weights apart)"
 CHECKS = [
     AssessmentCheck("linear, q = 2, FC = 1.35", 8.212, 2.844, "m/s²", 8.212 / 2.844, np.nan, ""),
     AssessmentCheck("a code", 0.11, 0.22, "m", 0.5, 1.178, "", bodies=0.45),
@@ -190,7 +192,7 @@ def test_demand_and_capacity_stand_beside_their_doubts(kept, undrawn):
             for name, demand, capacity, factor in (
                 ("linear, q = 2, FC = 1.35", "2.844 m/s²", "8.212 m/s², passes", "2.89"),
                 # of the factor that decides
-                ("a code", "0.22 m", "0.099 m, fails", "0.45 (0.5 with the weights apart)"),
+                ("a code", "0.22 m", "0.099 m with one weight a body, fails", APART),
             )
         ),
         (
@@ -273,9 +275,8 @@ def test_a_margin_names_its_spectrum_which_may_be_another_demand(kept, undrawn, 
     spectrum = f"the EC8 spectrum of PGA {1.15 * ag:.3g} g"
     demands = [row[1] for row in table.rows if row[0].startswith("assessment")]
     assert demands == [f"{own} of {spectrum}" for own in ("2.844 m/s²", "0.22 m")]
-    least = "0.45 (0.5 with the weights apart)"
     (margin,) = (each.text for each in pieces if getattr(each, "lead", "").startswith("By which"))
-    assert f"The least margin is {least}, on {spectrum}, by a code, wh" in margin
+    assert f"The least margin is {APART}, on {spectrum}, by a code, wh" in margin
     demands = [row[:3] for row in given.rows]
     assert ("EC8 spectrum", f"PGA {1.15 * ag:.3g} g", "[assessment]") == demands[1]
     assert ("; a margin on one is none on another" in given.caption) == noted

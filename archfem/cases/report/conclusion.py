@@ -11,7 +11,7 @@ import numpy as np
 
 from archfem._files import group_of, read_file_list
 from archfem.cases import result_text
-from archfem.cases.answers import RESULTS, Ratios, Row, Statement, read_numbers
+from archfem.cases.answers import AT_REST, RESULTS, Ratios, Row, Statement, read_numbers
 from archfem.cases.case import REPORT_KEYS
 from archfem.cases.report import margins
 from archfem.cases.report.demands import list_demands, name_spectrum, tabulate_demands
@@ -27,7 +27,7 @@ from archfem.cases.report.doubts import (
     list_unvaried,
     spans_run,
 )
-from archfem.cases.report.motion_rules import find_missed, find_rule
+from archfem.cases.report.motion_rules import find_missed, find_rule, name_norm
 from archfem.cases.report.outcomes import (
     describe_ends,
     describe_outcomes,
@@ -72,6 +72,9 @@ _BEGUN = {RESULTS["risk"]: "risk_samples.nc"}
 
 # Lines of the head with the answer, in their order
 HEAD = ("verdict", "margin", "depends on", "not checked")
+
+# Keys of [report] as the head has them
+_SIGNED = {key.replace("_", " ") for key in REPORT_KEYS}
 
 # Demands of which factors of several cases are multiples, in words
 KINDS = "the earthquake", "the vehicle", "the given load"
@@ -121,8 +124,8 @@ def list_facts(data: ReportData) -> list[tuple[str, str]]:
 def list_joint_facts(parts: Mapping[str, ReportData]) -> list[tuple[str, str]]:
     """List who signs what, the worst verdict and the least margin, and the answer of each case."""
     heads = {name: list_facts(data) for name, data in parts.items()}
-    keys = {key.replace("_", " ") for key in REPORT_KEYS}
-    signed = [row for row in next(iter(heads.values())) if row[0] in keys]
+    keys = [key for head in heads.values() for key, _ in head if key in _SIGNED]
+    signed = [(key, _join_values(heads, key)) for key in dict.fromkeys(keys)]
     answer, margin, _, left = HEAD
     said = {
         name: " ".join(text for key, text in head if key in (answer, margin, left))
@@ -151,14 +154,27 @@ def list_joint_facts(parts: Mapping[str, ReportData]) -> list[tuple[str, str]]:
     return [*signed, *facts, *said.items()]
 
 
+def _join_values(heads: Mapping[str, list[tuple[str, str]]], key: str) -> str:
+    """Return a value of several cases, with the names of its cases where they differ."""
+    named = dict[str, list[str]]()
+    for name, head in heads.items():
+        named.setdefault(dict(head).get(key, ""), []).append(name)
+    values = {f"{text} ({join_words(names)})": text for text, names in named.items() if text}
+    return "; ".join(values if len(named) > 1 else values.values())
+
+
 def _say_factor(data: ReportData, factor: float, kind: str) -> str:
-    """Say a least factor of a case, with "at most" before an upper bound."""
+    """Say a least factor of a case, with "at most" before an upper bound, and until when it is."""
     pushes = read_numbers(PushFactors, data.statements.get("limit"))
     bounds = [x.least for x in pushes if x.bounded or x.proved is not None]
     checks = read_numbers(Ratios, data.statements.get("assessment"))
     bounds += [check.decisive for check in checks if check.bounded]
     bounds += [least for least, words, _ in margins.say_less(data) if "≤" in words]
-    return f"{'at most ' * (factor in bounds)}{format_ratio(factor)} times {kind}"
+    rows = data.statements["assessment"].rows if checks else []
+    resting = [x.numbers["check"] for x in rows if AT_REST in x.outcome]
+    resting = [x.name for x in checks if x.decisive == factor and x.check in resting]
+    until = f" until it begins to move, by {resting[0]}" if resting else ""
+    return f"{'at most ' * (factor in bounds)}{format_ratio(factor)} times {kind}{until}"
 
 
 def _rank_verdict(data: ReportData) -> tuple[int, dict[str, float]]:
@@ -261,6 +277,8 @@ def _say_ratings(data: ReportData, stated: Statement) -> Iterator[str]:
         yield from [f"worst with {re.split('(?<= m), ', place)[0]}"] * bool(place)
     left = [row for row in stated.rows if row not in shown]
     passes, fails = ([x for x in left if x.numbers["passes"] is state] for state in (True, False))
+    unsure = [x for x in passes if x.outcome.startswith("passes only")]
+    passes = [x for x in passes if x not in unsure]
     if any(x.numbers["passes"] for x in shown):
         passes = []  # one is enough
     elif not passes:
@@ -269,6 +287,9 @@ def _say_ratings(data: ReportData, stated: Statement) -> Iterator[str]:
     for words, rows in (f"fails{too}", fails), ("passes", passes):
         if rows:
             yield f"it {words} for {join_words([f'{x.demand} ({x.factor})' for x in rows])}"
+    for row in unsure:
+        least = format_ratio(row.numbers["least"], 4)
+        yield f"it {row.outcome.partition('; ')[0]} for {row.demand} (else {least})"
 
 
 def _is_of_norm(data: ReportData, text: str) -> bool:
@@ -310,7 +331,8 @@ def _say_survival(
 def _say_conditions(data: ReportData) -> Iterator[str]:
     """Yield rules that the motions miss, how often it falls otherwise, and what decides."""
     if missed := join_words([x.rule.partition(",")[0] for x in find_missed(data)]):
-        yield f"the motions do not meet {data.case.report['norm']} by their {missed}"
+        norm = name_norm(find_rule(data))
+        yield f"the motions do not meet {norm} by their {missed}"
     ranges = sorted(data.verdict_ranges, key=lambda x: (x.falls.sum(), x.dislocated.sum()))
     for found in ranges[-1:]:
         motion = found.dataset.attrs.get("motion")
@@ -327,11 +349,11 @@ def _say_conditions(data: ReportData) -> Iterator[str]:
 
 def _say_why_undecided(data: ReportData) -> str:
     """Say how the runs are too few, or lack joints, to decide a survival; "" if they do not."""
-    count, rule, norm = len(data.runs), find_rule(data), data.case.report.get("norm", "")
+    count, rule = len(data.runs), find_rule(data)
     total = count + len(data.missing)
     words = [f"{count} of {total} motions {'were' if count > 1 else 'was'} run"] * (count < total)
     if rule and count < rule.fewest:
-        words.append(f"{norm} (from memory) requires {rule.fewest} motions at least")
+        words.append(f"{name_norm(rule)} (from memory) requires {rule.fewest} motions at least")
     falls = [run.verdict.fall for run in data.runs.values()]
     if loose := sum(fall is not None and fall.lacks_joints for fall in falls):
         words.append(f"in {loose} of {count} runs joints were not followed through strong motion")

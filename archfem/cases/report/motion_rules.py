@@ -1,5 +1,6 @@
 """Rules of a norm for suites of motions: what is required, what is found, and whether it is met."""
 
+import re
 from collections.abc import Iterator
 from csv import reader
 from inspect import signature
@@ -55,6 +56,11 @@ def find_rule(data: ReportData) -> SelectionRule | None:
         return None
     found = (rule for words, rule in _NORMS.items() if words in norm)
     return SELECTION_RULES.get(next(found, ""))
+
+
+def name_norm(rule: SelectionRule | None) -> str:
+    """Return the name of the norm of a rule, which may be one of several that a report names."""
+    return re.split("[:,]", rule.source)[0] if rule else ""
 
 
 def check_motions(data: ReportData) -> list[Check]:
@@ -187,5 +193,5 @@ def tabulate_checks(data: ReportData) -> list[Grid | TextBlock]:
 def note_checks(data: ReportData) -> list[str]:
     """Return a note on each rule of the norm that the motions do not meet."""
     found = [f"{x.rule}, {x.required}, is {x.found}" for x in find_missed(data)]
-    norm = data.case.report.get("norm", "")
+    norm = name_norm(find_rule(data))
     return [f"motions do not meet {norm} (from memory): {each}" for each in found]

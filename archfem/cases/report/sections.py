@@ -83,9 +83,12 @@ _METHODS = (
 
 def build_joint_sections(parts: Mapping[str, ReportData]) -> list[Section]:
     """Build the sections of a report of several cases: drawings, inputs, and each case."""
-    report, labels = next(iter(parts.values())).case.report, dict[str, list[str]]()
+    labels, signed = dict[str, list[str]](), dict[str, dict[str, None]]()
     for label, data in parts.items():
         labels.setdefault(data.case.structure.fingerprint, []).append(label)
+        for key in ("author", "checked_by", "date"):
+            signed.setdefault(key, {})[data.case.report.get(key, "")] = None
+    report = {key: "; ".join(filter(None, texts)) for key, texts in signed.items()}
     firsts = {join_words(own): parts[own[0]].case.structure for own in labels.values()}
     drawn = [_draw_assessed(each, f"{own}: the") for own, each in firsts.items()]
     sections = [Section("Signatures and drawings", [build_signatures(report), *drawn])]
