@@ -171,9 +171,12 @@ def _say_factor(data: ReportData, factor: float, kind: str) -> str:
     bounds += [check.decisive for check in checks if check.bounded]
     bounds += [least for least, words, _ in margins.say_less(data) if "≤" in words]
     rows = data.statements["assessment"].rows if checks else []
-    resting = [x.numbers["check"] for x in rows if AT_REST in x.outcome]
-    resting = [x.name for x in checks if x.decisive == factor and x.check in resting]
-    until = f" until it begins to move, by {resting[0]}" if resting else ""
+    until = ""
+    for row, check in zip(rows, checks, strict=True):
+        if AT_REST in row.outcome and check.decisive == factor:
+            capacity, demand = (float(text.split()[0]) for text in (row.outcome, row.demand))
+            until = f" until it begins to move, {format_ratio(capacity / demand)} by displacements"
+            until += f" ({check.name})"
     return f"{'at most ' * (factor in bounds)}{format_ratio(factor)} times {kind}{until}"
 
 
