@@ -88,7 +88,9 @@ def _name_slivers(structure: Structure) -> str:
 
 def _describe_bearing(structure: Structure) -> str:
     """Return a line on the lintels of a wall in bond with the least and most bearing, if any."""
-    found, most, beds = [], 0.0, np.flatnonzero(~structure.heads)
+    found, most = [], 0.0
+    # a keystone leans on stones beside it by steep joints
+    beds = np.flatnonzero(np.abs(structure.normals[:, 0]) <= np.abs(structure.normals[:, 1]))
     pairs = structure.pairs[beds]
     above = pairs[np.arange(len(beds)), structure.centroids[pairs, 1].argmax(axis=1)]
     bodies = find_bodies(structure)

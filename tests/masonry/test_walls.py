@@ -233,6 +233,34 @@ def test_jambs_of_one_storey_leave_the_bond_of_others(lengths):
     assert min(map(min, bearings.values())) > 0.249 * stone
 
 
+@pytest.mark.parametrize("is_lintel", [False, True])
+def test_a_keystone_between_voussoirs_is_no_lintel(is_lintel):
+    """A keystone's joints, 0.6 m high over 0.2 m, are steep; a stone on both walls bears on 2 m."""
+    places = {
+        "ground": ((-3, -1), (6, -1), (6, 0), (-3, 0)),
+        "left": ((-3, 0), (-1, 0), (-1, 1), (-3, 1)),
+        "right": ((1, 0), (3, 0), (3, 1), (1, 1)),
+        "one": ((4, 0), (5, 0), (5, 1), (4, 1)),
+        "other": ((5, 0), (6, 0), (6, 1), (5, 1)),
+        "key": ((-3, 1), (3, 1), (3, 2), (-3, 2)),
+    }
+    if not is_lintel:
+        places |= {
+            "left haunch": ((-3, 1), (-1, 1), (-0.5, 1.5), (-0.7, 2.1), (-3, 2.1)),
+            "right haunch": ((1, 1), (3, 1), (3, 2.1), (0.7, 2.1), (0.5, 1.5)),
+            "key": ((-0.5, 1.5), (0.5, 1.5), (0.7, 2.1), (-0.7, 2.1)),
+        }
+    span = dict.fromkeys(("key", "left haunch", "right haunch"), ("span", "ring"))
+    blocks = list[af.Block]()
+    for name, outline in places.items():
+        part, role = span.get(name, ("wall", "other"))
+        own = {"fixed": name == "ground", "part": part, "role": role}
+        blocks.append(af.Block(outline, af.STONE, name, **own))
+    said = describe_depths(af.masonry.assembled(blocks, CONTACT))
+    assert ("least bearing of a lintel: 2000 mm, of 'key'" in said) == is_lintel
+    assert ("lintel" in said) == is_lintel
+
+
 @pytest.mark.slow
 def test_lintels_bear_on_the_given_length_or_a_quarter_of_a_stone():
     lengths = lay_front(0.25)
