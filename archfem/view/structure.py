@@ -308,12 +308,12 @@ def _join_segments(segments: Array) -> Array:
 
 
 def list_numbers(structure: Structure) -> list[str]:
-    """Name a stone by its joints, and list the numbers that stand for long names of joints."""
+    """Name a stone by its joints, unless it is drawn with its name, and list numbered joints."""
     shown = [joint for joint, own in zip(structure.joints, structure.judged, strict=True) if own]
     sides = [(first, last) for first, last in pairwise(shown) if first.blocks[1] == last.blocks[0]]
     texts = [
         f"{structure.blocks[last.blocks[0]].name} is between {first.name} and {last.name}"
-        for first, last in sides[len(sides) // 2 :][:1]
+        for first, last in sides[len(sides) // 2 :][: not find_named_stones(structure)]
     ]
     for part in dict.fromkeys(joint.part for joint in shown):
         names = [short_name(joint.name, part) for joint in shown if joint.part == part]
@@ -321,6 +321,24 @@ def list_numbers(structure: Structure) -> list[str]:
             listed = ", ".join(f"{k} {name}" for k, name in enumerate(names))
             texts.append(f"{part or 'joints'}: {listed}")
     return texts
+
+
+def find_assessed_walls(structure: Structure) -> set[str]:
+    """Return the assessed parts that are walls in bond."""
+    joints = zip(structure.joints, structure.heads, structure.judged, strict=True)
+    kinds = [(joint.part, head, own) for joint, head, own in joints]
+    return {part for part, head, _ in kinds if head} & {part for part, _, own in kinds if own}
+
+
+def find_named_stones(structure: Structure) -> list[int]:
+    """Return the stones with room for their names: of stones in bond, if most have it."""
+    scale, stones, found = style.drawing_scale(structure), list_stones(structure), list[int]()
+    for number in stones if structure.heads.any() else ():
+        wide, high = scale * np.ptp(structure.blocks[number].outline, axis=0)
+        letters = len(structure.blocks[number].name)
+        if style.text_width(letters, Size.NOTE) < wide and high > Size.NOTE / 72.0:
+            found.append(number)
+    return found if len(found) > 0.5 * len(stones) else []
 
 
 def short_name(name: str, part: str) -> str:
@@ -356,29 +374,33 @@ def draw_names(structure: Structure) -> Figure:
     axes.autoscale_view()
     for joint in shown:
         axes.plot(*joint.ends.T, color=Colour.SLIDING, lw=1.0, zorder=4)
-    heads = zip(structure.joints, structure.heads, strict=True)
-    walls = {joint.part for joint, head in heads if head}
     parts = dict.fromkeys(joint.part for joint in shown)
+    walls, named = find_assessed_walls(structure), find_named_stones(structure)
+    numbered = bool(walls) and not named
     sign = "#" * (not walls.issuperset(parts))  # beside numbers of joints
     for part in parts:
-        if part in walls:
+        if part in walls and numbered:
             _number_stones(axes, structure, part, inch, sign)
-        else:
+        elif part not in walls:
             top = max(block.points[:, 1].max() for block in structure.blocks)
             _name_part(axes, [joint for joint in shown if joint.part == part], inch, float(top))
-    example = shown[len(shown) // 2].name
-    title = f"{structure.name}: names of joints, such as '{example}'"
-    if walls:
-        number = structure.joints[len(structure.joints) // 2].blocks[1]
+    example, of = shown[len(shown) // 2].name, "stones, and of " * bool(named)
+    title = f"{structure.name}: names of {of}joints, such as '{example}'"
+    if numbered:
+        stones = [k for k in structure.free if structure.blocks[k].part in walls]
+        number = stones[len(stones) // 2]
         stone = structure.blocks[number].name
         title = f"{structure.name}: numbers of stones; {sign}{number} is '{stone}'"
     style.set_title(axes, title)
-    numbers = [] if walls else list_numbers(structure)
+    numbers = [] if numbered else list_numbers(structure)
     note = "; ".join(filter(None, [structure.assessment, *numbers]))
     style.add_note(figure := cast(Figure, axes.figure), {"": note})
-    if not walls:
+    if not structure.heads.any():
         figure.draw_without_rendering()
         _keep_apart(sorted(axes.texts, key=lambda text: text.get_text() not in parts))
+    look: dict[str, Any] = {"ha": "center", "va": "center", "zorder": 8, "fontsize": Size.NOTE}
+    for k in named:
+        style.annotate(axes, structure.blocks[k].name, structure.centroids[k], **look)
     return figure
 
 

@@ -10,6 +10,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 import archfem as af
 from archfem.cases.analysis_keys import LimitAnalysis
+from archfem.cases.report.sections import _draw_assessed
 from archfem.cases.result_text import describe_collapse, describe_run
 from archfem.view import draw_envelope, draw_names, draw_structure
 from archfem.view.structure import draw_dimensions, list_numbers, short_name
@@ -195,6 +196,34 @@ def test_numbers_of_stones_beside_those_of_joints_are_marked():
     assert marked == [f"#{k}" for k in wall.free]
     assert len({*words}) == len(words)
     assert "; #" in figure.axes[0].get_title()
+
+
+@pytest.mark.parametrize("end", ["", ", named at length"])
+def test_stones_beside_a_gable_in_bond_have_their_names_where_these_are_short(end):
+    """Results call joints of the gable after its stones; joints of ring and piers have numbers."""
+    blocks = [*bonded(2).blocks]
+    blocks[1:] = [replace(block, part="gable", role="other") for block in blocks[1:]]
+    for side, x in (("L", 4.0), ("R", 6.0)):
+        feet = ((x, -0.5), (x + 0.5, -0.5), (x + 0.5, 0.0), (x, 0.0))
+        own = {"part": f"{side} pier", "role": "pier"}
+        blocks.append(af.Block(feet, af.STONE, f"{side} foot", fixed=True, **own))
+        shaft = [(a, y + 0.5 + 0.5 * k) for k in range(3) for a, y in feet]
+        blocks += [af.Block(shaft[4 * k : 4 * k + 4], af.STONE, "s", **own) for k in range(3)]
+    blocks = [replace(b, name=b.name if b.fixed else f"S{k}{end}") for k, b in enumerate(blocks)]
+    wall = af.masonry.assembled(blocks, af.Contact(1.48e9, 0.3e9, friction=0.6))
+    assert wall.heads.any()
+    figure = draw_names(wall)
+    words = [word for word, _ in written(figure)]
+    stones = {wall.blocks[k].name for k in wall.free}
+    assert stones.intersection(words) == (set() if end else stones)
+    assert {"base", "2", "L pier", "R pier"} <= {*words}
+    title = figure.axes[0].get_title().replace("\n", " ")
+    assert "numbers of stones" not in title
+    assert ("names of stones" in title) == (not end)
+    caption = _draw_assessed(wall).caption
+    named = "" if end else " and the names of stones"
+    assert caption.startswith(f"The structure, 1 m thick, with its assessed joints{named}")
+    assert ("; S" in caption) == bool(end)  # else a stone is named by its joints
 
 
 @pytest.mark.slow

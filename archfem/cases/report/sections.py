@@ -48,7 +48,14 @@ from archfem.motion.record_selection import SELECTION_RULES
 from archfem.statics.assessment_checks import LIMIT_STATES, LimitState
 from archfem.units import MPa, format_mm, kN
 from archfem.view.pages.document import FigureBlock, Grid, Section, TextBlock
-from archfem.view.structure import draw_dimensions, draw_names, draw_structure, list_numbers
+from archfem.view.structure import (
+    draw_dimensions,
+    draw_names,
+    draw_structure,
+    find_assessed_walls,
+    find_named_stones,
+    list_numbers,
+)
 from archfem.view.studies import draw_findings
 from archfem.view.style import limit_width
 
@@ -220,13 +227,16 @@ def build_structure_section(data: ReportData) -> Section:
 
 
 def _draw_assessed(structure: Structure, the: str = "The") -> FigureBlock:
-    """Draw a structure with the names of joints, or with those of the stones of a wall in bond."""
-    figure, named = draw_names(structure), ["with its assessed joints", *list_numbers(structure)]
+    """Draw a structure with names of joints and stones, or with numbers of stones in bond."""
+    figure, named = draw_names(structure), find_named_stones(structure)
+    shown = ["with its assessed joints", *list_numbers(structure)]
+    shown[0] += " and the names of stones" * bool(named)
+    if find_assessed_walls(structure) and not named:
+        shown = ["with numbers of stones in the order of the case, from 0 on"]
     if structure.heads.any():
         draw_dimensions(figure.axes[0], structure)
-        numbers = "with numbers of stones in the order of the case, from 0 on"
-        named = [f"{structure.width:g} m thick, {numbers}"]
-    return _untitle(figure, f"{the} structure, {'; '.join(named)}.")
+        shown[0] = f"{structure.width:g} m thick, {shown[0]}"
+    return _untitle(figure, f"{the} structure, {'; '.join(shown)}.")
 
 
 def _untitle(figure: Any, caption: str) -> FigureBlock:
