@@ -787,7 +787,32 @@ def test_the_verdict_of_several_cases_is_the_worst_and_names_its_case(case):
     least = "of stands 0.9 0.9 times the earthquake; of stands 1.4 1.4 times the earthquake; "
     assert facts[2][1].startswith(f"The least margins are {least}")
     assert facts[2][1].endswith("; of stands None not known.")
-    assert [key for key, _ in facts[3:]] == [name for name in parts if name != "fallen 2.0"]
+    assert facts[3][0] == "not checked"  # the same for all
+    assert [key for key, _ in facts[4:]] == [name for name in parts if name != "fallen 2.0"]
+
+
+def test_margins_side_by_side_are_in_the_plane_and_what_is_across_it_is_said_once(case):
+    """Across the plane, where nothing was checked, a push of 0.3 g overturns both at 0.3 × 1 g."""
+    spectrum = {"code": "EC8", "type": 1, "ag": 1.0, "ground": "A"}
+    settings = {**case.settings, "assessment": {**SPECTRUM, "spectrum": spectrum}}
+    parts = {"strong": 1.5, "weak": 0.6}
+    for name, factor in parts.items():
+        data = parts[name] = ReportData(af.Case.of(settings), {})
+        check = answers.Ratios("linear", ["right"], factor, factor)
+        vars(data).update(transverse_push=0.3, across=({}, ""))
+        vars(data)["statements"] = {"assessment": state("assessment", check)}
+    facts = conclusion.list_joint_facts(parts)
+    said = dict(facts)
+    assert said["margin"] == (
+        "The least margins are of weak 0.6 times the earthquake; "
+        "of strong 1.5 times the earthquake."
+    )
+    assert conclusion._rank_verdict(parts["strong"])[0] == 1  # it may overturn
+    assert sum("cross the plane of" in text for _, text in facts) == 1
+    assert said["not checked"] == (
+        "strong and weak: Across the plane of the drawing it was not checked, where it may "
+        "overturn from 0.3 g on (demand 1 g)."
+    )
 
 
 @pytest.mark.parametrize("fails", [False, True])

@@ -127,8 +127,13 @@ def list_joint_facts(parts: Mapping[str, ReportData]) -> list[tuple[str, str]]:
     keys = [key for head in heads.values() for key, _ in head if key in _SIGNED]
     signed = [(key, _join_values(heads, key)) for key in dict.fromkeys(keys)]
     answer, margin, _, left = HEAD
+    unchecked = [text for head in heads.values() for key, text in head if key == left]
     said = {
-        name: " ".join(text for key, text in head if key in (answer, margin, left))
+        name: " ".join(
+            text
+            for key, text in head
+            if key in (answer, margin) or (key == left and unchecked.count(text) == 1)
+        )
         + "".join(f" In doubt: {text}." for key, text in head if key == "in doubt")
         for name, head in heads.items()
     }
@@ -151,6 +156,9 @@ def list_joint_facts(parts: Mapping[str, ReportData]) -> list[tuple[str, str]]:
         name = next(iter(worst), min(ranks, key=lambda x: ranks[x][0]))
         facts.append((answer, f"The worst of {len(parts)} cases is {name}: {said.pop(name)}"))
     facts.append((margin, f"The least margins are {'; '.join(listed)}."))
+    for text in (x for x in dict.fromkeys(unchecked) if unchecked.count(x) > 1):
+        alike = [name for name, head in heads.items() if (left, text) in head]
+        facts.append((left, f"{join_words(alike)}: {text}"))
     return [*signed, *facts, *said.items()]
 
 
@@ -181,8 +189,11 @@ def _say_factor(data: ReportData, factor: float, kind: str) -> str:
 
 
 def _rank_verdict(data: ReportData) -> tuple[int, dict[str, float]]:
-    """Return the place of a case among others, the worst first, and its least factors by kind."""
-    ranked = margins.rank_margins(data, rests=False)
+    """Return the place of a case among others, the worst first, and its least factors by kind.
+
+    Factors are those in the plane of the drawing, where all cases have them.
+    """
+    ranked = [*margins.list_margins(data, across=False)]
     outcome = find_worst(data)[1] if data.runs else ""
     stated = data.statements.get("rating")
     rows = stated.rows if stated else []
@@ -191,8 +202,9 @@ def _rank_verdict(data: ReportData) -> tuple[int, dict[str, float]]:
     loads = read_numbers(PushFactors, data.statements.get("limit"))
     factors = [load.least for load in loads if not load.site]
     fails = [x < 1.0 for x, is_ranked, _ in ranked if is_ranked] + [x < 1.0 for x in factors]
-    fails += [least < 1.0 for least, *_ in margins.say_less(data)]
+    fails += [least < 1.0 for least, *_ in [*margins.say_less(data), *margins.say_across(data)]]
     fails += [not x.numbers["passes"] or x.numbers["least"] < 1.0 for x in rows]
+    fails += [_say_unchecked(data)[1]]
     shaken, rated = (x for x, *_ in ranked), (x.numbers["least"] for x in rows)
     every = zip(KINDS, (min(x, default=np.inf) for x in (shaken, rated, factors)), strict=True)
     undecided = outcome.startswith("may") or (bool(data.runs) and bool(_say_why_undecided(data)))

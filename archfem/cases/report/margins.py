@@ -127,15 +127,15 @@ def describe_margin(data: ReportData) -> Iterator[str]:
         yield from [*(f"{rank}{x}" for x in texts[:1]), *texts[1:]]
 
 
-def rank_margins(data: ReportData, *, rests: bool = True) -> list[tuple[float, bool, list[str]]]:
-    """Return what `_list_margins` yields, the least first.
+def rank_margins(data: ReportData) -> list[tuple[float, bool, list[str]]]:
+    """Return what `list_margins` yields, the least first.
 
     That at rest, if it counts, is among them where it is less than all. Where the least is across
     the plane, the next stands in the same sentence. What the head states is counted and not
     repeated.
     """
-    margins = sorted(_list_margins(data), key=lambda each: each[0])
-    at_rest = list_margins_at_rest(data.case.structure, data.case.limit.strength) if rests else []
+    margins = sorted(list_margins(data), key=lambda each: each[0])
+    at_rest = list_margins_at_rest(data.case.structure, data.case.limit.strength)
     least = min((each[0] for each in margins), default=np.inf)
     for factor, of in sorted(at_rest)[:1]:
         if factor < least:  # alone it has no rank
@@ -151,7 +151,9 @@ def rank_margins(data: ReportData, *, rests: bool = True) -> list[tuple[float, b
     return margins
 
 
-def _list_margins(data: ReportData) -> Iterator[tuple[float, bool, list[str]]]:
+def list_margins(
+    data: ReportData, *, across: bool = True
+) -> Iterator[tuple[float, bool, list[str]]]:
     """Yield factors on demands with their sentences, and whether they lack a subject and verb.
 
     A push that is no margin has an infinite one.
@@ -161,7 +163,7 @@ def _list_margins(data: ReportData) -> Iterator[tuple[float, bool, list[str]]]:
         yield least, True, texts
     for least, texts in describe_scales(data):
         yield least, True, texts
-    for least, at, _, body in sorted(say_across(data))[:1]:
+    for least, at, _, body in sorted(say_across(data))[:across]:
         text = f"below {at}: {body} across the plane as one rigid body, held by nothing else"
         yield least, True, [text]
     for name in (x for x in ("limit", "pushover") if x in data.statements):
