@@ -52,7 +52,7 @@ from archfem.limit.collapse import Collapse, describe_fill
 from archfem.limit.rating import Rating
 from archfem.masonry.ring_thickness import find_ring
 from archfem.masonry.structure import join_words
-from archfem.models.model import Doubt
+from archfem.models.model import Doubt, group_doubts, merge_doubts
 from archfem.motion.motion import Motion
 from archfem.motion.suite import Suite
 from archfem.statics.modes import Modes
@@ -246,7 +246,8 @@ def assess(options: argparse.Namespace) -> int:
     remarks += answers.note_band(case, found.values())
     remarks += answers.note_across(case.structure, found.values())
     remarks += result_text.note_masses(case.structure, parapets=case.parapets)
-    every = [*remarks, *(doubt for result in found.values() for doubt in result.doubts)]
+    own = group_doubts(doubt for result in found.values() for doubt in result.doubts)
+    every = [*remarks, *map(merge_doubts, own)]  # of both senses once
     texts = [answers.describe_margin(found.values())]
     for name, result in found.items():
         # doubts follow at the end, once

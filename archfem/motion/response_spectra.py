@@ -300,7 +300,12 @@ def measure_intensity(motion: Motion, component: str = "horizontal") -> Intensit
     return IntensityMeasures(
         pga=float(np.abs(samples).max()),
         pgv=float(np.abs(motion.velocity(component)).max()),
-        pgd=float(np.abs(motion.displacement(component)).max()),
+        # ground that rests behind the record does not drift on
+        pgd=float(
+            np.abs(motion.displacement(component)[: len(np.trim_zeros(samples, "b"))]).max(
+                initial=0.0
+            )
+        ),
         arias=float(signal_processing.integrate_arias(samples, motion.dt)[-1]),
         cav=float(integrate.trapezoid(np.abs(samples), dx=motion.dt)),
         housner=float(integrate.trapezoid(spectrum * periods / (2.0 * np.pi), periods)),

@@ -30,6 +30,9 @@ from archfem.units import STANDARD_GRAVITY, format_ratio
 # Outcome of a check that passes with the weights of single blocks alone
 BY_SPLIT = "passes or fails by the split of weights"
 
+# What the doubt of such a check begins with
+OF_SPLIT = "passes with weights at the centroids of blocks"
+
 # Outcome of a check that passes with the e* of the mechanism found, and fails with e* = 1
 BY_MECHANISM = "passes or fails by which mechanism moves at this alpha_0"
 
@@ -192,8 +195,8 @@ class AssessmentCheck:
         """Return the doubt of a check that passes with the weights of single blocks alone."""
         if self.outcome != BY_SPLIT:
             return []
-        words = "{} passes with weights at the centroids of blocks, and with one weight for each "
-        words += "body that moves as one it fails: {:.3g}"
+        words = f"{{}} {OF_SPLIT}, and with one weight for each body that moves as one it fails: "
+        words += "{:.3g}"
         remedy = "bonded or tall courses move as one body: take this ratio"
         return [Doubt(words, remedy, (self.name, self.bodies))]
 

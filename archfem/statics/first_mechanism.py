@@ -214,9 +214,9 @@ def search_flat(
     if found.solutions is not None and found.solutions.may_be_less:
         doubt = Doubt(
             "alpha_0 is {}, the least that a search without dilatancy found, and a weaker "
-            "mechanism may exist",
-            f"hold a push of {0.9 * found.factor:.3g} g, a tenth below, by [motion] held",
-            (UPPER_BOUND,),
+            "mechanism may exist; a tenth below it is {:.3g} g",
+            "hold such a push by [motion] held",
+            (UPPER_BOUND, 0.9 * found.factor),
         )
     return classify_motion(placed, joints, found.motion, flat, contacts, found.factor), doubt
 

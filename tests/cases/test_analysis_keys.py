@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from itertools import count
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,7 @@ from archfem.cases.analysis_keys import (
 )
 from archfem.dynamics.damping import resolve_effective_damping
 from archfem.dynamics.schemes import EffectiveDamping
+from archfem.models.model import Doubt
 
 RING = Path(__file__).parents[2] / "meshes" / "ring.toml"
 POINT = {"x": "1.4 m", "force": ["0 kN", "-1 kN"]}
@@ -452,3 +454,22 @@ def test_loads_of_a_limit_may_stay(stack):
         parse_limit({"point": point, "dead": [{"x": 0.0}]})
     with pytest.raises(af.InvalidInput, match="a rating takes no loads that stay"):
         rate_case(stack, {"vehicle": "LM1"}, limit)
+
+
+def test_a_doubt_of_both_senses_is_printed_once_with_both_numbers(
+    tmp_path, capsys, monkeypatch, unplotted
+):
+    numbers = count(1)
+    monkeypatch.setattr(
+        "archfem.statics.assessment_checks.AssessmentCheck.doubt_split",
+        lambda _: [Doubt("it may be {:.3g} g", "hold it", (0.25 * next(numbers),))],
+    )
+    spectrum = {"code": "NTC-2018", "ag": 0.2, "f0": 2.4, "tc_star": 0.3, "site": "B"}
+    column = {"shape": "column", "breadth": 0.6, "heights": [2.4]}
+    path = tmp_path / "column.toml"
+    path.write_text(af.Case.of({"structure": column, "assessment": {"spectrum": spectrum}}).text())
+    assert af.commands.main(["assess", str(path)]) == 3
+    said = capsys.readouterr().out
+    assert re.findall("in doubt: it may be .*", said) == [
+        "in doubt: it may be 0.25 to 1 g; hold it"
+    ]

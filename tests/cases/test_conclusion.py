@@ -36,7 +36,7 @@ from archfem.dynamics.walls_across import (
 from archfem.errors import InvalidInput
 from archfem.masonry.out_of_plane import UNCHECKED_ACROSS, find_transverse_push
 from archfem.models.model import Doubt, read_doubts, write_doubts
-from archfem.statics.assessment_checks import UPPER_BOUND
+from archfem.statics.assessment_checks import UPPER_BOUND, AssessmentCheck
 from archfem.studies import variations
 from archfem.studies.fragility import Rate
 
@@ -608,6 +608,22 @@ def test_an_upper_bound_is_no_doubt_about_a_study_whose_cases_all_fail_by_it(cas
         found = SimpleNamespace(worst={"least_margin": each_margin}, doubts=[doubt], is_own=True)
         vars(data)["studies"] = [found]
         assert doubts.list_decisive_doubts(data, [(doubts.STUDIES, doubt)]) == listed
+
+
+def test_what_can_only_fail_more_is_no_doubt_about_an_assessment_that_fails_in_one_sense(case):
+    """To the left it fails by whatever split of weights and bound; to the right by some."""
+    left = answers.Ratios("damage", ["left"], 0.68, 0.68, bodies=0.61, bounded=True)
+    right = answers.Ratios("damage", ["right"], 1.02, 1.02, bodies=0.9)
+    check = AssessmentCheck("damage", 1.02, 1.0, "m", 1.02, 1.0, "a code", bodies=0.9)
+    (split,) = check.doubt_split()
+    for checks, listed in (((right, left), []), ((right,), ["kinematic assessment"])):
+        data = data_of(case)
+        data.statements["assessment"] = state("assessment", *checks)
+        for doubt in (Doubt("the curve is {}", "", (UPPER_BOUND,)), split):
+            every = [("kinematic assessment", doubt)]
+            assert doubts.list_decisive_doubts(data, every) == listed
+    other = [("kinematic assessment", Doubt("no step converges"))]
+    assert doubts.list_decisive_doubts(data, other) == ["kinematic assessment"]
 
 
 @pytest.mark.parametrize(("share", "decided"), [(0.04, True), (0.06, False)])

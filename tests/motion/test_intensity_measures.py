@@ -23,6 +23,14 @@ def test_measures_of_a_sine_are_the_closed_forms():
     assert found.duration == pytest.approx(duration)
 
 
+@pytest.mark.parametrize("rest", [0.0, 10.0])
+def test_rest_behind_a_record_adds_no_drift_to_its_displacement(rest):
+    """A pulse of 1 m/s² in 1 s, which leaves 0.995 m/s, displaces the ground by t²/2 to its end."""
+    times = np.arange(101) * 0.01
+    pulse = af.Motion(np.ones(101), 0.01).with_rest(rest)
+    assert measure_intensity(pulse).pgd == pytest.approx(0.5 * times[-1] ** 2, rel=1e-6)
+
+
 def test_housner_intensity_sums_the_pseudo_velocity():
     motion = af.Motion.synthetic(seed=2, duration=8.0)
     periods = np.linspace(0.1, 2.5, 800)

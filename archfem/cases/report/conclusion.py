@@ -202,9 +202,9 @@ def _rank_verdict(data: ReportData) -> tuple[int, dict[str, float]]:
     loads = read_numbers(PushFactors, data.statements.get("limit"))
     factors = [load.least for load in loads if not load.site]
     fails = [x < 1.0 for x, is_ranked, _ in ranked if is_ranked] + [x < 1.0 for x in factors]
-    fails += [least < 1.0 for least, *_ in [*margins.say_less(data), *margins.say_across(data)]]
+    fails += [least < 1.0 for least, *_ in margins.say_less(data)]
+    fails += [scale < 1.0 for scale, *_ in margins.say_across(data)] + [_say_unchecked(data)[1]]
     fails += [not x.numbers["passes"] or x.numbers["least"] < 1.0 for x in rows]
-    fails += [_say_unchecked(data)[1]]
     shaken, rated = (x for x, *_ in ranked), (x.numbers["least"] for x in rows)
     every = zip(KINDS, (min(x, default=np.inf) for x in (shaken, rated, factors)), strict=True)
     undecided = outcome.startswith("may") or (bool(data.runs) and bool(_say_why_undecided(data)))

@@ -18,7 +18,7 @@ from archfem.masonry.out_of_plane import UNCHECKED_ACROSS
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import join_words
 from archfem.models.model import Doubt, group_doubts, merge_doubts
-from archfem.statics.assessment_checks import UPPER_BOUND
+from archfem.statics.assessment_checks import OF_SPLIT, UPPER_BOUND
 from archfem.units import STANDARD_GRAVITY, Ends
 
 # Ratio of the peaks of motions and spectrum beyond which they are different demands: those of
@@ -105,15 +105,20 @@ def list_checks(data: ReportData) -> list[Ratios]:
 def list_decisive_doubts(data: ReportData, doubts: Sequence[tuple[str, Doubt]]) -> list[str]:
     """List the results whose doubts may change the answer.
 
-    A bound from above can not change checks that fail by it, nor a study whose cases all do.
+    A bound from above can not change an assessment of which a check fails by it, nor a study whose
+    cases all do; nor does the split of weights where a check fails by any.
     """
     checks, studies = list_checks(data), [each.worst for each in data.own_studies if each.doubts]
     margins = [worst.get("least_margin", [1.0]) for worst in studies]
     failed = {
-        RESULTS["assessment"]: bool(checks) and all(max(x.least, x.most) < 1.0 for x in checks),
+        RESULTS["assessment"]: any(max(x.least, x.most) < 1.0 for x in checks),
         STUDIES: all(len(each) and max(each) < 1.0 for each in margins),
     }
-    bounded = {each for each in doubts if failed.get(each[0]) and UPPER_BOUND in str(each[1])}
+    bounded = {
+        (result, doubt)
+        for result, doubt in doubts
+        if failed.get(result) and (UPPER_BOUND in str(doubt) or OF_SPLIT in doubt.words)
+    }
     return list(dict.fromkeys(each[0] for each in doubts if each not in bounded))
 
 
