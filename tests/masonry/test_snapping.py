@@ -107,7 +107,8 @@ LOWER = {"rock": square(0, -1)}
         (LOWER | {"a": [[0, 0], [1, 1], [1, 0], [0, 1]]}, "'a' crosses or touches itself"),
         (
             LOWER | {"a": square(0.998, 0)},
-            r"touch along 2 mm only at .*, within 0.005 m = 5 times snap, taken for an error",
+            r"touch along 2 mm only at .*, within 0.005 m = 5 times snap: join the corners "
+            "there, or lower snap from 0.001 to 0.0004 m$",
         ),
         (
             LOWER | {"a": square(3, 3)},

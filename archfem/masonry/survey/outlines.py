@@ -500,8 +500,7 @@ def _check_contacts(
     raise InvalidStructure(
         f"'{one}' and '{other}' touch along {1e3 * dist(*short[0][2]):.3g} mm only at "
         f"{frame.place(start)}{say_others('the first', found, frame.place)}, within "
-        f"{frame.length(least)} = {AMBIGUOUS_GAP_RATIO:g} times snap, taken for an error of the "
-        "survey: draw its end at the corner nearby, and leave out a real step",
+        f"{frame.length(least)} = {AMBIGUOUS_GAP_RATIO:g} times snap: join the corners there",
         found,
     )
 
