@@ -394,7 +394,7 @@ def note_ties(case: Case) -> list[str]:
         return min(MOST_TIED, find_margin([least])), least.mechanism_name, bounded
 
     def describe(sense: float) -> str:
-        """Describe the least force from which on all checks pass; empty where ties do nothing."""
+        """Describe the force from which on all tried ones pass; empty where ties do nothing."""
         if solve(0.0, sense)[0] >= 1.0:
             return ""
         ratio, mechanism, _ = solve(MOST_TIED, sense)
@@ -411,9 +411,9 @@ def note_ties(case: Case) -> list[str]:
         if len(ties) == 1:
             size = scale * float(np.hypot(*ties[0].force)) / kN
             of = f"{size:.3g} kN of the tie at {ties[0].block}"
-        bounded = ", one by an upper bound alone," * solve(scale, sense)[2]
+        bounded = ", one by an upper bound alone" * solve(scale, sense)[2]
         length = describe_tied_length(case.structure)
-        return f"all its checks are just passed{bounded} with {of} {length}"
+        return f"from {of} on, {length}, all forces tried pass its checks{bounded}"
 
     for sense in settings.directions if ties else ():
         with suppress(InvalidInput):  # without its ties it may not stand

@@ -472,9 +472,9 @@ def test_a_check_that_alone_fails_is_in_every_headline_with_the_force_of_a_tie()
     ]
     assert note_ties_left_out(af.Case.of({"structure": column})) == []
     assert note_ties(case) == [
-        "note: pushed to the right, all its checks are just passed, one by an upper bound alone, "
-        f"with {needed:.3g} kN of the tie at block 1 in all for 1 m of width, without a factor on "
-        "the tie"
+        f"note: pushed to the right, from {needed:.3g} kN of the tie at block 1 on, in all for 1 m "
+        "of width, without a factor on the tie, all forces tried pass its checks, one by an upper "
+        "bound alone"
     ]
     bounded = replace(free, displacement=replace(free.displacement, bounded=True))
     assert describe_margin([bounded]).endswith(": fails")  # an upper bound shows no passing
@@ -877,6 +877,9 @@ def test_a_wedge_of_a_wall_in_bond_has_the_linear_check_alone(wedge, verified):
     Associated flow has a larger factor, and its mechanism cannot begin without dilatancy.
     """
     (limit, found), wall = wedge, wedge[0].structure
+    # a number, so that those of both senses are stated in one doubt
+    (push,) = [x.values[1] for x in found.doubts if "without dilatancy found, and" in x.words]
+    assert push == pytest.approx(0.9 * limit.factor, rel=1e-4)
     free = list(wall.free)
     sizes = [np.ptp(np.array(wall.blocks[k].outline), axis=0) for k in free]
     weights = np.array([0.4 * breadth * height * STONE for breadth, height in sizes])
