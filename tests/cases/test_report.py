@@ -1178,6 +1178,8 @@ def test_points_of_a_spectrum_and_attached_loads_are_stated(kept, undrawn):
     pairs = "0 0.2; 100 ms 0.5; 0.2 0.5; 0.3 0.5; 0.4 0.5; 0.5 0.5; 1 0.25; 2 0.125"
     table = f"table of period [s] and accelerations [g]: {pairs}"
     assert rows["assessment: spectrum"] == (table, "given")
+    law = "coulomb, as none without dilatancy is searched with loads"
+    assert rows["assessment: friction"] == (law, "default")
     assert [rows[f"assessment: load {k}"] for k in range(1, 5)] == [
         (text, "given")
         for text in (

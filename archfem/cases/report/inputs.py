@@ -458,6 +458,8 @@ def _default_rows(section: str, table: Mapping[str, Any]) -> Iterator[Row]:
     if section == "assessment" and "spectrum" not in table:
         yield "assessment: spectrum", "of the motions or their target", "inferred"
     words = {"direction": "right and left"} if section == "assessment" else {}
+    if section == "assessment" and table.get("loads"):
+        words["friction"] = "coulomb, as none without dilatancy is searched with loads"
     for key, argument in signature(_FUNCTIONS[section]).parameters.items():
         # an empty value stands for none, and is no input
         if key not in table and argument.default not in (Parameter.empty, None, ()):
