@@ -55,6 +55,7 @@ from archfem.masonry.structure import join_words
 from archfem.models.model import Doubt, group_doubts, merge_doubts
 from archfem.motion.motion import Motion
 from archfem.motion.suite import Suite
+from archfem.statics.mechanism_assessment import KinematicAssessment
 from archfem.statics.modes import Modes
 from archfem.statics.pushover import Pushover
 from archfem.view.collapse import draw_ratings, draw_worst_places
@@ -240,9 +241,22 @@ def assess(options: argparse.Namespace) -> int:
             bound = f"{error.last.sentence}; " if isinstance(error, Interrupted) else ""
             write_progress_line("assessment", f"{bound}nothing is kept")
             raise
-    remarks: list[result_text.Remark] = [*doubts]
-    with keep_warnings():  # which are those of the assessment
-        remarks += [] if options.parts else answers.note_ties(case)
+    ties = [f"{NOTE_MARK}the force of ties with which all checks pass was not searched to its end"]
+    try:  # a search of many assessments, which may be cut short
+        with keep_warnings():  # which are those of the assessment
+            ties = [] if options.parts else answers.note_ties(case)
+    finally:
+        every = _show_assessment(case, found, [*doubts, *ties], options.out)
+    return doubt_code(every)
+
+
+def _show_assessment(
+    case: Case,
+    found: Mapping[str, KinematicAssessment],
+    remarks: list[result_text.Remark],
+    out: str | None,
+) -> list[result_text.Remark]:
+    """Write the results of an assessment and print them; return all its remarks."""
     remarks += answers.note_band(case, found.values())
     remarks += answers.note_across(case.structure, found.values())
     remarks += result_text.note_masses(case.structure, parapets=case.parapets)
@@ -265,8 +279,8 @@ def assess(options: argparse.Namespace) -> int:
         stated = answers.state_assessments(found, remarks).as_file("assessment")
         return {"assessment.txt": text, **stated, **figures}
 
-    write_results("assess", case, options.out, f"{case.title}\n{text}", draw)
-    return doubt_code(every)
+    write_results("assess", case, out, f"{case.title}\n{text}", draw)
+    return every
 
 
 @keep_attempt("rating")

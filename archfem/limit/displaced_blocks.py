@@ -343,7 +343,7 @@ class Bodies:
         row, body, values = jump_entries(*self._jumps(contacts))
         rates = np.zeros((2 * len(contacts), self.count, 3))
         np.add.at(rates, (row, body), values)
-        return rates.reshape(2, len(contacts), -1)
+        return rates.reshape(2, len(contacts), 3 * self.count)
 
     def sparse_rates(self, contacts: Sequence[Contact]) -> list[csr_matrix]:
         """Return the rates of gaps and of slips, each (n_contacts, 3 n_bodies)."""

@@ -388,6 +388,21 @@ def test_an_interrupted_search_without_dilatancy_keeps_or_says_its_bound(
     assert not (tmp_path / "no").exists()
 
 
+def test_an_assessment_is_kept_where_the_search_of_ties_is_cut_short(
+    column, tmp_path, unplotted, monkeypatch, capsys
+):
+    def stop(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("archfem.cases.answers.note_ties", stop)
+    given = ["--set", "assessment.spectrum={ code = 'EC8', ag = 0.3, ground = 'B' }"]
+    assert af.commands.main(["assess", str(column), *given, "--out", str(tmp_path)]) == 130
+    text = (tmp_path / "assessment.txt").read_text(encoding="utf-8")
+    assert text.startswith("least margin ")
+    assert "the force of ties with which all checks pass was not searched to its end" in text
+    assert text.strip() in capsys.readouterr().out
+
+
 def test_sigterm_in_limit_analysis_keeps_dead_load_and_motion(
     column, tmp_path, unplotted, monkeypatch, caplog
 ):

@@ -521,6 +521,21 @@ def fold(turn):
     return low @ (-0.25, 1.0) + knee + high @ (0.25, 1.0)
 
 
+def test_a_strong_tie_at_the_top_leaves_vertical_bending(verified):
+    """Lower blocks turn about the toe, upper ones back about their knee, by virtual work.
+
+    α (h₁ + h₂) h₁ / 2 = h₁ b / 2 + h₂ (b + b h₁ / (2 h₂)), least over the knees at h₁.
+    """
+    column, b, height = af.column(breadth=0.5, heights=[0.75] * 4), 0.5, 3.0
+    tie = af.masonry.AttachedLoad("block 4", (-0.25, 3.0), force=(-50e3, 0.0), passive=True)
+    found = af.kinematic_assessment(column, SPECTRUM, loads=[tie])
+    rests = {h: h * b / 2 + (height - h) * b + b * h / 2 for h in (0.75, 1.5, 2.25)}
+    factor = min(2.0 * rest / (height * h) for h, rest in rests.items())
+    assert found.alpha_0 == pytest.approx(factor, rel=1e-6)
+    assert found.hinges == ((0, "extrados"), (3, "intrados"))
+    verified("column tied at its top, α", factor, "virtual work", found.alpha_0)
+
+
 def test_a_tie_holds_its_point_along_the_motion():
     """Tied at 4 m the halves turn against each other: α 20 (1 + 1) = 20 (0.25 + 0.75), t = 7.5.
 
