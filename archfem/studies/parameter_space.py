@@ -21,7 +21,7 @@ from archfem._files import hash_value
 from archfem._validation import check_choice, check_integer, short_repr
 from archfem.cases.analysis_tables import complete_path
 from archfem.cases.case import Case
-from archfem.cases.provenance import STRUCTURE_SECTIONS, hash_sections
+from archfem.cases.provenance import STRUCTURE_SECTIONS, hash_inputs, hash_sections
 from archfem.cases.toml_file import apply_change, check_table, refuse_unknown
 from archfem.errors import ArchfemError, InvalidInput
 
@@ -285,10 +285,11 @@ def find_nearest_cases(names: Iterable[str], points: Iterable[StudyPoint]) -> di
 
 
 def list_structures(points: Iterable[StudyPoint]) -> list[str]:
-    """Return the digests of the structures of points, and of the cases that they change."""
+    """Return the digests of points' structures, of cases that they change and their structures."""
     cases = [point for point in points if isinstance(point, Point)]
     found = {hash_sections(x.settings, x.folder, STRUCTURE_SECTIONS) for x in cases}
     for point in {id(x.base): x for x in cases}.values():
+        found.add(hash_inputs(point.base, point.folder))
         with suppress(ArchfemError):  # some are no cases without changes
             found.add(hash_value(replace(point, changes=()).case.structure))
     return sorted(found)

@@ -1042,13 +1042,31 @@ def test_a_report_of_several_folders_has_the_worst_verdict_and_the_inputs_once(
     # a study of one case, that of the file, is shown with that
     study, shown = tmp_path / "study.toml", tmp_path / "study"
     text = 'title = "Heights"\ncase = "column.toml"\ncompute = "assessment"\n'
-    study.write_text(f"{text}[vary]\nstructure.breadth = [0.3, 0.35]\n", encoding="utf-8")
+    study.write_text(f"{text}[vary]\nstructure.breadth = [0.25, 0.3]\n", encoding="utf-8")
     assert af.commands.main(["study", str(study), "--out", str(shown), "--workers", "1"]) in (0, 3)
     given = ["report", *folders, "--study", str(shown), "--out", str(page)]
     assert af.commands.main(given) == 0
     words = " ".join(words_of(page).split())
     assert words.count("Study of many cases") == 1
     assert words.index(f" {slender} verdict") < words.index("Study of many cases")
+    least = re.search(r"In the study 'Heights' the least margin is ([\d.]+)", words)[1]
+    assert float(least) < float(ratios[1])
+    # beside a case of its structure with a tie, its least margin is of the case that it changes
+    tie = '{ block = "block 2", point = [0.0, 2.0], force = [-100.0, 0.0], passive = true }'
+    tied, given = str(tmp_path / "tied"), ["--set", f"assessment.loads=[{tie}]"]
+    assert af.commands.main(["assess", str(path), *given, "--out", tied]) in (0, 3)
+    compared, both = tmp_path / "both.toml", tmp_path / "both"
+    changes = f"""[cases]\nfree = {{}}\ntied = {{ set = ['{given[1]}'] }}\n"""
+    compared.write_text(f"{text}{changes}", encoding="utf-8")
+    margin = re.findall(r"least margin ([\d.]+)", capsys.readouterr().out)[-1]
+    arguments = ["study", str(compared), "--out", str(both), "--workers", "1"]
+    assert af.commands.main(arguments) in (0, 3)
+    for place, of_slender in ((shown, least), (both, ratios[1])):
+        given = ["report", folders[1], tied, "--study", str(place), "--out", str(page)]
+        assert af.commands.main(given) == 0
+        words = " ".join(words_of(page).split())
+        says = [f"of {x} {y} times the earthquake" for x, y in (("A", of_slender), ("B", margin))]
+        assert f"The least margins are {'; '.join(says)}." in words
     capsys.readouterr()
     given = ["report", folders[0], folders[0], "--study", str(shown)]
     assert af.commands.main(given) == 1

@@ -53,11 +53,12 @@ def say_less(data: ReportData) -> Iterator[tuple[float, str, str]]:
     margins = [x.decisive for x in read_numbers(Ratios, data.statements.get("assessment"))]
     pushes = [x.least for x in read_numbers(PushFactors, data.statements.get("limit")) if x.site]
     site = "the least push{} is {} times the site's acceleration"
+    studies = [each for each in data.own_studies if each.folder not in data.shared]
     for name, words, own in (
         ("least_margin", "the least margin{} is {}", margins),
         (OVER_SITE, site, pushes),
     ):
-        least, texts, place, study = find_least(data.own_studies, name)
+        least, texts, place, study = find_least(studies, name)
         fails = ", where the check fails" * (name == "least_margin" and least < 1.0)
         if least < 0.999 * min(own, default=np.inf):
             yield least, f"in {study} {words.format(*texts)}, at {place}{fails}", study

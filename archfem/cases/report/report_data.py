@@ -58,6 +58,7 @@ class ReportData:
     missing: tuple[str, ...] = ()  # names of the pairs of the suite without a run
     study_folders: Sequence[Path] = ()  # without any, that of the results, which may have one
     label: str = ""  # in a report of several cases, with inputs and signatures of all
+    shared: Sequence[Path] = ()  # studies, of which the least margin is of no or another case
     # of several cases, those of a wall across its plane, or in its plane of a stack that is across
     other_plane: tuple[str, str] | None = None  # which plane they are of, and their labels
 
@@ -184,6 +185,12 @@ class ReportData:
             found |= {name: _join_statements(by_pair)} if by_pair else {}
         return found
 
+    @property
+    def inputs(self) -> str:
+        """Digest of the case of the folder as it was computed; "" without one."""
+        owner = self.folder and group_of(read_file_list(self.folder), CASE_FILE)
+        return owner.inputs if owner else ""
+
     @cached_property
     def files(self) -> dict[str, Path]:
         """Files of the folder by name that have the inputs of its case; the others are left out."""
@@ -247,6 +254,15 @@ def label_parts(cases: Sequence[ReportData]) -> dict[str, ReportData]:
         plane, found = ("in", walls) if walls else ("across", across.get(label, []))
         if found:
             parts[label] = replace(part, other_plane=(f"{plane} its plane", join_words(found)))
+    # studies of each case by whether they change this very case, and no other with its structure
+    varied = {
+        label: {each.folder: part.inputs in each.digests for each in part.studies}
+        for label, part in parts.items()
+    }
+    for label, own in varied.items():
+        others = [each for name, each in varied.items() if name != label]
+        shared = [k for k, is_own in own.items() if any(x.get(k, -1) >= is_own for x in others)]
+        parts[label] = replace(parts[label], shared=shared)
     return parts
 
 

@@ -75,6 +75,7 @@ class StudyFindings:
     folder: Path = Path()
     name: str = "the study"  # with its title in a report, as `_keep_whole` returns it
     is_own: bool = True  # whether one of its cases, or their base, has the report's structure
+    digests: Collection[str] = ()  # of its structures, and of the cases that it changes
 
     @cached_property
     def numbers(self) -> xr.Dataset:
@@ -168,8 +169,9 @@ def read_study(place: Path, structure: Collection[str]) -> StudyFindings:
     kept = read_sealed_json(plan, "study") if plan.is_file() else {}
     # the plan is rewritten before its table
     fits = listed is not None and listed.inputs == hash_json(kept.get("points"))
-    is_own = fits and not {*structure}.isdisjoint(kept.get("structures", ()))
-    return replace(found, folder=place, name=f"the study '{_keep_whole(title)}'", is_own=is_own)
+    digests = kept.get("structures", ()) if fits else ()
+    name, is_own = f"the study '{_keep_whole(title)}'", not {*structure}.isdisjoint(digests)
+    return replace(found, folder=place, name=name, is_own=is_own, digests=digests)
 
 
 def collect_findings(title: str, text: str, table: xr.Dataset) -> StudyFindings:
