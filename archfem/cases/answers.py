@@ -286,7 +286,7 @@ def state_assessments(
     rows, sentences = [], []
     for (text, _), (check, shown, ratios, directions) in checks.items():
         ways, outcome = " and ".join(directions), check.words
-        if check.passes and check.at_rest:
+        if check.outcome == "passes" and check.at_rest:
             outcome += f", {AT_REST}"
         demand, capacity = (f"{x:.4g} {check.unit}" for x in (shown.demand, shown.capacity))
         capacity += f" {_OF_BODIES}" * (shown is not check and ratios.floor is None)

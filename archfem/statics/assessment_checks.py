@@ -172,8 +172,11 @@ class AssessmentCheck:
 
     @property
     def passes(self) -> bool:
-        """Whether it is withstood under every assumption on a fill, by any split, with e* = 1."""
-        return self.outcome == "passes"
+        """Whether it is withstood under every assumption on a fill, by any split, with e* = 1.
+
+        An upper bound does not show it.
+        """
+        return self.outcome == "passes" and not self.bounded
 
     @property
     def outcome(self) -> str:
@@ -189,7 +192,7 @@ class AssessmentCheck:
     @property
     def words(self) -> str:
         """The outcome in words, with an upper bound by which alone it passes."""
-        return self.outcome + f" by {UPPER_BOUND} alone" * (self.passes and self.bounded)
+        return self.outcome + f" by {UPPER_BOUND} alone" * (self.outcome == "passes") * self.bounded
 
     def doubt_split(self) -> list[Doubt]:
         """Return the doubt of a check that passes with the weights of single blocks alone."""

@@ -233,7 +233,9 @@ def describe_ties(
         need = f"{share * size:.4g}" if share > 1e-4 else "none"
         needs.append(f"{need} of the {size:.4g} kN of the tie at {tie.name}")
     side, listed = name_side(placed.direction), join_names(needs)
-    return f"pushed to the {side}, alpha_0 needs {listed}, {describe_tied_length(placed.structure)}"
+    split = ", or another split," * (len(needs) > 1)
+    needed = f"alpha_0 needs {listed}{split} as it begins to move, no force to design for, "
+    return f"pushed to the {side}, {needed}{describe_tied_length(placed.structure)}"
 
 
 def describe_tied_length(structure: Structure) -> str:
@@ -272,10 +274,10 @@ def find_stretches(
 def doubt_stretches(stretches: Sequence[tuple[str, float]]) -> list[Doubt]:
     """Return the doubts about ties that are stretched further than a short bar bears."""
     words = (
-        "at the capacity the tie at {} is stretched by {:mm}, as 2 % of {:.3g} m of bar: the "
-        "displacement check is {}"
+        "at the capacity the tie at {} is stretched by {:mm}, by which iron that bears 2 % breaks "
+        "unless {:.3g} m of bar are free: the displacement check is {}"
     )
-    remedy = "a bar that breaks before has no share in it: verify its free length"
+    remedy = "verify its free length"
     return [
         Doubt(words, remedy, (name, size, size / 0.02, UPPER_BOUND))
         for name, size in stretches

@@ -533,6 +533,12 @@ def test_a_strong_tie_at_the_top_leaves_vertical_bending(verified):
     factor = min(2.0 * rest / (height * h) for h, rest in rests.items())
     assert found.alpha_0 == pytest.approx(factor, rel=1e-6)
     assert found.hinges == ((0, "extrados"), (3, "intrados"))
+    pull = 30.0 * (factor * height / 2 - b / 2) / height  # by moments about the toe
+    says = f"needs {pull:.4g} of the 50 kN of the tie at block 4 as it begins to move, no force to"
+    assert says in found.notes[0]
+    ties = [tie, replace(tie, block="block 3", point=(-0.25, 2.25))]
+    several = af.kinematic_assessment(column, SPECTRUM, loads=ties).notes[0]
+    assert "of the 50 kN of the tie at block 3, or another split, as it begins to move" in several
     verified("column tied at its top, α", factor, "virtual work", found.alpha_0)
 
 
@@ -605,7 +611,10 @@ def test_a_tie_is_stretched_up_to_the_capacity(height, doubted):
     assert (doubt is not None) == doubted == (stretch > 0.04)
     assert found.displacement.bounded == doubted
     if doubt:
-        says = f"by {1e3 * stretch:.3g} mm, as 2 % of {50.0 * stretch:.3g} m of bar: the displ"
+        says = f"stretched by {1e3 * stretch:.3g} mm, by which iron that bears 2 % breaks unless "
+        says += f"{50.0 * stretch:.3g} m of bar are free: the displ"
+        assert not found.displacement.passes
+        assert found.displacement.words == "passes by an upper bound alone"
         assert says in doubt.cause
     free = assess_tied(height, force, direction=-1.0)
     assert "at the capacity by 0 mm at block" in free.notes[0]
