@@ -3,7 +3,7 @@
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from inspect import signature
+from inspect import getdoc, signature
 from pathlib import Path
 from typing import Any
 
@@ -157,10 +157,13 @@ def build_spectrum(table: Table, section: str) -> DesignSpectrum:
     if "ground_spectrum" in values and spectrum is FloorSpectrum:
         key = "ground_spectrum"
         values[key] = build_spectrum(values[key], f"{section}.{key}")
-    try:
-        signature(spectrum).bind(**values)
-    except TypeError as error:
-        raise InvalidInput(f"{section} of {code}: {error}") from error
+    given = signature(spectrum).parameters.items()
+    missing = [key for key, each in given if each.default is each.empty and key not in values]
+    if missing:
+        text = getdoc(spectrum) or ""
+        stated = {key: re.search(rf"^ +{key}: ([^;:\n]+)", text, re.M) for key in missing}
+        listed = [f"'{key}'" + (f", {x[1].rstrip('.')}" if x else "") for key, x in stated.items()]
+        raise InvalidInput(f"{section} of {code}: give also {'; '.join(listed)}")
     return build_registered_spectrum(code, values)
 
 
