@@ -238,7 +238,8 @@ class NonassociatedBounds:
             where it has none.
         starts: number of states from which the search started, one where it is proved least, and
             of those that reached a solution.
-        path: shares of the friction, and factors of the weakest solution with each of them.
+        path: shares of the friction, and factors of the weakest solution with each of them, of
+            stones that do not crush.
         unbalanced: largest residual of the balance of the returned solution [mean block weights].
         excess: largest |V| - c A - μ N, relative to the largest N [-].
         opening: largest opening of an end that carries force, relative to the largest gap [-]; NaN
@@ -438,7 +439,8 @@ def _search_solutions(programme: Programme, start: Optimum | None, found: _Searc
     number = max(2, MAX_START_COUNT * min(joints, MAX_FULL_SEARCH_JOINTS) ** 2 // joints**2)
     hard = replace(programme, crushing=None)
     with ProgressReport("limit analysis", len(FRICTION_SHARES) + number) as progress:
-        followed, found.path = _follow_friction(programme, progress, associated)
+        # with crushing each share would take minutes in walls of hundreds of stones
+        followed, found.path = _follow_friction(hard, progress, associated)
         starts = followed + _free_head_joints(hard)
         starts += _relax_starts(hard, start, number)
         try:

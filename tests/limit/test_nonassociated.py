@@ -726,7 +726,7 @@ def test_a_search_with_strength_starts_from_states_of_hard_stones(monkeypatch):
     assert found[0.2e6].solutions.between[1] > 1.005 * found[0.2e6].factor
     assert lower == pytest.approx(0.01073, rel=1e-3)  # as where every least force has all its cuts
     assert counts["bound"] < 10  # such least forces take 19 more
-    assert counts[""] < 0.4 * counts["hard"]  # and starts that all have cuts as many as without
+    assert counts[""] < 0.28 * counts["hard"]  # those that follow the friction, cut too, a third
 
 
 @pytest.mark.usefixtures("few_starts")
