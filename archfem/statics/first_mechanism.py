@@ -234,8 +234,9 @@ def describe_ties(
         needs.append(f"{need} of the {size:.4g} kN of the tie at {tie.name}")
     side, listed = name_side(placed.direction), join_names(needs)
     split = ", or another split," * (len(needs) > 1)
-    needed = f"alpha_0 needs {listed}{split} as it begins to move, no force to design for, "
-    return f"pushed to the {side}, {needed}{describe_tied_length(placed.structure)}"
+    onset = f"{split} as it begins to move, no force to design for" * bool(max(shares) > 1e-4)
+    length = describe_tied_length(placed.structure)
+    return f"pushed to the {side}, alpha_0 needs {listed}{onset}, {length}"
 
 
 def describe_tied_length(structure: Structure) -> str:
