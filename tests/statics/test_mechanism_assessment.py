@@ -241,7 +241,7 @@ def test_a_tie_bears_what_equilibrium_needs(force, factor, pull):
     free = assess_tied(2.0, force, direction=-1.0)
     assert free.alpha_0 == pytest.approx(0.125, rel=1e-4)
     assert free.notes[0].startswith(
-        f"pushed to the left, alpha_0 needs none of the {force / 1e3:g} kN of the tie at block 1, in"
+        f"pushed to the left, alpha_0 needs none of the {force / 1e3:g} kN of the tie at block 1,"
     )
     assert ", pushed to the left: " in describe_margin([found, free])
     assert ", pushed to" not in describe_margin([free, replace(free, direction=1.0)])
