@@ -115,21 +115,20 @@ def tabulate_inputs(data: ReportData) -> Grid:
 def compare_inputs(parts: Mapping[str, ReportData]) -> list[Grid]:
     """Tabulate inputs of several cases: those of all, of one alone, and a column for each."""
     tables = {label: tabulate_inputs(data).rows for label, data in parts.items()}
-    same, differing = list[Sequence[str]](), list[Sequence[str]]()
-    alone: dict[str, list[Sequence[str]]] = {label: [] for label in parts}
+    same, differing, alone = (list[Sequence[str]]() for _ in range(3))
     for quantity in dict.fromkeys(row[0] for rows in tables.values() for row in rows):
         own = {label: tuple(x for x in tables[label] if x[0] == quantity) for label in parts}
         having = [label for label, rows in own.items() if rows]
         if len({*own.values()}) == 1:
             same += own[having[0]]
         elif len(having) == 1:
-            alone[having[0]] += [(having[0], *row) for row in own[having[0]]]
+            alone += [(having[0], *row) for row in own[having[0]]]
         else:
             texts = ("; ".join(map(_join_mark, rows)) for rows in own.values())
             differing.append((quantity, *(text or "-" for text in texts)))
     several = Grid(("", *parts), differing, "Inputs that differ between the cases", "words")
-    rows = [row for own in alone.values() for row in own]
-    single = Grid(("case", "", "", ""), rows, "Inputs of one case alone", "words")
+    alone.sort(key=lambda row: [*parts].index(row[0]))
+    single = Grid(("case", "", "", ""), alone, "Inputs of one case alone", "words")
     return [each for each in (Grid((), same, _CAPTION), several, single) if each.rows]
 
 
