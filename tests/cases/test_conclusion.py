@@ -193,7 +193,8 @@ def test_a_push_is_no_margin_of_what_moves(case, outcomes, verified, moves):
     unproved = {"limit": state("limit analysis", PushFactors(1.04, 1.04, site, 0.0))}
     assert f"found, and {margins.NO_PROOF}; {end}" in say_margin(data, **unproved)[0]
     less = {"limit": state("limit analysis", PushFactors(0.9, 0.9, site))}
-    least = f"pushed sideways it begins to move at 0.9 times {site}; to move is no collapse"
+    end = "to move is no collapse; elastic joints may bear less, and no pushover was computed"
+    least = f"pushed sideways as rigid blocks it begins to move at 0.9 times {site}; {end}"
     # the head has it, and the margin repeats its number alone
     alone = "the least margin is 0.9, as said above"
     assert say_margin(data, **less) == [alone, *filter(None, [moves])]
@@ -353,7 +354,7 @@ def test_the_margin_said_first_is_the_least_of_the_report(case):
     said = say_margin(data, limit=push, assessment=check)
     assert said[0].startswith(
         f"the least margin is {least:.3g} across the plane of the drawing, which was not checked; "
-        "pushed sideways it begins to move at 1.15 times the site's 0.2 g"
+        "pushed sideways as rigid blocks it begins to move at 1.15 times the site's 0.2 g"
     )
     assert said[1].startswith("the next is 1.85, on the EC8")
     columns = {name: ("x", [0.9, 0.7]) for name in ("least_push_over_site", "least_push", "push")}
@@ -370,7 +371,7 @@ def test_the_margin_said_first_is_the_least_of_the_report(case):
     said = " ".join(say_margin(data, limit=push, assessment=check))
     # the head says it once
     assert "study" not in said
-    assert said.startswith("the least margin is 0.7, as said above pushed sideways it begins")
+    assert said.startswith("the least margin is 0.7, as said above pushed sideways as rigid")
     below = "In the study the least push, 0.7 g, is 0.7 times the site's acceleration, at x = 2"
     verdict = head_of(conclusion.list_facts(data))
     assert f"{below}." in verdict
@@ -454,7 +455,10 @@ def test_the_box_has_the_push_and_no_scale_of_a_fill_in_tension_at_all(case):
         vars(data)["statements"] = {"scale": state("scale", found), "limit": state("limit", push)}
         said = head_of(conclusion.list_facts(data))
         assert ("first dislocated at 1.47 g" in said) == box  # 7.34 × 0.2 g
-        assert "Pushed sideways it begins to move at 0.737 to 1.65 times the demand of 0.15" in said
+        begins = (
+            "Pushed sideways as rigid blocks it begins to move at 0.737 to 1.65 times the demand"
+        )
+        assert begins in said
     vars(data)["statements"] = {
         "limit": state("limit", PushFactors(1.2, 1.65, "the demand of 0.15 g"))
     }
@@ -525,8 +529,8 @@ def test_the_answer_has_displacements_the_first_fall_and_the_checks(case):
         "By the kinematic assessment it does not withstand the spectrum of the motion. Under its "
         "motions it survives: it stands under all 2 motions of PGA 0.20 g, and moves by 60 to 80 "
         "mm. It first falls at 0.26 g, 1.30 × 'a' (1.30 to 1.51 ×, 0.26 to 0.302 g over motions "
-        "and time steps). No property was varied. Across the plane of the drawing it was not "
-        "checked."
+        "and time steps). No property was varied. The stiffness of joints is a default: measured "
+        "ones differ tenfold. Across the plane of the drawing it was not checked."
     )
     assert facts["in doubt"] == "scale of the motion"
     pieces = conclusion.build_conclusion(data).pieces
@@ -933,7 +937,8 @@ def test_of_unequal_outcomes_the_worst_is_the_first(case):
         "none of 2 variations"
     )
     rest = (
-        "No property that was varied decides. Across the plane of the drawing it was not checked."
+        f"No property that was varied decides. {sentence(conclusion.DEFAULT_STIFFNESS)} "
+        "Across the plane of the drawing it was not checked."
     )
     assert head_of(conclusion.list_facts(data)) == f"{text}, under 'first'. {rest}"
     parted = data.verdict_ranges[0].dataset.assign(outcome=("run", ["stands", "dislocated"]))
@@ -1084,10 +1089,27 @@ def test_the_head_of_a_push_says_when_it_begins_to_move(case):
     data = data_of(case)
     vars(data)["statements"] = {"limit": answers.Statement(["limit analysis"], [row])}
     begins = (
-        "Pushed sideways it begins to move at 0.5 times the site's 0.2 g; to move is no collapse."
+        "Pushed sideways as rigid blocks it begins to move at 0.5 times the site's 0.2 g; "
+        "to move is no collapse."
     )
     unchecked = "Across the plane of the drawing it was not checked."
     assert head_of(conclusion.list_facts(data)) == f"{begins} {unchecked}"
+
+
+def test_a_pushover_depends_on_the_stiffness_of_joints_and_limit_analysis_does_not(case):
+    data, push = data_of(case), PushFactors(0.5, 0.5, "the site's 0.2 g")
+    stated = {name: state(name, push) for name in ("limit", "pushover")}
+    for names, unvaried in ((["limit"], ""), (stated, "stiffness")):
+        vars(data)["statements"] = {name: stated[name] for name in names}
+        facts = dict(conclusion.list_facts(data))
+        said = facts.get("depends on", "")
+        assert said == sentence(conclusion.DEFAULT_STIFFNESS) * bool(unvaried)
+        assert ("stiffness" in doubts.list_unvaried(data)) == bool(unvaried)
+        texts = " ".join(getattr(x, "text", "") for x in conclusion.build_conclusion(data).pieces)
+        assert texts.count("Shaken it may begin to move at less") == 1
+    given = {"normal_stiffness": 2e9, "shear_stiffness": 1e9, "friction": 0.6}
+    measured = af.Case.of({**case.settings, "contacts": {"stone to stone": given}})
+    assert "depends on" not in dict(conclusion.list_facts(replace(data, case=measured)))
 
 
 @pytest.mark.parametrize(("least", "place"), [(0.6, ""), (0.4, "x = 2")])
@@ -1568,9 +1590,8 @@ def test_a_push_is_compared_with_a_demand_in_numbers_and_words_are_not_read(
     else:
         assert (shown, factor) == ("the demand of 0.2 g", "2.5")
         assert verdict.startswith(
-            "Pushed sideways it begins to move at 2.5 times the demand of 0.2"
+            "Pushed sideways as rigid blocks it begins to move at 2.5 times the demand of 0.2 g"
         )
-        assert "Pushed sideways it begins to move at 2.5 times the demand of 0.2 g" in verdict
     assert answers.NO_DEMAND not in text + verdict
 
 
@@ -1810,5 +1831,6 @@ def test_titles_and_names_of_studies_hold_any_character(case, tmp_path, undrawn)
     depends = dict(conclusion.list_facts(data))["depends on"].replace("\N{NO-BREAK SPACE}", " ")
     assert depends == (
         "In the study 'Measures: one; two; three, or more: all' none lowers the push of "
-        "'as: given', 0.25 g. 'wide; thick' raises the push most, to 0.35 g."
+        "'as: given', 0.25 g. 'wide; thick' raises the push most, to 0.35 g. "
+        + sentence(conclusion.DEFAULT_STIFFNESS)
     )

@@ -13,6 +13,7 @@ from archfem._files import group_of, read_file_list
 from archfem.cases import result_text
 from archfem.cases.answers import AT_REST, RESULTS, Ratios, Row, Statement, read_numbers
 from archfem.cases.case import REPORT_KEYS
+from archfem.cases.defaults import list_default_keys, list_materials_and_contacts
 from archfem.cases.report import margins
 from archfem.cases.report.demands import list_demands, name_spectrum, tabulate_demands
 from archfem.cases.report.doubts import (
@@ -75,6 +76,9 @@ HEAD = ("verdict", "margin", "depends on", "not checked")
 
 # Keys of [report] as the head has them
 _SIGNED = {key.replace("_", " ") for key in REPORT_KEYS}
+
+# What runs and pushovers depend on, where the case gives no stiffness of joints
+DEFAULT_STIFFNESS = "the stiffness of joints is a default: measured ones differ tenfold"
 
 # Demands of which factors of several cases are multiples, in words
 KINDS = "the earthquake", "the vehicle", "the given load"
@@ -226,6 +230,10 @@ def _say_plainly(data: ReportData, doubtful: Sequence[str]) -> Iterator[tuple[st
         yield from ((answer, x) for x in _say_survival(data, doubtful, failing))
         yield from ((margin, x) for x in [*_say_first_failures(data), *say_fragile(data)])
         yield from ((depends, x) for x in _say_conditions(data))
+    items = list_materials_and_contacts(data.case)
+    keys = [key for item in items for key in list_default_keys(data.case, item)]
+    if "normal_stiffness" in keys and (data.runs or "pushover" in data.statements):
+        yield depends, DEFAULT_STIFFNESS
     yield from [] if data.runs and failed else ((answer, x) for x in assessed)
     for name, stated in data.statements.items():
         pushes = [*_say_pushes(data, name, stated)]
@@ -511,7 +519,7 @@ def _build_paragraphs(data: ReportData, doubtful: Sequence[str]) -> dict[str, li
         changes.append(f"no motion was run, though [{given[0]}] is in the case")
     return {
         "What else was found?" if data.runs else "Result:": answer,
-        "By which margin?": [*margins.describe_margin(data)],
+        "By which margin?": [*dict.fromkeys(margins.describe_margin(data))],
         "What would change the answer?": changes,
     }
 

@@ -225,7 +225,8 @@ def list_unvaried(data: ReportData) -> list[str]:
         (static if data.runs and study.is_static else studied).update(list_studied(study))
     if not data.runs:
         computed = {"limit", "assessment", "pushover"} & data.statements.keys()
-        return [each for each in ("lengths", "friction") if computed and each not in studied]
+        needed = ["lengths", *["stiffness"] * ("pushover" in computed), "friction"]
+        return [each for each in needed if computed and each not in studied]
     single = ["motion"] if len(data.runs) == 1 else []
     if not data.verdict_ranges:
         single += ["lengths", "stiffness", "friction", "damping"]

@@ -190,17 +190,19 @@ def describe_push(data: ReportData, name: str, push: PushFactors) -> Iterator[st
     elastic = name == "pushover"
     moves = _say_motion(data, push.least, site_acceleration(data.case))
     bounded = push.proved is not None  # the least found, without proof that none is less
-    of = " with elastic joints" if elastic else " as rigid blocks" * bounded
+    of = "with elastic joints" if elastic else "as rigid blocks"
     over = OVER_FILL * (push.most > push.least)
     size = f"{Ends((push.least, push.most)):ratio} times {push.site}{over}"
-    text = f"pushed sideways{of} it begins to move {'at most ' * push.bounded}at {size}"
+    text = f"pushed sideways {of} it begins to move {'at most ' * push.bounded}at {size}"
     if bounded:
         proved = push.proved and f"is proved to stand up to {format_ratio(push.proved)} times"
         text += f"; it is the least that a search found, and {proved or NO_PROOF}"
     if moves and push.least >= 1.0:  # shaken it moves before
         yield f"{text}; {NO_MARGIN}"
         return
-    yield f"{text}; to move is no collapse"
+    beside = elastic or not data.runs or "pushover" in data.statements
+    less = "; elastic joints may bear less, and no pushover was computed" * (not beside)
+    yield f"{text}; to move is no collapse{less}"
     if then := moves if data.runs else "shaken it may begin to move at less":
         yield then
 
