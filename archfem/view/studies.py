@@ -81,7 +81,8 @@ def draw_findings(
     words, such as the case. Findings without negative values begin at zero over words, whose
     distances mean nothing. Named cases are bars with a dashed line at the first one, under several
     motions dots of their colours; of ratings these are the factors, with a line at 1. A case that
-    falls, without a number, is a hatched bar to the end.
+    falls, without a number, is a hatched bar to the end. Findings that the column `upper_bounds` of
+    a point names are open marks or bars.
 
     Args:
         table: table of a study, as by `Study.run`.
@@ -125,7 +126,8 @@ def draw_findings(
         few = [each for each in others if frame[each].nunique() <= len(Colour.LINES)]
         coloured = next((each for each in few if frame[each].dtype.kind not in "fi"), None)
         coloured = coloured or next(iter(few), None)
-        _draw_over_key(axes, frame.rename(columns={name: "value"}), key, others, coloured)
+        drawn = frame.rename(columns={name: "value"}).assign(bounded=_list_bounded(frame, name))
+        _draw_over_key(axes, drawn, key, others, coloured)
         if limits and name in limits:
             axes.axhline(limits[str(name)], color=Colour.GREY, lw=0.9, ls=":")
         if number < columns and coloured is not None:
@@ -158,7 +160,8 @@ def _draw_named_cases(
     for axes, name in zip(panels, names, strict=False):
         style.style_axes(axes, _label_key(table, str(name)))
         if frame["place"].is_unique:
-            axes.barh(frame["place"], frame[name], height=0.7, color=Colour.LINES[0])
+            faces = np.where(_list_bounded(frame, name), "none", Colour.LINES[0])
+            axes.barh(frame["place"], frame[name], height=0.7, color=faces, ec=Colour.LINES[0])
             _hatch_falls(axes, frame[frame[name].isna()])
         else:  # motions or samples of a case
             sets = frame.groupby(pairs, sort=False) if pairs else [(("",), frame)]
@@ -182,6 +185,12 @@ def _draw_named_cases(
         axes.remove()
     style.add_legend_below(figure, handles=panels[0].get_legend_handles_labels()[0])
     return figure
+
+
+def _list_bounded(frame: Any, name: Any) -> list[bool]:
+    """List whether a finding of each row is an upper bound."""
+    stated = frame["upper_bounds"] if "upper_bounds" in frame else [""] * len(frame)
+    return [name in f"{names}".split(", ") for names in stated]
 
 
 def _hatch_falls(axes: Axes, unknown: Any) -> None:
@@ -220,6 +229,9 @@ def _draw_over_key(
         known = group[np.isfinite(group["value"])].sort_values(key)
         look = {"ms": 3.5, "lw": 1.2, "color": colour, "label": label}
         axes.plot(known[key], known["value"], "o-" if joined else "o", **look)
+        bounds = known[known["bounded"]]
+        if len(bounds):
+            axes.plot(bounds[key], bounds["value"], "o", **look | {"mfc": "white", "label": None})
     finite = frame["value"][np.isfinite(frame["value"])]
     if in_words and finite.min() >= 0.0:
         axes.set_ylim(0.0, 1.1 * finite.max())

@@ -1375,12 +1375,9 @@ def test_a_study_stands_in_a_report(kept, unplotted, tmp_path, capsys, monkeypat
     assert af.commands.main(["report", str(kept), "--study", str(folder)]) == 0
     shown = " ".join(words_of(kept / "report.html").split("Study of many cases")[2].split())
     assert "Study: Breadths." in shown
-    assert "structure.breadth push [g] 0.5 0.25 1 0.5" in shown
+    assert "breadth [m] push [g] 0.5 0.25 1 0.5" in shown
     conclusion = " ".join(words_of(kept / "report.html").split())
-    assert (
-        "In the study 'Breadths' the push is least, 0.25 g, at structure.breadth = 0.5."
-        in conclusion
-    )
+    assert "In the study 'Breadths' the push is least, 0.25 g, at breadth = 0.5 m." in conclusion
     unvaried = conclusion.partition("were not varied")[0].rpartition(". ")[2]
     assert "engths (varied in statics alone), stiffness, friction, damp" in unvaried
     assert af.commands.main(["report", str(kept), "--study", str(tmp_path)]) == 1

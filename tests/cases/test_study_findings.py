@@ -342,6 +342,45 @@ def test_the_largest_displacement_at_an_end_of_a_sweep_may_not_be_the_largest():
     assert text.endswith("at scale = 2, where the sweep ends: more may lie beyond")
 
 
+def test_a_swept_key_that_leaves_the_least_equal_is_no_end_and_no_place():
+    """Bounds are open in the picture, and a note on all cases lists none of them."""
+    frictions, depths = [0.4, 0.5, 0.6, 0.7], [0.3, 0.4, 0.5]
+    keys = "contacts.stone_to_stone.friction", "structure.thickness"
+    pushes = np.array([[0.12, 0.137, 0.14], *[[0.12, 0.15, 0.18]] * 3])
+    pushes[3, 0] -= 1e-5
+    names = np.where(pushes > 0.13, "least_push_over_site", "")
+    columns = {"push": (keys, pushes, {"units": "g"}), "upper_bounds": (keys, names)}
+    columns |= {"least_push_over_site": (keys, pushes / 0.4)}
+    stated = af.models.model.write_doubts([af.models.model.Doubt("it may slide")])
+    columns |= {"doubts, stated": (keys, np.full(pushes.shape, stated))}
+    table = xr.Dataset(columns, dict(zip(keys, (frictions, depths), strict=True)))
+    found = study_findings.collect_findings("", "", table)
+    place = "thickness = 0.3 m, whatever the friction of stone to stone"
+    assert [*study_findings.say_what_changes(found)] == [
+        f"in the study the push is least, 0.12 g, at {place}, where the sweep of thickness ends: "
+        "less may lie beyond"
+    ]
+    name = study_findings.OVER_SITE
+    assert study_findings.find_least([found], name)[2] == place
+    assert found.doubts[0].place == "12 cases"
+    assert study_findings.list_studied(found) == {"lengths", "friction"}
+    grid = study_findings.tabulate_study(found)
+    assert grid.head == ["friction of stone to stone", "thickness [m]", "push [g]", name]
+    assert grid.caption.endswith("below which the value may lie: such values show no trend")
+    figure = draw_findings(found.numbers)
+    drawn = [line for axes in figure.axes[2:] for line in axes.lines]
+    hollow = np.concatenate([x.get_ydata() for x in drawn if x.get_mfc() == "white"])
+    bounded = (pushes / 0.4)[names != ""]
+    np.testing.assert_allclose(np.sort(hollow), np.sort([*bounded, *bounded]))
+    assert not [
+        line for axes in figure.axes[:2] for line in axes.lines if line.get_mfc() == "white"
+    ]
+    # the least at one friction alone is at its end
+    alone = table.assign(push=table["push"] - [[0.01], [0.0], [0.0], [0.0]])
+    (text,) = study_findings.say_what_changes(study_findings.collect_findings("", "", alone))
+    assert "at friction of stone to stone = 0.4, thickness = 0.3 m, where" in text
+
+
 def test_words_and_states_of_the_users_own_function_are_no_findings():
     """It may give any names, and the command states findings of each study."""
     cases = {"case": [*"ab"]}

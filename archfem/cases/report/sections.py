@@ -33,6 +33,7 @@ from archfem.cases.report.study_findings import (
     say_what_changes,
     tabulate_study,
 )
+from archfem.cases.result_text import UPPER_BOUNDS
 from archfem.cases.run import DRAWING_FILE
 from archfem.dynamics.collapse_state import DISLOCATION, FALLEN_STATES, shallowest_part
 from archfem.dynamics.history import SIGN_CONVENTION
@@ -468,6 +469,8 @@ def _build_study(data: ReportData, found: StudyFindings) -> list[Any]:
         dotted = f", dotted the limit of dislocation of the case, {format_mm(limit)}"
         dotted += "; cases of other lengths have others" * ("lengths" in list_studied(found))
         caption += f"; all points{dotted * (key in found.numbers)}"
+        bounds = np.any(found.table.get(UPPER_BOUNDS, "") != "")
+        caption += "; open marks are upper bounds" * bool(bounds)
         blocks.append(FigureBlock.of(figure, sentence(caption)))
     doubts = (f"{DOUBT_MARK}{replace(doubt, remedy='')}" for doubt in found.doubts)
     return [*blocks, *(TextBlock(text, "lines") for text in doubts)]

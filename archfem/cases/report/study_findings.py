@@ -4,7 +4,7 @@ import json
 import re
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +14,12 @@ import xarray as xr
 from archfem._files import hash_json, path_inside, read_file_list, read_listed, read_sealed_json
 from archfem._netcdf import read_dataset
 from archfem.cases.result_text import STATED_DOUBTS, UPPER_BOUNDS, mark_bound
+from archfem.cases.structure_keys import (
+    CONTACT_KEYS,
+    MATERIAL_KEYS,
+    list_shapes,
+    shape_keys,
+)
 from archfem.dynamics.collapse_state import COLLAPSE_STATES, FALLEN_STATES
 from archfem.errors import InvalidInput
 from archfem.masonry.structure import join_words, list_first
@@ -33,6 +39,7 @@ MAX_CASES = 24
 MIN_CHANGE = 0.1  # of a finding that is worth a sentence [-]
 MIN_STEP = 0.03  # from the extreme of a sweep to its neighbours, likewise
 MAX_NAMES = 4  # of cases in a sentence
+TIE = 1e-3  # relative difference of findings that are equal [-]
 
 # What cases are counted by, those that fail first, as verbs of one case and of several
 _COUNTED = {
@@ -81,7 +88,10 @@ class StudyFindings:
     def numbers(self) -> xr.Dataset:
         """Findings that are numbers, in words, beside falls; lengths in mm, and none of a fall."""
         numbers = [name for name in self.names if self.table[name].dtype.kind == "f"]
-        table = self.table[[*numbers, *(["fall"] if "fall" in self.table else [])]].copy()
+        others = {"fall", UPPER_BOUNDS} & {*self.table}
+        table = self.table[[*numbers, *others]].copy()
+        if UPPER_BOUNDS in others:
+            table[UPPER_BOUNDS] = table[UPPER_BOUNDS].str.replace("_", " ")
         for name in [name for name in _SIZES if name in table]:
             held = self.table[name].where(~self.table["fall"].isin(FALLEN_STATES))
             table[name] = (1e3 * held).assign_attrs(units="mm")
@@ -136,11 +146,30 @@ class StudyFindings:
             groups.setdefault(tuple(_OF_ONE_CASE.sub("", x) for x in doubt.kind), []).append(doubt)
         return [_merge_cases(each) for each in groups.values()]
 
-    def label(self, row: Any) -> str:
-        """Return the name of the case of a row."""
+    def label(self, row: Any, keys: Sequence[str] = ()) -> str:
+        """Return the name of the case of a row, by all keys or some."""
         if self.keys == ("case",):
             return f"'{_keep_whole(row['case'])}'"
-        return ", ".join(f"{key.replace('_', ' ')} = {_format(row[key])}" for key in self.keys)
+        units = {key: self.table[key].attrs.get("units", "") for key in keys or self.keys}
+        return ", ".join(
+            f"{k.replace('_', ' ')} = {_format(row[k])} {units[k]}".strip() for k in units
+        )
+
+    def list_tied(self, row: Any, name: str) -> list[str]:
+        """List keys that together leave a finding of a case equal, whatever their values."""
+        tied, rows = list[str](), self.worst
+        for key in self.keys:
+            kept = [each for each in self.keys if each not in (*tied, key)]
+            same = rows[(rows[kept] == [row[each] for each in kept]).all(axis=1)]
+            if kept and same[key].nunique() > 1 and np.ptp(same[name]) <= TIE * abs(row[name]):
+                tied.append(key)
+        return tied
+
+    def place(self, row: Any, name: str) -> str:
+        """Return the name of the case of a row by the keys that change a finding there."""
+        tied = self.list_tied(row, name)
+        whatever = f", whatever the {join_words([x.replace('_', ' ') for x in tied])}" * bool(tied)
+        return self.label(row, [key for key in self.keys if key not in tied]) + whatever
 
 
 def _keep_whole(name: str) -> str:
@@ -150,7 +179,10 @@ def _keep_whole(name: str) -> str:
 
 def _merge_cases(doubts: Sequence[Doubt]) -> Doubt:
     """Return doubts of several cases as one: its numbers are their ends, or those of the first."""
-    places = list_first([*dict.fromkeys(doubt.place for doubt in doubts)], MAX_NAMES)
+    named = [*dict.fromkeys(doubt.place for doubt in doubts)]
+    places = f"{len(named)} cases"
+    if len(named) <= MAX_NAMES or named[0].startswith("'"):
+        places = list_first(named, MAX_NAMES)
     if len({doubt.kind for doubt in doubts}) > 1:
         return replace(doubts[0], place=f"{places}, of which the first")
     return merge_doubts(doubts, places)
@@ -185,6 +217,8 @@ def collect_findings(title: str, text: str, table: xr.Dataset) -> StudyFindings:
     frame = table.to_dataframe().reset_index()
     differing = [str(name) for name in table.coords if frame[name].nunique() > 1]
     keys = [name for name in differing if name not in _NO_CASE] or differing
+    table, keys = _name_keys(table, keys)
+    frame = table.to_dataframe().reset_index()
     numbers = [name for name, each in table.data_vars.items() if each.dtype.kind == "f"]
     shown = [name for name in (*_FACTORS, *_SIZES) if name in numbers]
     hidden = {"factor"} if "push" in shown else set()
@@ -193,6 +227,30 @@ def collect_findings(title: str, text: str, table: xr.Dataset) -> StudyFindings:
     names = [name for name in shown if name not in hidden]
     worst = _find_worst(frame, keys, names) if keys and names else frame.head(0)
     return StudyFindings(title, text, table, tuple(keys), tuple(names), worst)
+
+
+def _name_keys(table: xr.Dataset, keys: list[str]) -> tuple[xr.Dataset, list[str]]:
+    """Return a table whose keys are in words, with units; it keeps what it varies as attribute."""
+    varied = "; ".join([*filter(None, [table.attrs.get("varied")]), *keys])
+    words = dict[str, str]()
+    for key in (x for x in keys if x.startswith(("structure.", "contacts.", "materials."))):
+        above, _, name = key.replace("_", " ").partition(".")[2].rpartition(".")
+        words[key] = f"{name} of {above.rpartition('.')[2]}" if above else name
+    if len({*words.values(), *table.variables}) < len(words) + len(table.variables):
+        words = {}  # two would have one name
+    for key in words:
+        unit = _list_units().get(key.rpartition(".")[2])
+        if table[key].dtype.kind in "if" and "units" not in table[key].attrs and unit:
+            table = table.assign_coords({key: table[key].assign_attrs(units=unit)})
+    return table.rename(words).assign_attrs(varied=varied), [words.get(x, x) for x in keys]
+
+
+@cache
+def _list_units() -> dict[str, str]:
+    """List the units of the numbers of structures, materials and contacts by their keys."""
+    tables = [CONTACT_KEYS, MATERIAL_KEYS, *map(shape_keys, list_shapes())]
+    units = {k: unit for keys in tables for k, unit in keys.items() if isinstance(unit, str)}
+    return {key: unit.replace("**3", "³") for key, unit in units.items() if unit != "1"}
 
 
 def _find_worst(frame: Any, keys: list[str], names: list[str]) -> Any:
@@ -234,6 +292,8 @@ def tabulate_study(found: StudyFindings) -> Grid:
     caption = f"Study: {found.title}{found.under}"
     caption += "; of each case the worst of each column over its motions" if several else ""
     caption += f"; {join_words(found.idle)} changed nothing" * bool(found.idle)
+    if any(cell.startswith("≤") for row in rows for cell in row):
+        caption += "; ≤ is an upper bound, below which the value may lie: such values show no trend"
     if left := order.iloc[MAX_CASES:].to_dict("records"):
         falls = f"of which {sum(row['falls'] > 0 for row in left)} fall"
         if found.is_static:
@@ -314,11 +374,12 @@ def find_least(
     """
     rows = list[tuple[float, tuple[str, str], str, str]]()
     for found in (each for each in studies if name in each.names):
-        for row in found.worst.to_dict("records"):
+        known = [row for row in found.worst.to_dict("records") if row[name] == row[name]]
+        for row in sorted(known, key=lambda x: x[name])[:1]:
             push = row.get("least_push", np.nan) if name == OVER_SITE else np.nan
             words = f", {push:.3g} g," * (push == push), mark_bound(row, name, f"{row[name]:.3g}")
-            rows.append((row[name], words, found.label(row), found.name))
-    return min((row for row in rows if row[0] == row[0]), default=(np.inf, ("", ""), "", ""))
+            rows.append((row[name], words, found.place(row, name), found.name))
+    return min(rows, default=(np.inf, ("", ""), "", ""))
 
 
 def _look_beside(found: StudyFindings, rows: list[Any], row: Any) -> tuple[list[str], float]:
@@ -329,6 +390,8 @@ def _look_beside(found: StudyFindings, rows: list[Any], row: Any) -> tuple[list[
     """
     swept = {key: found.table[key].values for key in found.keys if key in found.table.dims}
     numbers = {k: sorted(v) for k, v in swept.items() if v.dtype.kind in "if" and len(v) > 2}
+    for key in found.list_tied(row, found.decides):
+        numbers.pop(key, None)
     ends, step = [k for k, v in numbers.items() if row[k] in (v[0], v[-1])], 0.0
     for key in numbers.keys() - {*ends}:
         at = numbers[key].index(row[key])
@@ -359,7 +422,7 @@ def _compare_cases(found: StudyFindings, rows: list[Any], given: Any) -> str:
         end, beyond = ("least", "less") if least else ("largest", "more")
         ends, step = _look_beside(found, rows, extreme)
         of = f" of {join_words(ends)}" * (len(found.keys) > 1)
-        place = found.label(extreme)
+        place = found.place(extreme, name)
         place += f", where the sweep{of} ends: {beyond} may lie beyond" * bool(ends)
         if least and step > MIN_STEP:
             place += f"; neighbours differ by up to {step:.0%}: take smaller steps there"
@@ -382,5 +445,5 @@ def _compare_cases(found: StudyFindings, rows: list[Any], given: Any) -> str:
 
 def list_studied(found: StudyFindings) -> set[str]:
     """Return what a study varies, in the words of the conclusion."""
-    keys = [*str(found.table.attrs.get("varied", "")).split("; "), *found.keys]
+    keys = str(found.table.attrs["varied"]).split("; ")
     return {word for word, key in _VARIED.items() if any(re.match(key, each) for each in keys)}
