@@ -353,9 +353,12 @@ def _say_survival(
 
 def _say_conditions(data: ReportData) -> Iterator[str]:
     """Yield rules that the motions miss, how often it falls otherwise, and what decides."""
-    if missed := join_words([x.rule.partition(",")[0] for x in find_missed(data)]):
+    missed = [(x.rule.partition(",")[0], x.found.partition("; ")[2]) for x in find_missed(data)]
+    if listed := join_words(
+        [f"{rule} ({without})" if without else rule for rule, without in missed]
+    ):
         norm = name_norm(find_rule(data))
-        yield f"the motions do not meet {norm} by their {missed}"
+        yield f"the motions do not meet {norm} by their {listed}"
     ranges = sorted(data.verdict_ranges, key=lambda x: (x.falls.sum(), x.dislocated.sum()))
     for found in ranges[-1:]:
         motion = found.dataset.attrs.get("motion")

@@ -11,6 +11,7 @@ import numpy as np
 from archfem._typing import Array
 from archfem.cases.report.report_data import ReportData
 from archfem.errors import InvalidInput
+from archfem.masonry.structure import join_words
 from archfem.motion.design_spectra import DesignSpectrum
 from archfem.motion.motion import Motion
 from archfem.motion.record_selection import SELECTION_RULES, SelectionRule
@@ -102,14 +103,15 @@ def _check_spectra(data: ReportData, rule: SelectionRule) -> Iterator[Check]:
         band = rule.band(period)
         periods = np.geomspace(*band, 120)
         try:
-            design = reduction * _mean_spectrum(motions, periods) / target.horizontal(periods)
+            every = np.array([_mean_spectrum([motion], periods) for motion in motions])
+            ratios = reduction * every / target.horizontal(periods)
         except InvalidInput as error:  # a spectrum that ends below the longest period
             yield Check(name, required, str(error), None)
         else:
-            least, most = _round(design.min()), _round(design.max())
-            met = rule.lower <= least and most <= rule.upper
+            met, (least, most) = _meets(ratios, rule)
             within = f"from {band[0]:.3g} to {band[1]:.3g} s"
-            yield Check(name, required, f"{least:g} to {most:g} {within}", met)
+            causes = "" if met else _name_causes([each.name for each in motions], ratios, rule)
+            yield Check(name, required, f"{least:g} to {most:g} {within}{causes}", met)
         yield from _compare_beyond(motions, target, reduction, band[1])
     if rule.zero_period:
         mean = np.mean([motion.pga for motion in motions]) / STANDARD_GRAVITY
@@ -120,6 +122,23 @@ def _check_spectra(data: ReportData, rule: SelectionRule) -> Iterator[Check]:
         larger = np.ceil(1e3 * rule.zero_period / exact) / 1e3
         found = f"{ratio:g}" if met else f"{ratio:g}: scale by {larger:g}"
         yield Check(name, f"≥ {rule.zero_period:g}", found, met)
+
+
+def _meets(ratios: Array, rule: SelectionRule) -> tuple[bool, tuple[float, float]]:
+    """Return whether the mean of spectra over the target (motions, periods) is within, its ends."""
+    mean = ratios.mean(axis=0)
+    least, most = _round(mean.min()), _round(mean.max())
+    return rule.lower <= least and most <= rule.upper, (least, most)
+
+
+def _name_causes(names: list[str], ratios: Array, rule: SelectionRule) -> str:
+    """Name the fewest of the lowest motions without which the rule is met; "" if none are."""
+    order = ratios[:, ratios.mean(axis=0).argmin()].argsort()
+    for count in range(1, len(names) - rule.fewest + 1):
+        if _meets(ratios[order[count:]], rule)[0]:
+            left = [f"'{names[k]}'" for k in order[:count]]
+            return f"; met without {join_words(left)}"
+    return ""
 
 
 def _round(value: float) -> float:
