@@ -217,6 +217,7 @@ def state_scale(
     one = scales.as_one or np.inf  # at which it falls
     factor = (f"{held:#.3g}" if held < one else f"< {one:#.3g}") if held else "-"
     factor += " so far" * (found.interrupted and held > 0.0)
+    factor += " by all time steps" * (0.0 < held < found.held)
     row = Row(result, f"'{motion.name}', PGA {pga:.2f} g", words, factor, scales._asdict())
     stated = Statement([f"{result}: {words}"], [row], found.doubts).with_remarks(doubts)
     return {**stated.as_file("scale"), **files}

@@ -349,10 +349,13 @@ class CollapseScale:
     @property
     def held_by_all(self) -> float:
         """Largest such scale by every time step, also of a search that Ctrl-C ended; 0 for none."""
-        least = held = self.held
+        least = self.held
         for search in self.searches.values() if self.interrupted else ():
-            stood = (x.scale for x in search.runs if x.fall and x.fall.kind == "stands")
-            least = min(least, max((scale for scale in stood if scale <= held), default=0.0))
+            runs = [
+                (run.scale, bool(run.fall and run.fall.kind == "stands")) for run in search.runs
+            ]
+            failed = min((scale for scale, stood in runs if not stood), default=inf)
+            least = min(least, max((x for x, stood in runs if stood and x < failed), default=0.0))
         return least
 
     @property

@@ -416,6 +416,15 @@ def test_what_fails_under_a_motion_that_was_not_scaled_has_a_margin_below_one(ca
         .pieces[0]
         .text.startswith("The least margin is below 1 on 'b'")
     )
+    falls = dict.fromkeys("bde", verdict_of("fallen"))
+    many = data_of(case, a=verdict_of(), **falls, f=verdict_of("dislocated"))
+    many.runs["e"].dataset.attrs["pga"] = 3.0  # g is 9.81 m/s²
+    first, then, *_ = say_margin(many, scale=state("scale", scales("a", 1.4, falls=4.0)))
+    assert first == (
+        "the least margin is below 1 on 'b', 'd' and 'e', PGA 0.20 to 0.31 g, under which it "
+        "falls, and which were not scaled"
+    )
+    assert then.startswith("the next is below 1 on 'f', PGA 0.20 g, under which it is dislocated")
     plain = head_of(conclusion.list_facts(data))
     assert plain.startswith("It survives with damage: it is dislocated but stands under 1 of 3 mot")
     # 2 m/s² are 0.204 g

@@ -654,10 +654,13 @@ def test_a_margin_rests_on_finished_steps():
     )
     # the margin of a report is that of both steps
     motion = af.Motion(np.ones(9), 0.01, name="a")
-    for each, held in ((found, 0.7), (CollapseScale({0.005: whole}), 1.25)):
+    between = replace(begun, runs=fallen(0.7, 1.27, -1.5).runs)  # it stands by both at 1.25
+    every = (found, 0.7), (CollapseScale({0.005: whole, 0.0025: between}), 1.25)
+    for each, held in (*every, (CollapseScale({0.005: whole}), 1.25)):
         stated = answers.Statement.read(answers.state_scale(each, motion, [])["scale.json"])
         assert answers.read_numbers(answers.Scales, stated)[0].held == held
-        assert stated.rows[0].factor == f"{held:#.3g}{' so far' * (each is found)}"
+        unfinished = " so far" * each.interrupted + " by all time steps" * (held < each.held)
+        assert stated.rows[0].factor == f"{held:#.3g}{unfinished}"
     (doubt,) = found.doubts
     words = "by 2.5 ms: the search was interrupted after 2 runs; the same command continues it"
     assert str(doubt) == words

@@ -51,7 +51,7 @@ def find_first_failures(data: ReportData) -> Iterator[str]:
     searches = [x for x in list_scales(data) if x.held or "tension" not in x.states]
     unscaled, least = _list_unscaled(data), np.inf
     several, count = len(searches) + len(unscaled) > 1, len(data.runs)
-    was = "were" if len(searches) > 1 else "was"
+    was = _was(len(searches))
     some = f"; {len(searches)} of {count} motions {was} scaled" * (len(searches) < count)
     unfinished = any(x.unfinished for x in searches)
     some += "; the search is unfinished: at less it may, too" * unfinished
@@ -97,9 +97,11 @@ def say_fragile(data: ReportData) -> Iterator[str]:
 def describe_scales(data: ReportData) -> Iterator[tuple[float, list[str]]]:
     """Yield the least scale up to which it stands, what comes beyond, and motions without any."""
     searches, unscaled = list_scales(data), _list_unscaled(data)
-    for name, (state, peak) in unscaled.items():
-        fails = f"under which it {_STATES[state][0]}, and which was not scaled"
-        yield np.nextafter(1.0, 0.0), [f"below 1 on '{name}', PGA {peak:.2f} g, {fails}"]
+    for state in dict.fromkeys(state for state, _ in unscaled.values()):
+        own = {f"'{name}'": peak for name, (of, peak) in unscaled.items() if of == state}
+        of = f"{join_words([*own])}, PGA {Ends.of(own.values()):.2f} g"
+        fails = f"under which it {_STATES[state][0]}, and which {_was(len(own))} not scaled"
+        yield np.nextafter(1.0, 0.0), [f"below 1 on {of}, {fails}"]
     made = sorted((each for each in searches if each.held), key=lambda x: (_bound(x), x.pga))
     if not made:
         return
@@ -126,8 +128,13 @@ def describe_scales(data: ReportData) -> Iterator[tuple[float, list[str]]]:
         texts.append(f"no scale is known up to which it stands under {join_words(none)}")
     known = {each.motion for each in searches} | unscaled.keys()
     if left := [f"'{pair}'" for pair in data.pairs if pair not in known]:
-        texts.append(f"{join_words(left)} {'were' if left[1:] else 'was'} not scaled")
+        texts.append(f"{join_words(left)} {_was(len(left))} not scaled")
     yield _bound(first), texts
+
+
+def _was(count: int) -> str:
+    """Return the verb of some motions."""
+    return "were" if count > 1 else "was"
 
 
 def _say_first_states(searches: list[Scales], motion: str) -> Iterator[str]:
