@@ -434,6 +434,11 @@ def test_supports_bear_the_weight(ring, caplog):
     assert supported_weight_ratio(ring, rest.joints) == pytest.approx(1.0, abs=1e-9)
     half = rest.joints.assign(N=0.5 * rest.joints["N"], V=0.5 * rest.joints["V"])
     assert supported_weight_ratio(ring, half) == pytest.approx(0.5, abs=1e-9)
+    # large displacements turn the springings
+    arch = af.shapes.pointed_arch(span=5.2, rise=3.4, thickness=0.42, voussoirs=8)
+    rest = af.dead_load(af.build(arch, fidelity="rigid", displacements="large"))
+    assert supported_weight_ratio(arch, rest.joints) < 0.99995
+    assert supported_weight_ratio(arch, rest.joints, large=True) == pytest.approx(1.0, abs=1e-6)
 
 
 def test_a_report_of_a_history_is_of_its_pair_or_its_motion(kept, monkeypatch, tmp_path):

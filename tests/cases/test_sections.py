@@ -515,7 +515,8 @@ def test_players_of_a_page_share_its_size_but_stay_legible(players, megabytes, m
 def test_supports_are_judged_by_the_first_record_and_iterations_by_the_largest(piers, runs):
     """That of the dead load, which supports bear whole; later they bear inertia too."""
     run = runs["first"]
-    row = _check_row(SimpleNamespace(structure=piers), "first", run)
+    small = SimpleNamespace(structure=piers, analysis=SimpleNamespace(displacements="small"))
+    row = _check_row(small, "first", run)
     later = supported_weight_ratio(piers, run.joints.isel(time=1, drop=True))
     assert row[2] == "1.0000 of the weight"
     assert f"{later:.4f}" != "1.0000"
