@@ -375,6 +375,9 @@ def test_a_swept_key_that_leaves_the_least_equal_is_no_end_and_no_place():
     assert not [
         line for axes in figure.axes[:2] for line in axes.lines if line.get_mfc() == "white"
     ]
+    named = xr.Dataset({"push": ("case", [0.2, 0.3]), "upper_bounds": ("case", ["", "push"])})
+    (axes,) = draw_findings(named.assign_coords(case=["a", "b"])).axes
+    assert [bar.get_facecolor()[3] for bar in axes.patches] == [1.0, 0.0]
     # the least at one friction alone is at its end
     alone = table.assign(push=table["push"] - [[0.01], [0.0], [0.0], [0.0]])
     (text,) = study_findings.say_what_changes(study_findings.collect_findings("", "", alone))
