@@ -27,7 +27,7 @@ def made_case(structure, **values):
     """A made-up case of a report, without demands."""
     none = {"limit": SimpleNamespace(demand=None), "assessment": SimpleNamespace(spectrum=None)}
     own = {"title": "piers", "structure": structure, "report": {}, "suite": None, "target": None}
-    return SimpleNamespace(**own | none | values)
+    return SimpleNamespace(**own | none | {"settings": {"structure": {}}} | values)
 
 
 @pytest.fixture(scope="module")
