@@ -900,7 +900,8 @@ def test_the_least_margins_of_several_cases_are_at_most_what_is_an_upper_bound(c
         "sliding at most 1.5; of other 1.6."
     )
     alone = (
-        "Pushed sideways it begins to move at most at 1.5 times the site's acceleration; to move"
+        "Pushed sideways as rigid blocks it begins to move at most at 1.5 times the site's "
+        "acceleration; to move"
     )
     assert facts["sliding"].startswith(alone)
 
