@@ -393,9 +393,9 @@ class AssessmentSettings:
                 each = assess_parts(structure, spectrum, **options)
                 found |= {f"{name or 'part'}, {side}": result for name, result in each.items()}
             else:
-                found[side] = kinematic_assessment(structure, spectrum, **options)
-                if above := found[side].above:
-                    found[f"{side}, {above.mechanism_name}"] = above
+                found[side] = last = kinematic_assessment(structure, spectrum, **options)
+                while above := last.above:
+                    found[f"{side}, {above.mechanism_name}"] = last = above
         return {name: result.least or result for name, result in found.items()}
 
 

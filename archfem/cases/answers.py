@@ -291,6 +291,7 @@ def state_assessments(
             outcome += f", {AT_REST}"
         demand, capacity = (f"{x:.4g} {check.unit}" for x in (shown.demand, shown.capacity))
         capacity += f" {_OF_BODIES}" * (shown is not check and ratios.floor is None)
+        demand += check.amplified
         name, numbers = f"assessment: {check.name}, {ways}", ratios._replace(directions=directions)
         rows.append(Row(name, demand, f"{capacity}, {outcome}", str(ratios), numbers._asdict()))
         sentences += [f"kinematic assessment, {ways}: {text}"] if text in last else []

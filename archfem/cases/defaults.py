@@ -18,6 +18,7 @@ from archfem.masonry.joint_closing import finish_range
 from archfem.masonry.materials import Contact, Material
 from archfem.masonry.structure import Structure, join_names, join_words
 from archfem.models.builder import list_fidelities
+from archfem.motion.design_spectra import FloorSpectrum
 from archfem.units import GPa, MPa, in_unit, kN, kPa, mm
 
 HINGE_REASON = "8 % short of the edge, as in Demirel and Aldemir (2021)"
@@ -206,6 +207,9 @@ def list_spectrum_defaults(case: Case) -> Iterator[Default]:
     for path, spectrum in spectra.items():
         section, name = path.split(".")
         given = case.settings.get(section, {}).get(name) or {}
+        if isinstance(spectrum, FloorSpectrum) and spectrum.period is None:
+            words, reason = f"T_1 {spectrum.own_period:.3g} s", "0.05 H^(3/4), that of masonry"
+            yield Default("spectrum", words, f"{path}.period", reason)
         spectrum = getattr(spectrum, "ground_spectrum", spectrum)
         given = given.get("ground_spectrum", given)
         for key, reason in _OF_SPECTRUM.items():

@@ -318,6 +318,13 @@ class MechanismPath:
             {key: ("place", value, {"units": unit}) for key, (value, unit) in values.items()}
         )
 
+    def end_sliding(self) -> "MechanismPath":
+        """Return the path to its end, which is at rest where nothing turns: α does not fall."""
+        if np.abs(self.velocity[:, 2]).max() * self.blocks.structure.size > STILL:
+            return self
+        rest = self.factors[:1], self.displacements[:1], self.velocity
+        return MechanismPath(self.blocks, *rest, self.mechanisms[:1], (), PathEnd.SLIDES)
+
     @staticmethod
     def _places_of_forces(blocks: PlacedBlocks, chosen: Sequence[bool]) -> Array:
         """Return the present places of the chosen forces that grow (n, 2) [m]."""

@@ -1,17 +1,18 @@
 """Elastic design spectra in g: Turkish, European, Italian and American codes, and tables."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, Any, ClassVar, Protocol
 
 import numpy as np
 
-from archfem._typing import Array, Seconds
+from archfem._typing import Array, Metres, Seconds
 from archfem._validation import (
     check_array,
     check_between,
     check_choice,
     check_fields,
+    check_integer,
     check_number,
     check_own_keys,
     report_user_errors,
@@ -544,32 +545,80 @@ class FloorSpectrum:
         a_Z A / (1 + (A - 1) (1 - T / (0.8 T_1))^1.6)  up to 0.8 T_1,  a_Z A  up to 1.1 T_1,
         a_Z A / (1 + (A - 1) (T / (1.1 T_1) - 1)^1.2)  beyond,
 
-    and nowhere below S, the spectrum of the ground. It has no vertical.
+    and nowhere below S, the spectrum of the ground. It has no vertical. With height and storeys in
+    place of the amplification, this is 3 n / (2 n + 1) z / H at the foot z of each mechanism of
+    an assessment; `horizontal` is then that of the ground, z = 0.
 
     Args:
         ground_spectrum: spectrum of the ground, S.
-        period: T_1 of the building [s].
-        amplification: participation of the mode times its shape at the height [-]: of n equal
-            storeys 3 n / (2 n + 1) times the height over that of the building.
+        period: T_1 of the building [s]; by default 0.05 H^(3/4), that of masonry.
+        amplification: participation of the mode times its shape at the height [-].
         building_damping: ξ_1 [-].
+        height: H of the building above the ground, in place of the amplification [m].
+        storeys: number n of its storeys, as equal ones.
 
     Raises:
-        InvalidInput: a value is out of range; or the spectrum of the ground ends before a period.
+        InvalidInput: a value is out of range; not one of amplification and height with storeys is
+            given; or the spectrum of the ground ends before a period.
 
     References:
-        Circolare 7/2019, C7.2.3, and Degli Abbati, Cattari and Lagomarsino (2018), both from
-        memory: check them before you sign.
+        Circolare 7/2019, C7.2.3 and C7.3.3.2, and Degli Abbati, Cattari and Lagomarsino (2018), all
+        from memory: check them before you sign.
+
+    Example:
+        >>> ground = af.motion.Ntc2018(ag=0.18, f0=2.5, tc_star=0.32, site="B")
+        >>> floor = af.motion.FloorSpectrum(ground, height=10.5, storeys=3)
+        >>> floor.at(6.8).describe()
+        'amplification 0.833, a_Z 0.452 g'
     """
 
     ground_spectrum: Annotated[DesignSpectrum, dict]
-    period: Seconds
-    amplification: float
+    period: Seconds | None = None
+    amplification: float | None = None
     building_damping: float = 0.05
+    height: Metres | None = None
+    storeys: int | None = None
 
     def __post_init__(self) -> None:
-        check_between(self.period, "floor spectrum, period [s]", 0.0, 4.0, ends="()")
-        check_between(self.amplification, "floor spectrum, amplification [-]", 0.0, 3.0, ends="(]")
+        either = self.amplification, self.height, self.storeys
+        given = tuple(value is not None for value in either)
+        at_height, by_height = given == (True, False, False), given == (False, True, True)
+        if not by_height and (not at_height or self.period is None):
+            raise InvalidInput(
+                f"a floor spectrum has amplification, height, storeys {either} and period "
+                f"{self.period}: give height [m] and storeys of the building, or period and "
+                "amplification of one height"
+            )
+        if by_height:
+            check_between(self.height, "floor spectrum, height [m]", 0.0, 300.0, ends="()")
+            check_integer(self.storeys, "floor spectrum, storeys", maximum=100)
+        check_between(self.own_period, "floor spectrum, period [s]", 0.0, 4.0, ends="()")
+        share = self.amplification or 0.0
+        check_between(share, "floor spectrum, amplification [-]", 0.0, 3.0, ends="[]")
         check_between(self.building_damping, "floor spectrum, building_damping", 0.005, 0.3)
+
+    @property
+    def own_period(self) -> float:
+        """T_1 of the building [s]."""
+        return 0.05 * (self.height or 0.0) ** 0.75 if self.period is None else self.period
+
+    @property
+    def level(self) -> float:
+        """Spectral acceleration a_Z at period zero, without that of the ground [g]."""
+        level = (self.amplification or 0.0) * np.sqrt(1.0 + 4.0 * self.building_damping**2)
+        level *= damping_correction(self.building_damping)
+        return float(level * self.ground_spectrum.horizontal(self.own_period))
+
+    def at(self, foot: float) -> "FloorSpectrum":
+        """Return that of what stands at a height above the ground [m]; itself without `height`."""
+        if self.height is None or self.storeys is None:
+            return self
+        share = 3.0 * self.storeys / (2.0 * self.storeys + 1.0) * foot / self.height
+        return replace(self, period=self.own_period, amplification=share, height=None, storeys=None)
+
+    def describe(self) -> str:
+        """Return amplification and a_Z in one line."""
+        return f"amplification {self.amplification or 0.0:.3g}, a_Z {self.level:.3g} g"
 
     def horizontal(self, periods: float | Array) -> Array:
         """Return horizontal spectral accelerations in the shape of the periods [g].
@@ -577,10 +626,8 @@ class FloorSpectrum:
         Args:
             periods: natural periods, of any shape [s].
         """
-        ratio, resonance = np.asarray(periods) / self.period, 1.1 / np.sqrt(self.building_damping)
-        level = self.amplification * np.sqrt(1.0 + 4.0 * self.building_damping**2)
-        level *= damping_correction(self.building_damping)
-        level = level * self.ground_spectrum.horizontal(self.period)
+        ratio = np.asarray(periods) / self.own_period
+        level, resonance = self.level, 1.1 / np.sqrt(self.building_damping)
         below, beyond = np.maximum(1.0 - ratio / 0.8, 0.0), np.maximum(ratio / 1.1 - 1.0, 0.0)
         reduction = 1.0 + (resonance - 1.0) * (below**1.6 + beyond**1.2)
         return np.asarray(

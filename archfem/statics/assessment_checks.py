@@ -19,6 +19,7 @@ from archfem.motion.design_spectra import (
     DesignSpectrum,
     Eurocode8,
     Eurocode2024,
+    FloorSpectrum,
     Ntc2018,
     damping_correction,
     registered_spectra,
@@ -38,6 +39,10 @@ BY_MECHANISM = "passes or fails by which mechanism moves at this alpha_0"
 
 # Distance of an attached force, as at an anchor plate, from its block over the block's size [-]
 MAX_OFFSET = 0.1
+
+# Foot of a mechanism over the height of the building, from which a floor amplifies the ground [-]:
+# at resonance 1.1 / √0.05 times 1.5 z / H, the most of equal storeys, is 1 at 0.136
+HIGH_FOOT = 0.125
 
 # Value of a doubt about ratios that are no less than the true one
 UPPER_BOUND = "an upper bound"
@@ -78,12 +83,16 @@ class LimitState:
             options: Any = {"ends": "(]", "remedy": "give a ratio, such as 0.4 for 40 %"}
             check_between(getattr(self, key), f"{self.name}, {key} [-]", 0.0, most, **options)
 
-    def doubt(self, spectrum: DesignSpectrum | Motion, above: float | None = None) -> list[Doubt]:
+    def doubt(
+        self, spectrum: DesignSpectrum | Motion, structure: Structure, foot: float
+    ) -> list[Doubt]:
         """Return doubts about a spectrum of another code than NTC, and about one of the ground.
 
         Args:
-            spectrum: spectrum of the demand; a table and a motion are of no code.
-            above: height of the foot of what moves above the ground, if it is of a column [m].
+            spectrum: spectrum of the demand; a table and a motion are of no code, and of the foot
+                of the structure.
+            structure: structure of which a part moves.
+            foot: height of the foot of what moves above the ground [m].
         """
         kinds = {type(spectrum), type(getattr(spectrum, "ground_spectrum", None))}
         codes = [name for name, kind in registered_spectra.items() if kind in kinds]
@@ -92,12 +101,37 @@ class LimitState:
             words = f"the check is one of NTC, which was not made for a spectrum of {codes[0]}"
             remedy = "give limit_state with the rules of its code, or a spectrum of NTC-2018"
             found.append(Doubt(words, remedy))
-        if above and codes and not {*codes} & {"table", "floor"}:
+        base, tall = structure.above or 0.0, float(np.ptp(structure.ends[..., 1]))
+        above = foot - base * ({*codes} <= {"table"})
+        if above > HIGH_FOOT * (base + tall) and not isinstance(spectrum, FloorSpectrum):
             words = "the spectrum is that of the ground, and {:.3g} m above it, at the foot of what"
             words += " moves, it is larger: each ratio is {}"
-            remedy = 'give that of the height, by code = "floor" or a table'
+            remedy = 'give code = "floor" with height and storeys of the building'
             found.append(Doubt(words, remedy, (above, UPPER_BOUND)))
         return found
+
+    def rate(
+        self,
+        spectrum: DesignSpectrum | Motion,
+        q: float,
+        confidence: float,
+        foot: float,
+        moved: Array,
+        curve: Array,
+    ) -> tuple[float, float]:
+        """Return the ratios of the linear check and by displacements of what stands at a height.
+
+        Args:
+            spectrum: spectrum of the demand.
+            q: behaviour factor [-].
+            confidence: FC [-].
+            foot: height above the ground [m].
+            moved: spectral displacements (n,) [m].
+            curve: accelerations there (n,) [m/s²].
+        """
+        own = place_spectrum(spectrum, foot)
+        linear = q * float(curve[0]) / confidence / peak_acceleration(own)
+        return linear, self.check(own, confidence, moved, curve).ratio
 
     def check(
         self, spectrum: DesignSpectrum | Motion, confidence: float, moved: Array, curve: Array
@@ -120,7 +154,8 @@ class LimitState:
         # nor does it fail where the ground does not set it in motion
         begins = float(curve[0]) / confidence / peak_acceleration(spectrum)
         ratio = max(capacity / demand, begins)
-        return AssessmentCheck(self.name, capacity, demand, "m", ratio, period, self.source)
+        given = capacity, demand, "m", ratio, period, self.source
+        return AssessmentCheck(self.name, *given, amplified=describe_floor(spectrum))
 
 
 # Sources of displacement checks; the 2019 values were read in a transcription of the Circolare.
@@ -156,6 +191,7 @@ class AssessmentCheck:
             each body has one anyhow.
         bounded: whether the ratio is an upper bound, by which a check fails and does not pass.
         floor: least ratio of all mechanisms of this α₀, that of e* = 1; None where it is the first.
+        amplified: amplification and a_Z of a floor spectrum, in brackets; "" of others.
     """
 
     name: str
@@ -169,6 +205,7 @@ class AssessmentCheck:
     bodies: float | None = None
     bounded: bool = False
     floor: float | None = None
+    amplified: str = ""
 
     @property
     def passes(self) -> bool:
@@ -239,9 +276,17 @@ class AssessmentCheck:
         rest = " before the mechanism begins to move"
         return (
             f"{self.name}: capacity {self.capacity:.4g} {self.unit}, demand {self.demand:.4g} "
-            f"{self.unit}{period}: {self.words}, the spectrum may be "
+            f"{self.unit}{self.amplified}{period}: {self.words}, the spectrum may be "
             f"{self.ratios} times as strong{rest if self.at_rest else ''}"
         )
+
+
+def list_lower(
+    checks: Sequence[AssessmentCheck], others: Sequence[AssessmentCheck]
+) -> list[AssessmentCheck]:
+    """List the checks with a lower ratio than the same, or the only, one of another mechanism."""
+    pairs = zip(checks, [*others, others[-1]], strict=False)
+    return [x for x, other in pairs if x.decisive < 0.999 * other.decisive]
 
 
 def describe_difference(displaced: float, apart: float, linear: float) -> str:
@@ -259,6 +304,18 @@ def describe_difference(displaced: float, apart: float, linear: float) -> str:
         f"{passes} by displacements ({format_ratio(displaced)}), fails by the linear check "
         f"({format_ratio(linear)}); no clause that was read says which governs"
     )
+
+
+def place_spectrum(spectrum: DesignSpectrum | Motion, foot: float) -> DesignSpectrum | Motion:
+    """Return the spectrum of what stands at a height above the ground [m]."""
+    return spectrum.at(foot) if isinstance(spectrum, FloorSpectrum) else spectrum
+
+
+def describe_floor(spectrum: DesignSpectrum | Motion) -> str:
+    """Describe how a floor amplifies the ground, in brackets; "" where it does not."""
+    if not isinstance(spectrum, FloorSpectrum) or not spectrum.amplification:
+        return ""
+    return f" ({spectrum.describe()})"
 
 
 def spectral_acceleration(

@@ -30,11 +30,14 @@ from archfem.masonry.loads import AttachedLoad, BodyForce, name_side
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import Structure, join_names, list_stack
 from archfem.models.model import Doubt
-from archfem.statics.assessment_checks import UPPER_BOUND, AssessmentCheck, measure_blocks
+from archfem.statics.assessment_checks import UPPER_BOUND, measure_blocks
 from archfem.units import MPa, format_mm, kN
 
 # Stretch from which a tie is doubted, as its free length is not known: 2 % of 2 m [m]
 MAX_STRETCH = 0.04
+
+# Slope up to which a joint is a level bed [-]
+LEVEL_BED = 0.05
 
 # Rounds of thrusts and hinges, of which two or three usually suffice
 MAX_ROUNDS = 40
@@ -103,20 +106,23 @@ def select_joints(
     return [k for k, pair in enumerate(structure.pairs.tolist()) if chosen & set(pair)]
 
 
-def find_weakest_body(
+def find_weakest_bodies(
     structure: Structure,
     loads: Sequence[AttachedLoad],
     direction: float,
-    check: Callable[[Array, Array], AssessmentCheck],
-) -> tuple[int, list[int]] | None:
-    """Return bed and blocks of the part of a stack of stones above a bed that has the least ratio.
+    rate: Callable[[float, Array, Array], tuple[float, ...]],
+) -> dict[int, list[int]]:
+    """Return bed and blocks of each part of a stack of stones above a bed that has a least ratio.
 
     It turns about the toe of the bed as one body: a*(d*) is straight from α₀ g to an arm, that of
-    its weight, with the moment of forces and ties over the weight. None unless it is a stack.
+    its weight, with the moment of forces and ties over the weight. Of such a curve at a height
+    above the ground `rate` returns the ratios. None unless it is a stack.
     """
     stack = None if find_yielding_blocks(structure) else list_stack(structure)
     if stack is None:
-        return None
+        return {}
+    lows = structure.ends[..., 1].min(axis=1)
+    ground = lows[stack[0][0]] - (structure.above or 0.0)
     placed, found = PlacedBlocks.at_rest(structure, loads, direction), []
     for k, (bed, _) in enumerate(stack):
         own = [block for _, block in stack[k:]]
@@ -131,8 +137,9 @@ def find_weakest_body(
             resists = direction * (force[1] * right - force[0] * up) * (block in own)
             moment += max(resists, 0.0) if load.passive else resists
         curve = [0.0, moment / weight.sum()], [structure.gravity * moment / (weight @ y), 0.0]
-        found.append((check(*map(np.array, curve)).ratio, bed, own))
-    return min(found, key=lambda each: each[0])[1:]
+        found.append((rate(float(lows[bed] - ground), *map(np.array, curve)), bed, own))
+    least = np.array([ratios for ratios, _, _ in found]).argmin(axis=0)
+    return dict(found[k][1:] for k in least)
 
 
 def find_first_mechanism(
@@ -245,13 +252,21 @@ def describe_tied_length(structure: Structure) -> str:
     return f"in all for {structure.width:g} m of {of}, without a factor on the tie"
 
 
-def find_foot(placed: PlacedBlocks, path: MechanismPath | None) -> float | None:
-    """Return the height above the ground of a column of a wall, or of what moves above its ties."""
-    above = placed.structure.above
-    if above is None or path is None or not placed.ties:
-        return above
-    low = min(contact.point[1] for contact in path.mechanisms[0].contacts)
-    return above + round(float(low - placed.structure.ends[..., 1].min()), 3)
+def find_foot(structure: Structure, path: MechanismPath | None) -> float:
+    """Return the height above the ground of the foot of what moves, of rings their springings [m].
+
+    The ground is that of the fixed blocks, on the next level below.
+    """
+    lows, joints = structure.ends[..., 1].min(axis=1), structure.joints
+    moved = {contact.joint for contact in path.mechanisms[0].contacts} if path else set()
+    # level beds are of rings by default, and of their feet
+    steep = [k for k in moved if abs(structure.normals[k, 0]) > LEVEL_BED]
+    rings = {joints[k].part for k in steep if joints[k].role == "ring"}
+    moved |= {k for k, each in enumerate(joints) if each.role == "ring" and each.part in rings}
+    foot = min(lows[[*moved]], default=lows.min())
+    on_ground = ~np.isin(structure.pairs, structure.free).all(axis=1) & (lows <= foot)
+    ground = lows[on_ground].max(initial=lows.min())
+    return float(foot - ground) + (structure.above or 0.0)
 
 
 def find_stretches(

@@ -33,12 +33,7 @@ from archfem._validation import check_between, check_choice, validate_arguments
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.limit.backfill import attach_fill
 from archfem.limit.collapse import ONE_OF_MANY, slides_anywhere
-from archfem.limit.displaced_blocks import (
-    STILL,
-    TOUCHING,
-    KinematicChain,
-    PlacedBlocks,
-)
+from archfem.limit.displaced_blocks import TOUCHING, KinematicChain, PlacedBlocks
 from archfem.limit.fill_range import FillAssumption, vary_fill
 from archfem.limit.fill_strength import Fill, PlasticFill
 from archfem.limit.finite_mechanism import MechanismPath, PathEnd, PathFollower
@@ -65,7 +60,10 @@ from archfem.statics.assessment_checks import (
     add_fill_ranges,
     check_assessable,
     describe_difference,
+    describe_floor,
+    list_lower,
     peak_acceleration,
+    place_spectrum,
     secant_period,
     spectral_acceleration,
 )
@@ -78,7 +76,7 @@ from archfem.statics.first_mechanism import (
     find_first_mechanism,
     find_foot,
     find_stretches,
-    find_weakest_body,
+    find_weakest_bodies,
     press_stones,
     search_flat,
     select_joints,
@@ -276,12 +274,12 @@ class KinematicAssessment(ResultDisplay):
 
     @property
     def _lower(self) -> list[str]:
-        """Mechanism and ratio of what is above a bed, if it is lower."""
-        if self.above is None:
+        """Mechanism and ratios of what is above a bed, if they are lower."""
+        if not self.above or not (lower := list_lower(self.above.checks, self.checks)):
             return []
-        check, moves = self.above.checks[-1], f"from alpha_0 = {self.above.alpha_0:.4g} on"
-        ratio = f"{format_ratio(check.decisive)} by {check.name}, {check.words}"
-        return [f"{self.above.mechanism_name}, {moves}, has a lower ratio: {ratio}"]
+        moves = f"from alpha_0 = {self.above.alpha_0:.4g} on"
+        ratios = "; ".join(f"{format_ratio(x.decisive)} by {x.name}, {x.words}" for x in lower)
+        return [f"{self.above.mechanism_name}, {moves}, has a lower ratio: {ratios}"]
 
     @property
     def _split_note(self) -> list[str]:
@@ -332,8 +330,8 @@ def kinematic_assessment(  # noqa: PLR0913  (the factors of the codes are argume
     A fill, bodies softer than their joints, counts by its weight and mass on the stones below,
     column by column; with its strength, `fill`, it presses on them as in `collapse_factor`. Along
     the motion pressures are those of the weights as built: active on faces that move away, and
-    passive on those that move into the fill. The mechanism must stand on the ground: at a height
-    of a building give `motion.FloorSpectrum`, a `TableSpectrum` or a `Motion` there.
+    passive on those that move into the fill. What stands high above the ground needs the
+    spectrum there, of which `motion.FloorSpectrum` has the rule; a doubt says so of any other.
 
     Args:
         structure: supports are its fixed blocks; or an `archfem.Analysis` of it.
@@ -425,15 +423,19 @@ class _Search:
     def assess_above(
         self, lever: float, fill: Any, found: KinematicAssessment
     ) -> KinematicAssessment | None:
-        """Return the assessment of the body above a bed of a stack with a lower ratio, if any."""
-        check = partial(self.rules.check, self.spectrum, self.confidence_factor)
-        least = find_weakest_body(self.structure, self.loads, self.direction, check)
-        if least is None or [least[0]] == [joint for joint, _ in found.hinges]:
-            return None
-        law = self.friction and "coulomb"  # without dilatancy the whole alone is searched
-        above = replace(self, bed=least[0], blocks=least[1], friction=law).assess(lever, fill)
-        lower = above.checks[-1].decisive < 0.999 * found.checks[-1].decisive
-        return above if lower else None
+        """Return the assessment of what is above a bed of a stack with a lower ratio, if any.
+
+        That of the least ratio by displacements has in `above` that by the linear check.
+        """
+        lower, law = None, self.friction and "coulomb"  # flat, the whole alone is searched
+        rate = partial(self.rules.rate, self.spectrum, self.q, self.confidence_factor)
+        bodies = find_weakest_bodies(self.structure, self.loads, self.direction, rate)
+        for bed, blocks in bodies.items():
+            if [bed] != [joint for joint, _ in found.hinges]:
+                above = replace(self, bed=bed, blocks=blocks, friction=law).assess(lever, fill)
+                if list_lower(above.checks, found.checks):
+                    lower = replace(above, above=lower)
+        return lower
 
     def assess(self, lever: float, fill: Fill | PlasticFill | None) -> KinematicAssessment:
         """Return the assessment with a fill, whose horizontal forces act at a lever."""
@@ -474,7 +476,7 @@ class _Search:
             with suppress(DidNotConverge):  # no mechanism was found whose faces slide flat
                 path = follower.follow(mechanism)
                 if follower.travel > TOUCHING * self.structure.size:
-                    path = _end_sliding(path)
+                    path = path.end_sliding()
                     moved = path, follower.last_equilibrium(path)
                     # in walls in bond flat motions are many, and the search may find a weaker one
                     if searched or not (slides and self.structure.heads.any()):
@@ -498,14 +500,6 @@ class _Search:
                 except DoesNotStand:
                     others[assumption] = None
         return others
-
-
-def _end_sliding(path: MechanismPath) -> MechanismPath:
-    """Return a path that ends at rest where nothing turns, so that alpha does not fall on it."""
-    if np.abs(path.velocity[:, 2]).max() * path.blocks.structure.size > STILL:
-        return path
-    rest = path.factors[:1], path.displacements[:1], path.velocity
-    return MechanismPath(path.blocks, *rest, path.mechanisms[:1], (), PathEnd.SLIDES)
 
 
 @validate_arguments
@@ -559,6 +553,16 @@ class _Oscillator:
         _, own = np.unique(bodies, return_inverse=True)
         of_bodies = np.bincount(own, weights).astype(float)
         return of_bodies, np.bincount(own, weights * moved) / of_bodies
+
+    @cached_property
+    def foot(self) -> float:
+        """Height above the ground of the foot of what moves [m]."""
+        return find_foot(self.placed.structure, self.path)
+
+    @property
+    def spectrum(self) -> DesignSpectrum | Motion:
+        """Spectrum at the foot of what moves."""
+        return place_spectrum(self.given.spectrum, self.foot)
 
     @cached_property
     def control(self) -> int:
@@ -643,8 +647,7 @@ class _Oscillator:
     @property
     def doubts(self) -> list[Doubt]:
         """Why a ratio may be too high: another code's spectrum, a fill left out, other joints."""
-        foot = find_foot(self.placed, self.path)
-        found = self.given.rules.doubt(self.given.spectrum, foot)
+        found = self.given.rules.doubt(self.given.spectrum, self.placed.structure, self.foot)
         if self.searched:
             found.append(self.searched)
         if self.fill and self.placed.fill is None and self.path is not None:
@@ -663,7 +666,7 @@ class _Oscillator:
     def linear(self) -> AssessmentCheck:
         """Linear check with a behaviour factor q."""
         confidence, q = self.given.confidence_factor, self.given.q
-        ground = peak_acceleration(self.given.spectrum)
+        ground = peak_acceleration(self.spectrum)
         capacity = q / confidence * (np.inf if self.path is None else float(self.curve["a"][0]))
         ratio = capacity / ground
         source = "Circolare 7/2019, C8.7.1.2.1.5 and C8.7.1.2.1.7, eq. C8.7.1.8"
@@ -672,6 +675,7 @@ class _Oscillator:
             source,
             bounded=self.bounded_at_rest,
             floor=self.e_star * ratio if self.searched else None,
+            amplified=describe_floor(self.spectrum),
         )
 
     def assess(self) -> KinematicAssessment:
@@ -691,7 +695,7 @@ class _Oscillator:
                 secant = secant_period(curve["d"].values, curve["a"].values, 0.16 * d_0)
         found = KinematicAssessment(
             structure,
-            given.spectrum,
+            self.spectrum,
             self.placed.direction,
             alpha_0,
             mass,
@@ -726,6 +730,6 @@ class _Oscillator:
     def _check_displacement(self) -> AssessmentCheck:
         """Check the displacement of the capacity curve against the spectrum."""
         given, curve = self.given, (self.curve["d"].values, self.curve["a"].values)
-        check = given.rules.check(given.spectrum, given.confidence_factor, *curve)
+        check = given.rules.check(self.spectrum, given.confidence_factor, *curve)
         higher = not check.at_rest and bool(self.opens or doubt_stretches(self.stretches))
         return replace(check, bounded=self.bounded_at_rest or higher)

@@ -151,6 +151,15 @@ def test_a_floor_spectrum_at_its_corners():
     case["ground_spectrum"] = {"code": "NTC-2018", "ag": 0.17, "f0": 2.45, "tc_star": 0.32}
     case["ground_spectrum"]["site"] = "B"
     assert build_spectrum(case, "assessment.spectrum") == floor
+    building = af.motion.FloorSpectrum(ground, height=10.0, storeys=4)
+    assert building.at(7.5) == af.motion.FloorSpectrum(ground, 0.05 * 10.0**0.75, 1.0)
+    assert building.horizontal([0.0, 0.3]) == pytest.approx(ground.horizontal([0.0, 0.3]))
+    del case["period"], case["amplification"]
+    case |= {"height": "10 m", "storeys": 4, "building_damping": 0.05}
+    assert build_spectrum(case, "assessment.spectrum") == building
+    for given in ({"height": 10.0}, {"amplification": 1.0}, {"height": 9.0, "storeys": 2.5}):
+        with pytest.raises(af.InvalidInput, match="floor spectrum"):
+            af.motion.FloorSpectrum(ground, **given)
     with pytest.raises(af.InvalidInput, match="a floor spectrum has no vertical"):
         floor.vertical(0.1)
     with pytest.raises(af.InvalidInput, match="ground_spectrum"):

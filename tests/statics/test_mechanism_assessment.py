@@ -1378,3 +1378,78 @@ def test_a_wall_held_at_its_top_moves_as_by_hand():
     expected = moved * inertia / (rates[control] * work)
     assert found.d_0_star == pytest.approx(expected, rel=1e-4)
     assert found.displacement.capacity == pytest.approx(0.4 * expected, rel=1e-4)
+
+
+GROUND = af.motion.Ntc2018(ag=0.18, f0=2.5, tc_star=0.32, site="B")
+
+
+def front_of_three_storeys(eaves, floors):
+    """Blocks of 0.65, 0.65 and 0.5 m flush outside, 10.5 m high; floors, roof, thrust and ties."""
+    levels, inner = [0.0, 3.4, 6.8, 10.5], [0.0, 0.0, 0.15]
+    blocks, joints = [box(-1.0, 1.0, -0.5, 0.0, "ground", fixed=True)], []
+    loads = [af.masonry.AttachedLoad("storey 3", (0.4, 10.5), 5e3, (1.5e3, 0.0))]
+    for k, left in enumerate(inner):
+        blocks.append(box(left, 0.65, *levels[k : k + 2], f"storey {k + 1}"))
+        joints.append(bed((k, k + 1), left, 0.65, levels[k]))
+        pull = eaves if k == 2 else floors
+        of_block = {"block": f"storey {k + 1}", "point": (left, levels[k + 1])}
+        loads += [af.masonry.AttachedLoad(**of_block, weight=9e3)] * (k < 2)
+        loads += [af.masonry.AttachedLoad(**of_block, force=(-pull, 0.0), passive=True)] * (
+            pull > 0
+        )
+    return af.Structure(tuple(blocks), tuple(joints)), loads
+
+
+def test_a_floor_spectrum_follows_the_mechanism_up_a_front(verified):
+    """a_Z = 0.54 g · 9/7 · 6.8/10.5 · √1.01, by hand, against moments about the toe at 6.8 m."""
+    floor = af.motion.FloorSpectrum(GROUND, 0.29, height=10.5, storeys=3)
+    demand = 0.18 * 1.2 * 2.5 * 9.0 / 7.0 * 6.8 / 10.5 * sqrt(1.01)
+    assert demand == pytest.approx(0.452, abs=5e-4)
+    arms, heights = 42.0 * 0.25 - 1.5 * 3.7, 37.0 * 1.85 + 5.0 * 3.7  # kN m, without the tie
+    free = 2.0 / 1.35 * arms / heights / demand
+    needed = (1.35 / 2.0 * demand * heights - arms) / 3.7
+    for eaves, floors, ratio in ((0.0, 0.0, free), (1e3 * needed, 12e3, 1.0)):
+        structure, loads = front_of_three_storeys(eaves, floors)
+        found = af.kinematic_assessment(structure, floor, loads=loads)
+        assert found.linear.demand == pytest.approx(0.18 * 1.2 * af.units.STANDARD_GRAVITY)
+        above = found.above
+        assert above.mechanism_name.startswith("rocking of all above storey 2 ")
+        assert above.linear.demand / af.units.STANDARD_GRAVITY == pytest.approx(demand)
+        verified(f"front, tie of {eaves:.0f} N at the eaves", ratio, "moments", above.linear.bodies)
+        assert above.linear.decisive == above.linear.bodies == pytest.approx(ratio, rel=1e-3)
+        says = "demand 4.431 m/s² (amplification 0.833, a_Z 0.452 g)"
+        assert says in str(above)
+        (row,) = (x for x in state_assessments({"x": above}, ()).rows if "linear" in x.result)
+        assert row.demand == says.removeprefix("demand ")
+        assert "amplification" not in str(found.linear)
+        assert not any("that of the ground" in each.cause for each in above.doubts)
+    # from the floors on: what a column above them has for its tie
+    roof = {"block": "block 1", "point": [0.0, 3.7], "weight": 5e3, "force": [1.5e3, 0.0]}
+    tie = {"block": "block 1", "point": [0.0, 3.7], "force": [-4e3, 0.0], "passive": True}
+    spectrum = {"code": "floor", "period": 0.29, "height": 10.5, "storeys": 3}
+    spectrum["ground_spectrum"] = {"code": "NTC-2018", "ag": 0.18, "f0": 2.5, "tc_star": 0.32}
+    spectrum["ground_spectrum"]["site"] = "B"
+    column = {"shape": "column", "breadth": 0.5, "heights": [3.7], "above": 6.8}
+    assessment = {"spectrum": spectrum, "direction": 1, "loads": [roof, tie]}
+    case = af.Case.of({"structure": column, "assessment": assessment})
+    (note,) = note_ties(case)
+    assert f"with {needed:.3g} kN of the tie at block 1" in note
+
+
+def test_what_moves_high_above_the_ground_is_in_doubt_under_its_spectrum():
+    """Above 6.8 m of a front by any spectrum of the ground; a ring is as high as its springings."""
+    structure, loads = front_of_three_storeys(7e3, 12e3)
+    table = af.motion.TableSpectrum(periods=[0.0, 1.0, 4.0], values=[0.3, 0.3, 0.1])
+    doubt = "and 6.8 m above it, at the foot of what moves, it is larger"
+    for spectrum in (GROUND, table):
+        found = af.kinematic_assessment(structure, spectrum, loads=loads)
+        whole, above = (any(doubt in str(x) for x in y.doubts) for y in (found, found.above))
+        assert (whole, above) == (False, True)
+    sizes = {"radius": 2.0, "thickness": 0.4, "voussoirs": 12}
+    piers = af.arch_on_piers(**sizes, pier_breadth=2.0, courses=[1.0, 1.5])
+    found = af.kinematic_assessment(piers, GROUND, part="arch")
+    assert any("and 2.5 m above it" in str(each) for each in found.doubts)
+    slender = af.arch_on_piers(**sizes, pier_breadth=1.0, courses=[1.0, 1.5])
+    for structure in (slender, af.circular_arch(**sizes, embrace=160.0)):
+        found = af.kinematic_assessment(structure, GROUND)
+        assert not any("that of the ground" in each.cause for each in found.doubts)
