@@ -378,6 +378,20 @@ def note_across(structure: Structure, found: Iterable[KinematicAssessment]) -> l
     return [f"{NOTE_MARK}{text}"] * (weaker and bool(text))
 
 
+def doubt_ties(case: Case) -> list[Remark]:
+    """Return doubts about ties that pull in the one sense of the push."""
+    settings = case.assessment
+    if len(settings.directions) > 1:
+        return []
+    words = "the tie at {} pulls in the sense of the push, which it never holds"
+    remedy = "correct the sign of its force, which points to where it is held"
+    return [
+        Doubt(words, remedy, (str(load.block),))
+        for load in settings.options.get("loads", ())
+        if load.passive and not load.anchor and settings.directions[0] * load.force[0] > 0.0
+    ]
+
+
 def note_ties(case: Case) -> list[str]:
     """Return notes on the force of ties with which a sense just passes every check."""
     settings, notes = case.assessment, list[str]()
@@ -401,9 +415,10 @@ def note_ties(case: Case) -> list[str]:
             return ""
         ratio, mechanism, _ = solve(MOST_TIED, sense)
         if ratio <= 1.0:
-            pulls = any(tie.anchor or sense * tie.force[0] < 0.0 for tie in ties)
+            if not any(tie.anchor or sense * tie.force[0] < 0.0 for tie in ties):
+                return f"no tie holds it: if floors and walls do, give direction = {-sense:g}"
             most = f"not even {MOST_TIED:g} times the forces of the ties suffice: {mechanism}"
-            return f"{most} has a ratio of {format_ratio(ratio)}" * pulls
+            return f"{most} has a ratio of {format_ratio(ratio)}"
         # from above, as another mechanism with less force may pass again
         scales = MOST_TIED * 2.0 ** (-0.5 * np.arange(1, 11))
         low = next((scale for scale in scales if solve(scale, sense)[0] < 1.0), 0.0)

@@ -36,6 +36,9 @@ from archfem.units import MPa, format_mm, kN
 # Stretch from which a tie is doubted, as its free length is not known: 2 % of 2 m [m]
 MAX_STRETCH = 0.04
 
+# Load over the weight of the lightest block, below which its unit is probably wrong [-]
+TINY_LOAD = 0.01
+
 # Slope up to which a joint is a level bed [-]
 LEVEL_BED = 0.05
 
@@ -301,13 +304,19 @@ def doubt_stretches(stretches: Sequence[tuple[str, float]]) -> list[Doubt]:
     ]
 
 
-def doubt_opposed_ties(placed: PlacedBlocks) -> list[Doubt]:
-    """Return doubts about ties to the ground that pull two blocks towards each other."""
+def doubt_loads(placed: PlacedBlocks, loads: Sequence[AttachedLoad]) -> list[Doubt]:
+    """Return doubts about tiny loads, and ties to the ground that pull towards each other."""
+    own, found = placed.masses[: len(placed.structure.blocks)], list[Doubt]()
+    least = min(weight for block, _, weight in own if block in placed.structure.free)
+    for load in loads:
+        if (size := float(np.hypot(*load.force)) + load.weight) < TINY_LOAD * least:
+            tiny = "the load at {} is {:.3g} N, below 1 % of the lightest block, {:.3g} kN"
+            remedy = 'give its unit, as in "9 kN"'
+            found.append(Doubt(tiny, remedy, (str(load.block), size, least / kN)))
     words = (
         "the ties at {} and {} pull towards each other, and each counts as held by the ground: a "
         "bar between both blocks holds neither to the ground"
     )
-    found = []
     for one, other in combinations(placed.ties, 2):
         chord = other.place - one.place
         pulls = np.array([one.force @ chord, -(other.force @ chord)]) / np.hypot(*chord)

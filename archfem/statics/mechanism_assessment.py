@@ -71,7 +71,7 @@ from archfem.statics.first_mechanism import (
     DoesNotStand,
     describe_loads,
     describe_ties,
-    doubt_opposed_ties,
+    doubt_loads,
     doubt_stretches,
     find_first_mechanism,
     find_foot,
@@ -660,7 +660,7 @@ class _Oscillator:
             words = f"{place} joints open or slide that the mechanism keeps closed: {what} is {{}}"
             remedy = "a time history with large displacements can test it"
             found.append(Doubt(words, remedy, (UPPER_BOUND,)))
-        return found + doubt_stretches(self.stretches) + doubt_opposed_ties(self.placed)
+        return found + doubt_stretches(self.stretches) + doubt_loads(self.placed, self.given.loads)
 
     @cached_property
     def linear(self) -> AssessmentCheck:

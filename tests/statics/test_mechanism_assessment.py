@@ -15,6 +15,7 @@ from scipy.optimize import brentq
 import archfem as af
 from archfem.cases.answers import (
     describe_margin,
+    doubt_ties,
     find_margin,
     list_ratios,
     note_ties,
@@ -474,7 +475,8 @@ def test_a_check_that_alone_fails_is_in_every_headline_with_the_force_of_a_tie()
     assert note_ties(case) == [
         f"note: pushed to the right, from {needed:.3g} kN of the tie at block 1 on, in all for 1 m "
         "of width, without a factor on the tie, all forces tried pass its checks, one by an upper "
-        "bound alone"
+        "bound alone",
+        "note: pushed to the left, no tie holds it: if floors and walls do, give direction = 1",
     ]
     bounded = replace(free, displacement=replace(free.displacement, bounded=True))
     assert describe_margin([bounded]).endswith(": fails")  # an upper bound shows no passing
@@ -1378,6 +1380,28 @@ def test_a_wall_held_at_its_top_moves_as_by_hand():
     expected = moved * inertia / (rates[control] * work)
     assert found.d_0_star == pytest.approx(expected, rel=1e-4)
     assert found.displacement.capacity == pytest.approx(0.4 * expected, rel=1e-4)
+
+
+def test_a_load_with_a_wrong_sign_or_unit_is_in_doubt():
+    """A block of 160 kN, a tie that points outwards, and a mass of 9 N in place of 9 kN."""
+    spectrum = {"code": "NTC-2018", "ag": 0.25, "f0": 2.4, "tc_star": 0.32, "site": "B"}
+    tie = {"block": "block 1", "point": [0.5, 4.0], "force": [15e3, 0.0], "passive": True}
+    column = {"shape": "column", "breadth": 1.0, "heights": [8.0]}
+    for direction, wrong in ((1, True), (-1, False)):
+        assessment = {"spectrum": spectrum, "loads": [tie], "direction": direction}
+        case = af.Case.of({"structure": column, "assessment": assessment})
+        doubted = [str(x) for x in doubt_ties(case)]
+        says = "the tie at block 1 pulls in the sense of the push, which it never holds; correct "
+        assert [x.startswith(says) for x in doubted] == [True] * wrong
+    # to one side floors and walls may hold what no tie does
+    case = af.Case.of({"structure": column, "assessment": assessment | {"direction": 1}})
+    says = "note: pushed to the right, no tie holds it: if floors and walls do, give direction = -1"
+    assert note_ties(case) == [says]
+    for weight, wrong in ((9.0, True), (9e3, False)):
+        load = af.masonry.AttachedLoad("block 1", (0.5, 4.0), weight)
+        found = af.kinematic_assessment(case.structure, SPECTRUM, loads=[load])
+        says = "the load at block 1 is 9 N, below 1 % of the lightest block, 160 kN"
+        assert [x.startswith(says) for x in map(str, found.doubts)] == [True] * wrong
 
 
 GROUND = af.motion.Ntc2018(ag=0.18, f0=2.5, tc_star=0.32, site="B")
