@@ -27,7 +27,7 @@ from archfem.errors import InvalidInput, InvalidStructure
 from archfem.masonry.block import Block, Point, as_point, check_overlaps, say_place
 from archfem.masonry.materials import Contact
 from archfem.masonry.parts import assign_roles, find_misplaced, select_assessed_parts
-from archfem.units import G
+from archfem.units import Ends, G
 
 
 def find_number(kind: str, names: Sequence[str], requested: str | int) -> int:
@@ -680,8 +680,9 @@ def describe_piers(structure: Structure) -> dict[str, str]:
             for joint in rings
             if part in {parts[number].part for number in joint.blocks}
         ]
-        broad, tall = min(joint.depth for joint in own), max(map(max, ends), default=np.inf) - base
-        high = f", more than {tall:.3g} m high" * bool(broad > tall)
+        broad = Ends.of(joint.depth for joint in own)
+        tall = max(map(max, ends), default=np.inf) - base
+        high = f", more than {tall:.3g} m high" * bool(min(broad) > tall)
         high = f" and {min(clear):.3g} m high to the ring" if clear else high
         piers[part] = f"{broad:.4g} m broad{high}"
     return piers

@@ -539,7 +539,7 @@ def test_the_answer_has_displacements_the_first_fall_and_the_checks(case):
         "motions it survives: it stands under all 2 motions of PGA 0.20 g, and moves by 60 to 80 "
         "mm. It first falls at 0.26 g, 1.30 × 'a' (1.30 to 1.51 ×, 0.26 to 0.302 g over motions "
         "and time steps). No property was varied. The stiffness of joints is a default: measured "
-        "ones differ tenfold. Across the plane of the drawing it was not checked."
+        "ones differ tenfold. Perpendicular to this section, as along a wall, it was not checked."
     )
     assert facts["in doubt"] == "scale of the motion"
     pieces = conclusion.build_conclusion(data).pieces
@@ -948,7 +948,7 @@ def test_of_unequal_outcomes_the_worst_is_the_first(case):
     )
     rest = (
         f"No property that was varied decides. {sentence(conclusion.DEFAULT_STIFFNESS)} "
-        "Across the plane of the drawing it was not checked."
+        "Perpendicular to this section, as along a wall, it was not checked."
     )
     assert head_of(conclusion.list_facts(data)) == f"{text}, under 'first'. {rest}"
     parted = data.verdict_ranges[0].dataset.assign(outcome=("run", ["stands", "dislocated"]))
@@ -1102,7 +1102,7 @@ def test_the_head_of_a_push_says_when_it_begins_to_move(case):
         "Pushed sideways as rigid blocks it begins to move at 0.5 times the site's 0.2 g; "
         "to move is no collapse."
     )
-    unchecked = "Across the plane of the drawing it was not checked."
+    unchecked = "Perpendicular to this section, as along a wall, it was not checked."
     assert head_of(conclusion.list_facts(data)) == f"{begins} {unchecked}"
 
 

@@ -223,7 +223,7 @@ def test_demand_and_capacity_stand_beside_their_doubts(kept, undrawn):
     assert facts["in doubt"] == "limit analysis"
     failed = "By the kinematic assessment it does not withstand the spectrum of the motion."
     rate = "Annual rate: median PGA 6 m/s², falls at 0.002 a year."
-    unchecked = "Across the plane of the drawing it was not checked."
+    unchecked = "Perpendicular to this section, as along a wall, it was not checked."
     rest = "Rating for LM1: factor 1.25, passes without all. Worst with 2 axles at -0.1, 1.1 m. "
     but = "Under its motions it survives: it forms no mechanism under all 2 motions"
     assert head_of(facts.items()).startswith(f"{failed} {but}")

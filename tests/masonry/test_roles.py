@@ -10,6 +10,7 @@ import pytest
 
 import archfem as af
 from archfem.masonry.parts import infer_role, select_assessed_parts
+from archfem.masonry.structure import describe_piers
 from archfem.studies.evaluators import findings_by_part
 from archfem.view.joint_marks import joint_marks
 
@@ -353,3 +354,12 @@ def test_a_saved_history_keeps_roles(tmp_path):
         af.joints.assessed_joints(dataset)["joint"]
     )
     assert again.mechanism == af.limit.counted_mechanisms(dataset)["any joints at once"]
+
+
+def test_a_pier_with_a_setback_has_both_breadths():
+    blocks = [af.Block(((-1, -1), (1, -1), (1, 0), (-1, 0)), af.STONE, "ground", fixed=True)]
+    for level, left in enumerate((0.0, 0.0, 0.15)):
+        corners = ((left, level), (0.65, level), (0.65, level + 1), (left, level + 1))
+        blocks.append(af.Block(corners, af.STONE, f"{level}", part="front", role="pier"))
+    front = af.masonry.assembled(blocks, af.Contact(1e9, 4e8, friction=0.6))
+    assert describe_piers(front) == {"front": "0.5 to 0.65 m broad"}

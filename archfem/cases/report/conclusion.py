@@ -256,7 +256,12 @@ def _say_unchecked(data: ReportData) -> tuple[list[str], bool]:
     push, demand = found
     beside = f" (demand {demand:.3g} g)" * (demand > 0.0)
     falls = f", where it may overturn from {push:.3g} g on{beside}" * (push > 0.0)
-    return [f"across the plane of the drawing it was not checked{falls}"], push < demand
+    way = (
+        "perpendicular to this section, as along a wall,"
+        if np.isnan(push)
+        else "across the plane of the drawing"
+    )
+    return [f"{way} it was not checked{falls}"], push < demand
 
 
 def _say_first_failures(data: ReportData) -> Iterator[str]:
