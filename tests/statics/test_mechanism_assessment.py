@@ -1457,7 +1457,7 @@ def test_a_floor_spectrum_follows_the_mechanism_up_a_front(verified):
     assessment = {"spectrum": spectrum, "direction": 1, "loads": [roof, tie]}
     case = af.Case.of({"structure": column, "assessment": assessment})
     (note,) = note_ties(case)
-    assert f"with {needed:.3g} kN of the tie at block 1" in note
+    assert f"from {needed:.3g} kN of the tie at block 1 on" in note
 
 
 def test_what_moves_high_above_the_ground_is_in_doubt_under_its_spectrum():
