@@ -12,6 +12,7 @@
     finite_mechanism      finite motion of a mechanism, load factor along its path
     instability           why a structure does not stand
     linear_programme      rigid-block equilibrium as a linear programme
+    linkage               linkage of rigid bodies: constraints, velocities, equilibrium
     mechanism_count       mechanisms by counting failed joints; duration and opening
     mechanism_kinematics  mechanisms verified by a rigid-block motion
     mechanism_names       plain names of mechanisms
