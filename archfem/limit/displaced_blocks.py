@@ -431,16 +431,24 @@ def find_mechanism(
     # factor at which they balance the loads is sought; its dual is the motion. Without dilatancy,
     # if `flat`, |T| <= μ N₀ with N₀ of the solution before, until it repeats (Gilbert, Casapulla
     # and Ahmed, Comput. Struct. 84 (2006) 873-887).
-    bodies, contacts, coefficient = given = _select_bodies(blocks, joints, friction)
-    if not bodies.count or (solution := _solve_static(*given)) is None:
-        return None
-    factor, velocity, forces = solution
-    if flat:
-        factor, velocity = _solve_flat(*given, factor, forces[: len(contacts)])
-    motion = bodies.spread(velocity)
-    speed = blocks.largest_speed(motion)
-    dilates = np.zeros(len(contacts)) if flat else coefficient
-    found = classify_motion(blocks, joints, motion / speed, dilates, contacts, factor)
+    bodies, contacts, coefficient = _select_bodies(blocks, joints, friction)
+    # Corners that coincide slide on the face of either block, which an open joint turns apart; on
+    # which one follows from the motion, so that its contacts are those of a second programme.
+    for _ in range(4):
+        given = bodies, contacts, coefficient
+        if not bodies.count or (solution := _solve_static(*given)) is None:
+            return None
+        factor, velocity, forces = solution
+        if flat:
+            factor, velocity = _solve_flat(*given, factor, forces[: len(contacts)])
+        motion = bodies.spread(velocity)
+        motion = motion / blocks.largest_speed(motion)
+        dilates = np.zeros(len(contacts)) if flat else coefficient
+        found = classify_motion(blocks, joints, motion, dilates, contacts, factor)
+        before, contacts = contacts, face_slips(blocks, contacts, motion)
+        normals = np.array([[each.normal for each in some] for some in (before, contacts)])
+        if np.abs(np.cross(*normals)).max(initial=0.0) <= STILL:
+            break
     return replace(found, is_flat=flat)
 
 
@@ -552,9 +560,8 @@ def classify_motion(
     factor: float,
 ) -> KinematicChain:
     """Weld joints that do not move, and select the contacts that a motion keeps."""
-    every = Bodies(blocks, np.arange(len(motion)))
+    every, contacts = Bodies(blocks, np.arange(len(motion))), face_slips(blocks, contacts, motion)
     normal, along = (rates @ motion.ravel() for rates in every.sparse_rates(contacts))
-    slip = np.where(np.abs(along) > STILL, np.sign(along), 0.0)
     # associated flow opens a sliding contact by μ |slip|; flat sliding by nothing
     dilation = np.where(np.isfinite(coefficient), coefficient, 0.0) * np.abs(along)
     keeps = (np.abs(normal) <= STILL) | (np.abs(normal - dilation) <= STILL)
@@ -562,11 +569,18 @@ def classify_motion(
     opens &= np.isin(np.arange(len(opens)), joints)
     body = merge_blocks(blocks.structure, ~opens)
     kept = tuple(
-        _sliding_contact(blocks, contact, int(sense))
-        for contact, keep, sense in zip(contacts, keeps, slip, strict=True)
+        contact
+        for contact, keep in zip(contacts, keeps, strict=True)
         if keep and body[contact.corner] != body[contact.face]
     )
     return KinematicChain(factor, motion, body, kept)
+
+
+def face_slips(blocks: PlacedBlocks, contacts: Sequence[Contact], motion: Array) -> list[Contact]:
+    """Return contacts with the slips of a motion, at corners that stay on the other's face."""
+    rates = Bodies(blocks, np.arange(len(motion))).sparse_rates(contacts)[1] @ motion.ravel()
+    slips = np.where(np.abs(rates) > STILL, np.sign(rates), 0.0).astype(int)
+    return [_sliding_contact(blocks, *each) for each in zip(contacts, slips.tolist(), strict=True)]
 
 
 def _find_opening_joints(blocks: PlacedBlocks, motion: Array) -> Flags:
@@ -581,17 +595,16 @@ def _find_opening_joints(blocks: PlacedBlocks, motion: Array) -> Flags:
 
 def _sliding_contact(blocks: PlacedBlocks, contact: Contact, slip: int) -> Contact:
     """Return a contact with its slip, at the corner that stays on the other block's face."""
-    joint = contact.joint
-    lower, higher = blocks.structure.pairs[joint]
-    end = int(np.linalg.norm(blocks.faces[:, joint] - contact.point, axis=-1).min(axis=0).argmin())
-    apart = np.linalg.norm(blocks.faces[1, joint, end] - blocks.faces[0, joint, end])
-    coincide = apart <= TOUCHING * blocks.structure.size
-    if not slip or not coincide:
+    joint, pair = contact.joint, blocks.structure.pairs[contact.joint]
+    faces, own = blocks.faces[:, joint], int(contact.corner == pair[1])
+    end = int(np.linalg.norm(faces - contact.point, axis=-1).min(axis=0).argmin())
+    apart = np.linalg.norm(faces[1, end] - faces[0, end])
+    if not slip or apart > TOUCHING * blocks.structure.size:
         return contact._replace(slip=slip)
-    # Of corners that coincide, that of the higher block stays on the face where it slides inwards.
-    outward = blocks.faces[0, joint, end] - blocks.faces[0, joint, 1 - end]
+    # Of corners that coincide, that which slides inwards stays on the other block's face.
+    outward = faces[1 - own, end] - faces[1 - own, 1 - end]
     if slip * (tangent(contact.normal) @ outward) < 0.0:
         return contact._replace(slip=slip)
-    point, normal = blocks.faces[0, joint, end], blocks.normals[1, joint]
     # the corner's velocity relative to the face, and the face's tangent, both change sign
-    return Contact(joint, lower, higher, point, normal, slip)
+    point, normal = faces[1 - own, end], blocks.normals[own, joint]
+    return Contact(joint, contact.face, contact.corner, point, normal, slip)

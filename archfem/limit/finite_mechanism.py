@@ -15,9 +15,11 @@ Faces slide flat: sliding in limit analysis dilates by μ (associated flow), the
 not. Where a joint slides and others hinge, α at rest can therefore be below the collapse factor.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import islice
 
 import numpy as np
 import xarray as xr
@@ -34,15 +36,19 @@ from archfem.limit.displaced_blocks import (
     Contact,
     KinematicChain,
     PlacedBlocks,
+    face_slips,
     find_mechanism,
 )
 from archfem.limit.linear_programme import NoEquilibrium
 from archfem.limit.linkage import Linkage, LinkageState
 from archfem.limit.self_weight import refuse_bonds
-from archfem.masonry.block import largest_overlap
+from archfem.masonry.block import find_neighbours, find_overlaps
 from archfem.masonry.loads import Action, AttachedLoad, PointLoad, list_loads
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import HasStructure, Structure, join_joint_names, structure_of
+
+# Share of the smaller of two neighbours that may overlap beside their joint [-]
+CHIPPED = 2e-3
 
 
 class PathEnd(ExplainedWord):
@@ -50,8 +56,8 @@ class PathEnd(ExplainedWord):
 
     FALLS = "falls", "at the end of the path it falls by its weight alone"
     LOCKS = "locks", "at the end its contacts permit no further motion"
-    COLLIDES = "collides", "at the end it runs into blocks that it has no joint with"
-    ENDURES = "endures", "it still needs a force where the path is cut off"
+    COLLIDES = "collides", "at the end two blocks run into each other beside their joints"
+    ENDURES = "endures", "it still needs a force after a way as long as the structure is large"
     UNRESOLVED = "unresolved", "at the end no mechanism was found whose faces slide flat"
     RELEASED = "released", "at the end a tie yields or slackens, and no equilibrium follows"
     SLIDES = "slides", "it slides without turning, up to the ends of the faces as drawn"
@@ -82,6 +88,7 @@ class MechanismPath:
         holds: last place up to which no other mechanism has a lower factor; beyond it the factors
             are upper bounds. None where that was not examined.
         pulls: largest force of each tie on the way, while it keeps its length (n_ties,) [N].
+        met: names of the blocks that run into each other at the end, if they do.
     """
 
     blocks: PlacedBlocks
@@ -93,6 +100,21 @@ class MechanismPath:
     end: PathEnd
     holds: int | None = None
     pulls: Array = field(default_factory=lambda: np.zeros(0))
+    met: tuple[str, ...] = ()
+
+    @property
+    def first_changes(self) -> dict[str, int]:
+        """Place of each change of the mechanism, which may happen again and again, by its text."""
+        found: dict[str, int] = {}
+        for event in self.events:
+            if event.text != self.end:
+                found.setdefault(event.text, event.place)
+        return found
+
+    @property
+    def ending(self) -> str:
+        """Meaning of the end, with the names of blocks that run into each other."""
+        return ": ".join([self.end.sentence, *[" and ".join(self.met)] * bool(self.met)])
 
     @cached_property
     def curve(self) -> xr.Dataset:
@@ -125,7 +147,7 @@ class MechanismPath:
         moved = float(self.curve["displacement"][-1])
         return (
             f"MechanismPath: factor {self.factors[0]:.4g} at rest, {self.factors[-1]:.4g} after "
-            f"{moved:.4g} m along the forces, {len(self.events)} events; {self.end.sentence}"
+            f"{moved:.4g} m along the forces, {len(self.events)} events; {self.ending}"
         )
 
 
@@ -235,11 +257,13 @@ class PathFollower:
     events: list[PathEvent] = field(default_factory=list)
     travel: float = 0.0  # of the fastest corner, so far [m]
     pulls: Array = field(default_factory=lambda: np.zeros(0))  # as of the path (n_ties,) [N]
+    stuck: int = 0  # mechanisms that did not move since the last place that did
+    met: tuple[str, ...] = ()  # names of the blocks that run into each other at the end
 
     def follow(self, mechanism: KinematicChain, max_events: int = 20) -> MechanismPath:
         """Follow a mechanism until it falls, locks, collides, or the path is cut off."""
         mechanisms: list[KinematicChain] = [mechanism]
-        motion, stuck = np.zeros_like(self.blocks.displacement), 0
+        motion = np.zeros_like(self.blocks.displacement)
         self.pulls = np.zeros(len(self.blocks.ties))
         try:
             mechanisms[0], state, velocity = self._start(self.blocks, mechanism)
@@ -248,9 +272,7 @@ class PathFollower:
                 before = self.travel
                 blocks = self._follow_linkage(state, velocity)
                 moved = self.travel - before > TOUCHING * self.blocks.structure.size
-                stuck = 0 if moved else stuck + 1
-                if stuck > 2:
-                    break
+                self.stuck = 0 if moved else self.stuck + 1
                 renewed, state, velocity = self._start(blocks, self._renew(blocks))
                 mechanisms.append(renewed)
             end = PathEnd.UNRESOLVED
@@ -262,17 +284,17 @@ class PathFollower:
             end = PathEnd.UNRESOLVED
         places = np.array(self.factors), np.array(self.displacements)
         changes = tuple(mechanisms), tuple(self.events)
-        return MechanismPath(self.blocks, *places, motion, *changes, end, pulls=self.pulls)
+        path = MechanismPath(self.blocks, *places, motion, *changes, end)
+        return replace(path, pulls=self.pulls, met=self.met)
 
     def _start(
         self, blocks: PlacedBlocks, mechanism: KinematicChain
     ) -> tuple[KinematicChain, LinkageState, Array]:
-        """Return a mechanism that slides without dilatancy, and the start of its path."""
-        for trial in (mechanism, None):
-            if trial is None:
-                # With the dilatancy of associated flow joints open that would close if faces slid
-                # flat, and contacts are in compression that would need tension.
-                trial = self._renew(blocks, flat=True)
+        """Return a mechanism that slides without dilatancy, and the start of its path.
+
+        It is the first that moves, behind as many as did not since the last place that moved.
+        """
+        for trial in islice(self._trials(blocks, mechanism), self.stuck, None):
             trial = self._without_grazing(blocks, trial)
             state = LinkageState(Linkage(blocks, trial), blocks)
             velocity = state.velocity(state.linkage.first_velocity)
@@ -283,6 +305,23 @@ class PathFollower:
         self._record(blocks, mechanism.factor)
         raise _Stop(PathEnd.LOCKS)
 
+    def _trials(self, blocks: PlacedBlocks, mechanism: KinematicChain) -> Iterator[KinematicChain]:
+        """Yield mechanisms that may move at a place: a given one, and others without dilatancy."""
+        yield mechanism
+        # With the dilatancy of associated flow joints open that would close if faces slid flat, and
+        # contacts are in compression that would need tension.
+        if not self.travel:
+            yield self._renew(blocks, flat=True)
+            return
+        # where several are of equal factor, less friction selects one of them, on the safe side
+        found = None
+        for share in (1.0, 0.99, 0.97, 0.94, 0.9):
+            with suppress(DidNotConverge, NoEquilibrium):
+                if found := find_mechanism(blocks, self.joints, share * self.friction, flat=True):
+                    yield found
+        if found is None:
+            raise _Stop(PathEnd.UNRESOLVED)
+
     def _without_grazing(self, blocks: PlacedBlocks, mechanism: KinematicChain) -> KinematicChain:
         """Return a mechanism without sliding contacts that open although their rate is zero."""
         # A corner that leaves a face along a circle keeps it to first order only: as a constraint,
@@ -292,7 +331,7 @@ class PathFollower:
             freed = replace(mechanism, contacts=others)
             whole = LinkageState(Linkage(blocks, mechanism), blocks)
             state = LinkageState(Linkage(blocks, freed), blocks)
-            ranks = [np.linalg.matrix_rank(each.jacobian, tol=1e-9) for each in (whole, state)]
+            ranks = [np.linalg.matrix_rank(each.jacobian, tol=STILL) for each in (whole, state)]
             if ranks[0] == ranks[1] and self._leaves(whole, state, contact):
                 mechanism = freed
         return mechanism
@@ -302,23 +341,24 @@ class PathFollower:
         velocity = freed.velocity(whole.linkage.first_velocity)
         step = 1e-3 * self.blocks.structure.size
         trial = None if velocity is None else freed.advanced(velocity, step)
-        if trial is None:
+        if velocity is None or trial is None or not self._presses(freed, velocity):
             return False
         moved = LinkageState(whole.linkage, trial[0].blocks)
         contacts = whole.linkage.mechanism.contacts
         place = next(k for k, each in enumerate(contacts) if each is contact)
-        return bool(moved.misfits[place] > 1e-9 * self.blocks.structure.size)
+        return bool(moved.misfits[place] > 1e-11 * self.blocks.structure.size)
 
     def _opens_joints(self, state: LinkageState, velocity: Array) -> bool:
         """Return whether no contact closes."""
         body, touching = state.bodies.body, state.blocks.touching(self.joints)
         contacts = [each for each in touching if body[each.corner] != body[each.face]]
+        contacts = face_slips(state.blocks, contacts, state.bodies.spread(velocity))
         return bool((state.bodies.rates(contacts)[0] @ velocity >= -10.0 * STILL).all())
 
     def _presses(self, state: LinkageState, velocity: Array) -> bool:
         """Return whether no contact needs tension."""
         forces = state.balance(velocity, self.friction)[1]
-        return not bool((forces < -1e-5 * self._force_unit).any())
+        return not bool((forces < -2e-5 * self._force_unit).any())
 
     @property
     def _force_unit(self) -> float:
@@ -337,20 +377,24 @@ class PathFollower:
 
     def _renew(self, blocks: PlacedBlocks, *, flat: bool = False) -> KinematicChain:
         """Return the mechanism of limit analysis at the present places."""
-        try:
-            mechanism = find_mechanism(blocks, self.joints, self.friction, flat=flat)
-        except NoEquilibrium as error:
-            # without the length that a tie kept, two motions are free, and one factor holds neither
-            if self.events and self.events[-1].of_tie:
-                raise _Stop(PathEnd.RELEASED) from error
-            self._record(blocks, 0.0)
-            raise _Stop(PathEnd.FALLS) from error
-        if mechanism is None:
-            raise _Stop(PathEnd.LOCKS)
-        if mechanism.factor <= 0.0:
-            self._record(blocks, 0.0)
-            raise _Stop(PathEnd.FALLS)
-        return mechanism
+        # Where friction just fails, stones slip by little to a state that a little more would hold:
+        # the path continues as the upper bound that `last_equilibrium` finds.
+        for share in (1.0, 1.02, 1.05, 1.1) if self.travel else (1.0,):
+            try:
+                mechanism = find_mechanism(blocks, self.joints, share * self.friction, flat=flat)
+            except NoEquilibrium:
+                # without the length that a tie kept, two motions are free, and no factor holds them
+                if self.events and self.events[-1].of_tie:
+                    raise _Stop(PathEnd.RELEASED) from None
+                continue
+            if mechanism is None:
+                raise _Stop(PathEnd.LOCKS)
+            jumps = share > 1.0 and abs(mechanism.factor / self.factors[-1] - 1.0) > 0.05
+            if mechanism.factor <= 0.0 or jumps:
+                break
+            return mechanism
+        self._record(blocks, 0.0)
+        raise _Stop(PathEnd.FALLS)
 
     def _follow_linkage(self, state: LinkageState, velocity: Array) -> PlacedBlocks:
         """Follow a linkage to its next event and return the blocks there."""
@@ -431,11 +475,36 @@ class PathFollower:
         left = np.concatenate([forces, state.held_sizes - pulls]) + near_zero
         pressed, of_ties = np.split(np.nan_to_num(left, nan=np.inf), [len(state.contacts)])
         ways = [self._way_to_end(blocks, each) if each.slip else np.inf for each in state.contacts]
-        crushed = pairs[np.flatnonzero(blocks.setback)]
-        room = 1e-5 * size - largest_overlap(blocks.outlines, body, crushed)
         edges = np.array(ways) + 2.0 * near
         met = gaps.ravel() + 0.5 * near
+        room = self._least_room(state)[0]
         return np.concatenate([[factor], met, pressed, edges, of_ties, [room]])
+
+    @cached_property
+    def tolerated(self) -> Array:
+        """Overlap of each pair of blocks that ends no path (n_blocks, n_blocks) [m²].
+
+        Of neighbours it is a chip of a corner: faces drawn as chords of an arc would else lock.
+        """
+        structure, found = self.blocks.structure, self.blocks.outlines
+        areas = np.array([block.area for block in structure.blocks])
+        tolerated = np.zeros(2 * areas.shape)
+        one, other = find_neighbours(found, 1e-3 * structure.size)
+        tolerated[one, other] = CHIPPED * np.minimum(areas[one], areas[other])
+        one, other = structure.pairs[np.flatnonzero(self.blocks.setback)].T
+        tolerated[one, other] = tolerated[other, one] = np.inf
+        return tolerated
+
+    def _least_room(self, state: LinkageState) -> tuple[float, Sequence[int]]:
+        """Return the least margin of blocks that run into others, and the two, if any overlap."""
+        pairs, _, areas, depths = find_overlaps(state.blocks.outlines, state.bodies.body)
+        if not len(pairs):
+            return np.inf, ()
+        rooms = np.maximum(
+            self.tolerated[*pairs.T] - areas, 1e-5 * self.blocks.structure.size - depths
+        )
+        least = int(rooms.argmin())
+        return float(rooms[least]), pairs[least].tolist()
 
     @staticmethod
     def _way_to_end(blocks: PlacedBlocks, contact: Contact) -> float:
@@ -446,8 +515,7 @@ class PathFollower:
         share = (contact.point - face[0]) @ (face[1] - face[0]) / length
         return float(min(share, length - share))
 
-    @staticmethod
-    def _name_event(place: int, state: LinkageState, happened: Flags) -> PathEvent:
+    def _name_event(self, place: int, state: LinkageState, happened: Flags) -> PathEvent:
         """Return the first of the events that have happened at a state."""
         names = [joint.name for joint in state.blocks.structure.joints]
         if happened[0]:
@@ -469,6 +537,7 @@ class PathFollower:
             if is_off:
                 name = names[contact.joint]
                 return PathEvent(place, f"a corner slides off its face at {name}")
+        self.met = tuple(state.blocks.structure.blocks[k].name for k in self._least_room(state)[1])
         return PathEvent(place, PathEnd.COLLIDES)
 
     def last_equilibrium(self, path: MechanismPath, samples: int = 9) -> int:

@@ -185,7 +185,10 @@ class LinkageState:
         end = self.linkage.place(self.blocks, step * halfway).corrected()
         if end is None or (after := end.velocity(halfway)) is None:
             return None
-        return end, after
+        # constraints that contradict each other beyond first order bring a step back
+        moved = (end.blocks.displacement - self.blocks.displacement).ravel()
+        expected = step * self.bodies.spread(velocity).ravel()
+        return (end, after) if moved @ expected > 0.5 * (expected @ expected) else None
 
     def balance(self, velocity: Array, friction: Array) -> tuple[float, Array]:
         """Return the factor α in equilibrium, and the forces (n_contacts + n_held,) [N].

@@ -360,7 +360,7 @@ def check_overlaps(
         check_simple(outline, name, place)
     # overlaps of less depth, relative to the size of all outlines, are round-off
     near = max(deep, 1e-6 * float(np.linalg.norm(np.ptp(np.concatenate(outlines), axis=0))))
-    pairs, common, depth = _find_overlaps(outlines, body)
+    pairs, common, area, depth = find_overlaps(outlines, body)
     if not np.any(depth > near):
         return
     deepest = [k for k in np.argsort(-depth).tolist() if depth[k] > near]
@@ -368,7 +368,7 @@ def check_overlaps(
     both, (one, other) = common[deepest[0]], (names[k] for k in pairs[deepest[0]])
     where, sizes = place(middles[0]), np.array([measure_polygon(each)[0] for each in outlines])
     areas = sizes[pairs[deepest]].T
-    same = np.array([common[k].area for k in deepest]) > (1.0 - 1e-6) * areas.max(axis=0)
+    same = area[deepest] > (1.0 - 1e-6) * areas.max(axis=0)
     found = [
         ("overlap", names[pairs[k][0]], names[pairs[k][1]], middle)
         for k, middle in zip(deepest, middles, strict=True)
@@ -395,20 +395,19 @@ def say_others(rank: str, found: Sequence[Fault], place: Callable[[Point], str])
     return f", {rank} of {len(found)} {found[0][0]}s (also {listed}{more})" if others else ""
 
 
-def largest_overlap(outlines: Sequence[Array], body: Numbers, crushed: Numbers) -> float:
-    """Return the largest depth by which outlines of different bodies overlap [m].
+def find_neighbours(outlines: Sequence[Array], near: float) -> tuple[Numbers, Numbers]:
+    """Return the numbers of outlines within a distance of each other, each pair twice (2, n)."""
+    import shapely
 
-    Pairs of blocks that crush each other are left out (n_crushed, 2).
-    """
-    pairs, _, depths = _find_overlaps(outlines, body)
-    crush = (pairs[:, None] == crushed).all(axis=2).any(axis=1)
-    return float(depths[~crush].max(initial=0.0))
+    polygons = np.array([shapely.Polygon(points) for points in outlines])
+    one, other = shapely.STRtree(polygons).query(polygons, predicate="dwithin", distance=near)
+    return one, other
 
 
-def _find_overlaps(
+def find_overlaps(
     outlines: Sequence[Array], body: Numbers | None
-) -> tuple[Numbers, NDArray[np.object_], Array]:
-    """Return pairs (n, 2) of different bodies that meet, their overlaps, and mean depths [m]."""
+) -> tuple[Numbers, NDArray[np.object_], Array, Array]:
+    """Return pairs (n, 2) of different bodies that meet, overlaps, areas, mean depths [m², m]."""
     import shapely
 
     polygons = np.array([shapely.Polygon(points) for points in outlines])
@@ -418,5 +417,5 @@ def _find_overlaps(
     pairs = pairs[(a < b) & (numbers[a] != numbers[b])]
     common = shapely.intersection(*polygons[pairs].T)
     # the mean depth follows from area and length
-    length = shapely.length(common)
-    return pairs, common, 2.0 * shapely.area(common) / np.where(length > 0.0, length, 1.0)
+    length, area = shapely.length(common), shapely.area(common)
+    return pairs, common, area, 2.0 * area / np.where(length > 0.0, length, 1.0)

@@ -251,11 +251,11 @@ class KinematicAssessment(ResultDisplay):
                 f"{divided}{vanishes if np.isfinite(self.d_0_star) else ''}",
             ]
             moved = abs(self.curve["d"].values.round(5))
-            events = [event for event in self.path.events if event.text != self.path.end]
-            changes = [f"{event.text} at d* = {moved[event.place]:.3g} m" for event in events]
+            places = self.path.first_changes
+            changes = [f"{text} at d* = {moved[k]:.3g} m" for text, k in places.items()]
             changed = f"along the path the mechanism changes: {join_names(changes, '; ')}"
             lines += [*self._setbacks, *[changed] * bool(changes)]
-            lines += [self.path.end.sentence] if self.displacement else []
+            lines += [self.path.ending] if self.displacement else []
             lines += map(str, self.checks)
             if (over_fill := self.checks[-1].over_fill) is not None:
                 lines.append(over_fill.describe_states(digits=3, name=" times the spectrum"))
@@ -623,8 +623,8 @@ class _Oscillator:
             )
         elif self.path.end is not PathEnd.FALLS:
             found.append(
-                f"alpha does not vanish: {self.path.end.sentence}, and the displacement check "
-                "counts the end of the path as d_0*"
+                f"alpha does not vanish: {self.path.ending}, and the displacement check counts "
+                f"d* = {self.curve['d'].values[-1]:.4g} m there as d_0*, on the safe side"
             )
         return found
 

@@ -1,17 +1,22 @@
 """Finite motion of mechanisms: closed forms of rocking, sliding and linkages, and their events."""
 
+from contextlib import suppress
 from itertools import combinations, pairwise
 from math import atan2, cos, hypot, sin, tan
 
 import numpy as np
 import pytest
+import shapely
 from backfilled import arch_bridge
+from drawn import geojson
 from granite import granite_wall
 
 import archfem as af
 from archfem.limit import displaced_blocks
 from archfem.limit.displaced_blocks import PlacedBlocks, find_corners, find_mechanism
-from archfem.limit.finite_mechanism import LinkageState, PathEnd, PathFollower
+from archfem.limit.finite_mechanism import PathEnd, PathFollower
+from archfem.limit.linear_programme import NoEquilibrium
+from archfem.limit.linkage import LinkageState
 
 RING = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17)
 
@@ -171,6 +176,7 @@ def test_a_block_runs_into_a_wall_that_it_has_no_joint_with():
     )
     path = follow(af.Structure(blocks, (bed((0, 1), -0.3, 0.3, 0.0),)))
     assert path.end is PathEnd.COLLIDES
+    assert path.ending == f"{path.end.sentence}: stone and wall"
     # the upper right corner moves by 2.4 sin θ
     turn = -path.displacements[-1, 1, 2]
     assert 2.4 * sin(turn) == pytest.approx(gap, abs=1e-3)
@@ -493,3 +499,97 @@ def test_a_factor_of_flat_sliding_is_not_beyond_that_with_dilatancy(monkeypatch,
         return
     with pytest.raises(af.DidNotConverge, match="whose faces slide without dilatancy"):
         displaced_blocks._solve_flat(*given)
+
+
+def gabled_portal(folder, seed=None):
+    """Portal of 42 stones with a gable, each corner surveyed to 1 to 3 mm if seeded.
+
+    Chords of the ring's back are faces of the gable, at whose corners stones of the ring interlock.
+    """
+    rng, stones = np.random.default_rng(seed), {"ground": shapely.box(-3.0, -0.5, 3.0, 0.0)}
+    for side, (left, right) in (("L", (-2.3, -1.4)), ("R", (1.4, 2.3))):
+        for k in range(9):
+            stones[f"{side}{k + 1}"] = shapely.box(left, 0.4 * k, right, 0.4 * (k + 1))
+    turns = np.pi * (1.0 - np.arange(16) / 15)
+    inner, outer = (r * np.array([np.cos(turns), np.sin(turns)]).T + (0.0, 3.6) for r in (1.4, 1.8))
+    for k in range(15):
+        stones[f"V{k + 1}"] = shapely.Polygon([inner[k + 1], outer[k + 1], outer[k], inner[k]])
+    corners = [(-2.3, 3.6), (2.3, 3.6), (2.3, 4.5), (0.0, 6.1), (-2.3, 4.5)]
+    gable = shapely.Polygon(corners) - shapely.Polygon(outer)
+    levels = (3.6, 4.05, 4.5, outer[4, 1], 6.2)
+    for side, sign in (("L", -1.0), ("R", 1.0)):
+        for k, (low, high) in enumerate(pairwise(levels)):
+            left, right = sorted((0.4 * sign * (k == 3), 2.3 * sign))
+            stones[f"G{side}{k + 1}"] = gable & shapely.box(left, low, right, high)
+    stones["GC"] = gable & shapely.box(-0.4, levels[3], 0.4, levels[4])
+    outlines = {}
+    for name, stone in stones.items():
+        stone = max(getattr(stone, "geoms", [stone]), key=lambda each: each.area)
+        points = np.array(shapely.geometry.polygon.orient(stone).exterior.coords)[:-1]
+        if seed is not None and name != "ground":
+            away, turn = rng.uniform([[1e-3], [0.0]], [[3e-3], [2.0 * np.pi]], (2, len(points)))
+            points = points + np.array([away * np.cos(turn), away * np.sin(turn)]).T
+        outlines[name] = points.tolist()
+    drawing = geojson(folder / "portal.geojson", outlines)
+    survey = af.masonry.read_outlines(drawing, snap=8.4e-3)
+    return af.masonry.assembled(survey.blocks, lambda a, b: contact(0.6))
+
+
+ANCHOR = {"anchor": "R9", "anchor_point": (1.85, 3.4), "passive": True}
+TIE = af.masonry.AttachedLoad("L9", (-1.85, 3.4), force=(1e5, 0.0), **ANCHOR)
+
+
+@pytest.fixture(scope="module")
+def tied_path(tmp_path_factory):
+    """Path of the tied portal as drawn, pushed to the right."""
+    return follow(gabled_portal(tmp_path_factory.mktemp("portal")), loads=[TIE])
+
+
+def way(path):
+    """Way of the pushed weights to the fall [m]."""
+    assert path.end is PathEnd.FALLS
+    return float(path.curve["displacement"][-1])
+
+
+@pytest.mark.slow
+def test_a_mirrored_push_has_the_mirrored_path(tied_path, tmp_path):
+    mirrored = follow(gabled_portal(tmp_path), loads=[TIE], direction=-1.0)
+    assert way(mirrored) == pytest.approx(way(tied_path), rel=1e-6)
+    np.testing.assert_allclose(mirrored.factors, tied_path.factors, atol=1e-6)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("seed", "direction"), [(7, -1.0), (8, 1.0), (1, 1.0), (2, -1.0)])
+def test_a_survey_changes_a_path_by_little(seed, direction, tied_path, tmp_path):
+    """Corners move by 3 mm at most; the way to the fall changes by 1 to 9 % in these surveys."""
+    surveyed = gabled_portal(tmp_path, seed)
+    path = follow(surveyed, loads=[TIE], direction=direction)
+    assert way(path) == pytest.approx(way(tied_path), rel=0.1)
+    # without sliding the displaced blocks bear more, at every place
+    rigid, joints = np.full(len(surveyed.joints), np.inf), range(len(surveyed.joints))
+    for place in range(0, len(path.factors) - 1, 4):
+        blocks = path.blocks.moved(path.displacements[place])
+        bound = find_mechanism(blocks, joints, rigid).factor
+        assert path.factors[place] < bound
+        with suppress(NoEquilibrium):  # the slips that a state needs are less than a millimetre
+            held = find_mechanism(blocks, joints, surveyed.friction).factor
+            assert path.factors[place] == pytest.approx(held, rel=0.03, abs=1e-3)
+
+
+@pytest.mark.slow
+def test_stones_that_interlock_by_chords_of_an_arc_meet_alike_in_both_senses(tmp_path):
+    """Without a tie V10 slides into a corner of GR4, pushed to the left its mirror image."""
+    portal, found = gabled_portal(tmp_path), []
+    joints = list(range(len(portal.joints)))
+    for direction in (1.0, -1.0):
+        weakest = af.collapse_factor(portal, live=af.BodyForce(direction), friction="nonassociated")
+        placed = PlacedBlocks.at_rest(portal, (), direction)
+        contacts = placed.touching(joints)
+        given = np.zeros(len(contacts)), contacts, weakest.factor
+        chain = displaced_blocks.classify_motion(placed, joints, weakest.motion, *given)
+        found.append(PathFollower(placed, joints, portal.friction).follow(chain))
+    right, left = found
+    assert (right.met, left.met) == (("V10", "GR4"), ("V6", "GL4"))
+    ends = [float(path.curve["displacement"][-1]) for path in found]
+    assert ends[0] == pytest.approx(ends[1], rel=1e-6)
+    assert right.factors[-1] < 0.5 * right.factors[0]
