@@ -570,7 +570,7 @@ def test_the_end_of_a_path_by_a_tie_is_read_from_no_text(monkeypatch):
         event = name_event(*given)
         return event if isinstance(event.text, PathEnd) else replace(event, text="in other words")
 
-    monkeypatch.setattr(PathFollower, "_name_event", staticmethod(reword))
+    monkeypatch.setattr(PathFollower, "_name_event", reword)
     path = assess_tied(4.0, 2e4).path
     assert path.end is PathEnd.RELEASED
     assert path.events[-1].text == "in other words"
