@@ -33,7 +33,7 @@ LONG = (
     "viaduct of 8 spans, bare",
     "record × 3",
     "0.98 × least, soft joints",
-    "cover of 20 mm",
+    "cover of 45 mm",
     "flat ring, 20°",
     "rocking block, HHT(-0.05), 1 ms",
     "rocking block, average acceleration, 1 ms",
