@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 from scipy.optimize import brentq
 
-from archfem._display import NOTE_MARK
+from archfem._display import NOTE_MARK, ProgressReport
 from archfem.cases.case import Case
 from archfem.cases.motion_keys import find_matched_band
 from archfem.cases.result_text import PushFactors, Remark, ResultTable
@@ -401,6 +401,7 @@ def note_ties(case: Case) -> list[str]:
     @cache  # ends of the search are tried before it
     def solve(scale: float, sense: float) -> tuple[float, str, bool]:
         """Return least ratio, mechanism and any upper bound with multiples of the ties' forces."""
+        progress.show(f"pushed to the {name_side(sense)}, {scale:.3g} times their forces", 1)
         tied = [replace(x, force=(scale * x.force[0], scale * x.force[1])) for x in ties if scale]
         options = {**settings.options, "loads": [x for x in loads if not x.passive] + tied}
         own = replace(settings, directions=(sense,), options=options)
@@ -426,14 +427,14 @@ def note_ties(case: Case) -> list[str]:
         scale = brentq(lambda each: solve(each, sense)[0] - 1.0, low, high, xtol=1e-3)
         of = f"{scale:.3g} times the forces of the ties"
         if len(ties) == 1:
-            size = scale * float(np.hypot(*ties[0].force)) / kN
-            of = f"{size:.3g} kN of the tie at {ties[0].block}"
+            of = f"{scale * np.hypot(*ties[0].force) / kN:.3g} kN of the tie at {ties[0].block}"
         bounded = ", one by an upper bound alone" * solve(scale, sense)[2]
         length = describe_tied_length(case.structure)
         return f"from {of} on, {length}, all forces tried pass its checks{bounded}"
 
     for sense in settings.directions if ties else ():
-        with suppress(InvalidInput):  # without its ties it may not stand
+        # without its ties it may not stand
+        with suppress(InvalidInput), ProgressReport("forces of ties", None) as progress:
             try:
                 text = describe(sense)
             except DidNotConverge as error:
