@@ -443,6 +443,16 @@ def note_ties(case: Case) -> list[str]:
     return notes
 
 
+def note_sense(case: Case) -> list[str]:
+    """Return a note on the sense of push that the case leaves out."""
+    found = case.assessment.directions
+    other = name_side(-found[0])
+    words = (
+        f"pushed to the {other} nothing was assessed, as the case gives direction = {found[0]:g}"
+    )
+    return [f"{NOTE_MARK}{words}"] * (len(found) == 1)
+
+
 def note_band(case: Case, found: Iterable[KinematicAssessment]) -> list[str]:
     """Return a note where motions are matched up to a shorter period than that of a check."""
     if (band := find_matched_band(case.suite)) is None:

@@ -257,7 +257,7 @@ def _show_assessment(
     out: str | None,
 ) -> list[result_text.Remark]:
     """Write the results of an assessment and print them; return all its remarks."""
-    remarks += answers.doubt_ties(case)
+    remarks += [*answers.doubt_ties(case), *answers.note_sense(case)]
     remarks += answers.note_band(case, found.values())
     remarks += answers.note_across(case.structure, found.values())
     remarks += result_text.note_masses(case.structure, parapets=case.parapets)

@@ -21,6 +21,7 @@ from archfem.motion.design_spectra import (
     Eurocode2024,
     FloorSpectrum,
     Ntc2018,
+    TableSpectrum,
     damping_correction,
     registered_spectra,
 )
@@ -101,9 +102,7 @@ class LimitState:
             words = f"the check is one of NTC, which was not made for a spectrum of {codes[0]}"
             remedy = "give limit_state with the rules of its code, or a spectrum of NTC-2018"
             found.append(Doubt(words, remedy))
-        base, tall = structure.above or 0.0, float(np.ptp(structure.ends[..., 1]))
-        above = foot - base * ({*codes} <= {"table"})
-        if above > HIGH_FOOT * (base + tall) and not isinstance(spectrum, FloorSpectrum):
+        if above := find_height_left_out(spectrum, structure, foot):
             words = "the spectrum is that of the ground, and {:.3g} m above it, at the foot of what"
             words += " moves, it is larger: each ratio is {}"
             remedy = 'give code = "floor" with height and storeys of the building'
@@ -405,6 +404,16 @@ def _check_place(
             f"{left:.4g} to {right:.4g} m, y from {low:.4g} to {high:.4g} m), above the "
             f"{near:.3g} m of {of}: correct its point, or name the block there"
         )
+
+
+def find_height_left_out(
+    spectrum: DesignSpectrum | Motion, structure: Structure, foot: float
+) -> float:
+    """Return how high a foot is above the ground of a spectrum [m], 0 where that matters little."""
+    base, tall = structure.above or 0.0, float(np.ptp(structure.ends[..., 1]))
+    is_of_foot = isinstance(spectrum, TableSpectrum | Motion)
+    above = 0.0 if isinstance(spectrum, FloorSpectrum) else foot - base * is_of_foot
+    return above * (above > HIGH_FOOT * (base + tall))
 
 
 def measure_blocks(*blocks: Block) -> float:

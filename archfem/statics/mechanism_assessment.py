@@ -61,6 +61,7 @@ from archfem.statics.assessment_checks import (
     check_assessable,
     describe_difference,
     describe_floor,
+    find_height_left_out,
     list_lower,
     peak_acceleration,
     place_spectrum,
@@ -645,6 +646,12 @@ class _Oscillator:
         return bool(self.searched or (self.opens and self.holds == 0))
 
     @property
+    def bounded(self) -> bool:
+        """Whether each ratio is an upper bound, also as the spectrum is larger at the foot."""
+        height = find_height_left_out(self.given.spectrum, self.placed.structure, self.foot)
+        return self.bounded_at_rest or height > 0.0
+
+    @property
     def doubts(self) -> list[Doubt]:
         """Why a ratio may be too high: another code's spectrum, a fill left out, other joints."""
         found = self.given.rules.doubt(self.given.spectrum, self.placed.structure, self.foot)
@@ -673,7 +680,7 @@ class _Oscillator:
         return AssessmentCheck(
             *(f"linear, q = {q:g}, FC = {confidence:g}", capacity, ground, "m/s²", ratio, np.nan),
             source,
-            bounded=self.bounded_at_rest,
+            bounded=self.bounded,
             floor=self.e_star * ratio if self.searched else None,
             amplified=describe_floor(self.spectrum),
         )
@@ -697,20 +704,10 @@ class _Oscillator:
             structure,
             self.spectrum,
             self.placed.direction,
-            alpha_0,
-            mass,
-            self.e_star,
-            a_0,
-            d_0,
-            secant,
-            curve,
+            *(alpha_0, mass, self.e_star, a_0, d_0, secant, curve),
             self.linear,
             displacement,
-            given.rules,
-            given.confidence_factor,
-            given.strength,
-            control,
-            path,
+            *(given.rules, given.confidence_factor, given.strength, control, path),
             tuple(self.notes(alpha_0)),
             tuple(self.doubts),
         )
@@ -732,4 +729,4 @@ class _Oscillator:
         given, curve = self.given, (self.curve["d"].values, self.curve["a"].values)
         check = given.rules.check(self.spectrum, given.confidence_factor, *curve)
         higher = not check.at_rest and bool(self.opens or doubt_stretches(self.stretches))
-        return replace(check, bounded=self.bounded_at_rest or higher)
+        return replace(check, bounded=self.bounded or higher)

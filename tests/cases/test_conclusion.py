@@ -752,6 +752,10 @@ def test_a_matched_suite_is_the_test_of_an_upper_bound_on_its_spectrum(change, o
     vars(data)["runs"] = {}
     tests = "an upper bound. Time histories with large displacements under motions of this spec"
     assert tests in head_of(conclusion.list_facts(data))
+    # the sense whose ratio is no bound says nothing more
+    left = ratios._replace(directions=["left"], bounded=False)
+    vars(data)["statements"] = {"assessment": state("assessment", linear, ratios, left)}
+    assert head_of(conclusion.list_facts(data)).count(both) == 1
 
 
 def test_rewording_a_sentence_changes_no_number_of_the_report(case):

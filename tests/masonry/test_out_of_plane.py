@@ -378,6 +378,7 @@ def test_a_column_above_a_level_doubts_the_spectrum_of_the_ground(tmp_path):
         found = af.kinematic_assessment(read.structure, af.Eurocode8(ag=0.1, ground="A"), q=1.5)
         said = [str(doubt) for doubt in found.doubts if "that of the ground" in str(doubt)]
         assert len(said) == doubted
+        assert [check.bounded for check in found.checks] == [doubted] * len(found.checks)
         assert all(
             "and 3 m above it, at the foot of what moves, it is larger" in x for x in said
         ), said

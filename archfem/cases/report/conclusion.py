@@ -221,7 +221,9 @@ def _say_plainly(data: ReportData, doubtful: Sequence[str]) -> Iterator[tuple[st
     checks = list_checks(data)
     failed = [check for check in checks if check.needed or check.least < 1.0]
     found = dict.fromkeys(margins.judge_check(data, check)[0] for check in failed or checks)
-    assessed = [f"by the kinematic assessment {words}" for words in found]
+    # of two senses one may say more than the other
+    longest = [x for x in found if sum(y.startswith(x) for y in found) == 1]
+    assessed = [f"by the kinematic assessment {words}" for words in longest]
     unchecked, overturns = _say_unchecked(data)
     answer, margin, depends, left = HEAD
     less = [(bool(data.runs) and x < 1.0, words) for x, words, _ in margins.say_less(data)]
