@@ -234,7 +234,9 @@ def test_tables_state_what_is_assessed(other, ring):
         assert (SENTENCE in table.splitlines()) == said
         assert (of_history(run).get("assessed") == SENTENCE) == said
         limit, assessment = SimpleNamespace(demand=None), SimpleNamespace(spectrum=None)
-        case = SimpleNamespace(structure=model.structure, suite=None, report={})
+        case = SimpleNamespace(
+            structure=model.structure, suite=None, report={}, settings={"structure": {}}
+        )
         case.limit, case.assessment, case.target = limit, assessment, None
         data = report_data.ReportData(case, {"one": run})
         vars(data)["motions"] = {}  # a run alone does not keep its motion
