@@ -447,7 +447,8 @@ def find_mechanism(
         found = classify_motion(blocks, joints, motion, dilates, contacts, factor)
         before, contacts = contacts, face_slips(blocks, contacts, motion)
         normals = np.array([[each.normal for each in some] for some in (before, contacts)])
-        if np.abs(np.cross(*normals)).max(initial=0.0) <= STILL:
+        (x, y), (u, v) = (np.reshape(own, (-1, 2)).T for own in normals)
+        if np.abs(x * v - y * u).max(initial=0.0) <= STILL:
             break
     return replace(found, is_flat=flat)
 
