@@ -65,9 +65,6 @@ class Row(NamedTuple):
 # Largest multiple of the forces of ties that is tried, and largest ratio of interest [-]
 MOST_TIED = 4.0
 
-# Outcome of a check by displacements that is passed at rest
-AT_REST = "for the mechanism does not begin to move"
-
 # Begin of a note on motions that are matched up to a shorter period than that of a check
 MATCHED = "the motions of the suite are matched from"
 
@@ -85,6 +82,7 @@ class Ratios(NamedTuple):
     bodies: float | None = None  # with one weight a body, where it is less
     bounded: bool = False  # whether they are upper bounds, by which it fails and does not pass
     floor: float | None = None  # with e* = 1, whatever moves at the same push
+    displaced: float | None = None  # of the values that are shown, of what passes at rest
 
     @property
     def name(self) -> str:
@@ -287,12 +285,14 @@ def state_assessments(
     rows, sentences = [], []
     for (text, _), (check, shown, ratios, directions) in checks.items():
         ways, outcome = " and ".join(directions), check.words
+        numbers = ratios._replace(directions=directions)
         if check.outcome == "passes" and check.at_rest:
-            outcome += f", {AT_REST}"
+            outcome += ", for the mechanism does not begin to move"
+            numbers = numbers._replace(displaced=shown.capacity / shown.demand)
         demand, capacity = (f"{x:.4g} {check.unit}" for x in (shown.demand, shown.capacity))
         capacity += f" {_OF_BODIES}" * (shown is not check and ratios.floor is None)
         demand += check.amplified
-        name, numbers = f"assessment: {check.name}, {ways}", ratios._replace(directions=directions)
+        name = f"assessment: {check.name}, {ways}"
         rows.append(Row(name, demand, f"{capacity}, {outcome}", str(ratios), numbers._asdict()))
         sentences += [f"kinematic assessment, {ways}: {text}"] if text in last else []
     sentences.append(describe_margin(found.values()))

@@ -301,7 +301,8 @@ def test_a_check_that_passes_at_rest_says_so():
     outcome = "0.11 m, passes, for the mechanism does not begin to move"
     factor = "1.5 until it moves (0.5 by displacements)"
     assert row[:4] == ("assessment: a code, right", "0.22 m", outcome, factor)
-    assert answers.Ratios(**row.numbers) == answers.Ratios("a code", ["right"], 1.5, 1.5, moved=0.5)
+    expected = answers.Ratios("a code", ["right"], 1.5, 1.5, moved=0.5, displaced=0.11 / 0.22)
+    assert answers.Ratios(**row.numbers) == expected
 
 
 def test_capacity_is_that_of_the_ratio_with_all_weight_in_motion_where_it_decides():

@@ -11,7 +11,7 @@ import numpy as np
 
 from archfem._files import group_of, read_file_list
 from archfem.cases import result_text
-from archfem.cases.answers import AT_REST, RESULTS, Ratios, Row, Statement, read_numbers
+from archfem.cases.answers import RESULTS, Ratios, Row, Statement, read_numbers
 from archfem.cases.case import REPORT_KEYS
 from archfem.cases.defaults import list_default_keys, list_materials_and_contacts
 from archfem.cases.report import margins
@@ -182,13 +182,11 @@ def _say_factor(data: ReportData, factor: float, kind: str) -> str:
     checks = read_numbers(Ratios, data.statements.get("assessment"))
     bounds += [check.decisive for check in checks if check.bounded]
     bounds += [least for least, words, _ in margins.say_less(data) if "≤" in words]
-    rows = data.statements["assessment"].rows if checks else []
     until = ""
-    for row, check in zip(rows, checks, strict=True):
-        if AT_REST in row.outcome and check.decisive == factor:
-            capacity, demand = (float(text.split()[0]) for text in (row.outcome, row.demand))
-            until = f" until it begins to move, {format_ratio(capacity / demand)} by displacements"
-            until += f" ({check.name})"
+    for check in checks:
+        if check.displaced is not None and check.decisive == factor:
+            by = f"{format_ratio(check.displaced)} by displacements ({check.name})"
+            until = f" until it begins to move, {by}"
     return f"{'at most ' * (factor in bounds)}{format_ratio(factor)} times {kind}{until}"
 
 
