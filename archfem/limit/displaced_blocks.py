@@ -443,13 +443,13 @@ def find_mechanism(
             factor, velocity = _solve_flat(*given, factor, forces[: len(contacts)])
         motion = bodies.spread(velocity)
         motion = motion / blocks.largest_speed(motion)
-        dilates = np.zeros(len(contacts)) if flat else coefficient
-        found = classify_motion(blocks, joints, motion, dilates, contacts, factor)
         before, contacts = contacts, face_slips(blocks, contacts, motion)
         normals = np.array([[each.normal for each in some] for some in (before, contacts)])
         (x, y), (u, v) = (np.reshape(own, (-1, 2)).T for own in normals)
         if np.abs(x * v - y * u).max(initial=0.0) <= STILL:
             break
+    dilates = np.zeros(len(contacts)) if flat else coefficient
+    found = classify_motion(blocks, joints, motion, dilates, contacts, factor)
     return replace(found, is_flat=flat)
 
 

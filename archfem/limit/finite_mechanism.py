@@ -48,7 +48,15 @@ from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import HasStructure, Structure, join_joint_names, structure_of
 
 # Share of the smaller of two neighbours that may overlap beside their joint [-]
-CHIPPED = 2e-3
+MAX_CHIP_SHARE = 2e-3
+
+# Multiples of the friction with which a path goes on where the given one just fails, and relative
+# change of the factor from which on this is no small correction [-]
+MORE_FRICTION = 1.02, 1.05, 1.1
+MAX_JUMP = 0.05
+
+# Multiples of the friction that select one of several mechanisms of equal factor [-]
+LESS_FRICTION = 0.99, 0.97, 0.94, 0.9
 
 
 class PathEnd(ExplainedWord):
@@ -315,7 +323,7 @@ class PathFollower:
             return
         # where several are of equal factor, less friction selects one of them, on the safe side
         found = None
-        for share in (1.0, 0.99, 0.97, 0.94, 0.9):
+        for share in (1.0, *LESS_FRICTION):
             with suppress(DidNotConverge, NoEquilibrium):
                 if found := find_mechanism(blocks, self.joints, share * self.friction, flat=True):
                     yield found
@@ -379,7 +387,7 @@ class PathFollower:
         """Return the mechanism of limit analysis at the present places."""
         # Where friction just fails, stones slip by little to a state that a little more would hold:
         # the path continues as the upper bound that `last_equilibrium` finds.
-        for share in (1.0, 1.02, 1.05, 1.1) if self.travel else (1.0,):
+        for share in (1.0, *MORE_FRICTION) if self.travel else (1.0,):
             try:
                 mechanism = find_mechanism(blocks, self.joints, share * self.friction, flat=flat)
             except NoEquilibrium:
@@ -389,7 +397,7 @@ class PathFollower:
                 continue
             if mechanism is None:
                 raise _Stop(PathEnd.LOCKS)
-            jumps = share > 1.0 and abs(mechanism.factor / self.factors[-1] - 1.0) > 0.05
+            jumps = share > 1.0 and abs(mechanism.factor / self.factors[-1] - 1.0) > MAX_JUMP
             if mechanism.factor <= 0.0 or jumps:
                 break
             return mechanism
@@ -490,7 +498,7 @@ class PathFollower:
         areas = np.array([block.area for block in structure.blocks])
         tolerated = np.zeros(2 * areas.shape)
         one, other = find_neighbours(found, 1e-3 * structure.size)
-        tolerated[one, other] = CHIPPED * np.minimum(areas[one], areas[other])
+        tolerated[one, other] = MAX_CHIP_SHARE * np.minimum(areas[one], areas[other])
         one, other = structure.pairs[np.flatnonzero(self.blocks.setback)].T
         tolerated[one, other] = tolerated[other, one] = np.inf
         return tolerated
