@@ -39,7 +39,7 @@ MAX_CASES = 24
 MIN_CHANGE = 0.1  # of a finding that is worth a sentence [-]
 MIN_STEP = 0.03  # from the extreme of a sweep to its neighbours, likewise
 MAX_NAMES = 4  # of cases in a sentence
-TIE = 1e-3  # relative difference of findings that are equal [-]
+MAX_TIE_DIFFERENCE = 1e-3  # of findings that are equal, as numbers with three digits are [-]
 
 # What cases are counted by, those that fail first, as verbs of one case and of several
 _COUNTED = {
@@ -161,7 +161,11 @@ class StudyFindings:
         for key in self.keys:
             kept = [each for each in self.keys if each not in (*tied, key)]
             same = rows[(rows[kept] == [row[each] for each in kept]).all(axis=1)]
-            if kept and same[key].nunique() > 1 and np.ptp(same[name]) <= TIE * abs(row[name]):
+            if (
+                kept
+                and same[key].nunique() > 1
+                and np.ptp(same[name]) <= MAX_TIE_DIFFERENCE * abs(row[name])
+            ):
                 tied.append(key)
         return tied
 
