@@ -23,7 +23,7 @@ STACK = {
     "record": {"fields_every": 4},
 }
 
-MESSAGE = r"{} was written by another version of archfem \(format '.*', not '.* 6'\): "
+MESSAGE = r"{} was written by another version of archfem \(format '.*', not '.* 7'\): "
 """Begin of the message, behind the name of the file."""
 
 READERS = {
@@ -34,7 +34,7 @@ READERS = {
 }
 """Readers of datasets, and the remedy, by the kind of file."""
 
-LAYOUTS = {6: "ec4684df1d9f6baf"}
+LAYOUTS = {7: "d297c2080c977e71"}
 """Digests of the names in result files, by the number of their format."""
 
 

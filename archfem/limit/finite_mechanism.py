@@ -50,8 +50,8 @@ from archfem.masonry.structure import HasStructure, Structure, join_joint_names,
 # Share of the smaller of two neighbours that may overlap beside their joint [-]
 MAX_CHIP_SHARE = 2e-3
 
-# Multiples of the friction with which a path goes on where the given one just fails, and relative
-# change of the factor from which on this is no small correction [-]
+# Multiples of the friction that continue a path where the given one barely fails, and relative
+# change of the factor beyond which this is no small correction [-]
 MORE_FRICTION = 1.02, 1.05, 1.1
 MAX_JUMP = 0.05
 
