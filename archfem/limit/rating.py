@@ -185,9 +185,8 @@ class Rating(ResultDisplay):
         """Whether it passes, and with which parts of a bridge alone."""
         if np.isnan(self.factor):
             return "does not stand under its own weight"
-        needed = self._needs() if self.passes else ""
         words = "passes" if self.passes else "fails"
-        return f"{words} only with {needed}" if needed else words
+        return f"{words} only with {self.needed}" if self.needed else words
 
     @property
     def headline(self) -> str:
@@ -223,8 +222,11 @@ class Rating(ResultDisplay):
             states |= {(*x, _HARD_STONES): self.crushing[key] for x, key in names.items()}
         return states
 
-    def _needs(self) -> str:
-        """Return the parts of fill and stones without which the bridge fails, in words."""
+    @property
+    def needed(self) -> str:
+        """Parts of fill and stones without which alone the bridge fails, in words; else ""."""
+        if not self.passes:
+            return ""
         if isinstance(self.fill, PlasticFill) and not self.by_pressure >= 1.0:
             return "the fill as a plastic body"
         cuts, states = list[tuple[str, ...]](), self._list_states()

@@ -14,6 +14,7 @@ from archfem.cases.answers import state_ratings
 from archfem.cases.result_text import ResultTable, doubt_rating, tabulate_ratings
 from archfem.limit import VEHICLES, Vehicle, rating
 from archfem.limit.rating import _places_along as places_along
+from archfem.models.model import Doubt
 from archfem.view.collapse import draw_ratings
 
 EXACT = 1e-6
@@ -252,6 +253,15 @@ def test_a_verdict_names_the_least_that_it_needs(lorry_rating, low, words):
     fill = replace(GRAVEL, backing=0.5)
     found = replace(lorry_rating, missing=(), fill=fill, crushing=crushing, **of_fill)
     assert replace(found, moving=moving).short_outcome == words
+
+
+@pytest.mark.parametrize(("without", "doubted"), [(0.9, True), (1.1, False)])
+def test_what_passes_with_the_pressure_of_the_fill_alone_is_in_doubt(lorry_rating, without, doubted):
+    moving = _scaled(lorry_rating.moving, 1.5 / lorry_rating.factor)
+    found = replace(lorry_rating, moving=moving, crushing={}, fill=GRAVEL, without_pressure=without)
+    remarks = doubt_rating(found, LimitAnalysis([], "coulomb", 1e7))
+    causes = [remark.cause for remark in remarks if isinstance(remark, Doubt)]
+    assert causes == ["the bridge passes only with the pressure of the fill"] * doubted
 
 
 def _scaled(moving, share):
