@@ -224,7 +224,6 @@ def _say_plainly(data: ReportData, doubtful: Sequence[str]) -> Iterator[tuple[st
     assessed = [f"by the kinematic assessment {words}" for words in longest]
     unchecked, overturns = _say_unchecked(data)
     answer, margin, depends, left = HEAD
-    less = [(bool(data.runs) and x < 1.0, words) for x, words, _ in margins.say_less(data)]
     if data.runs:
         failing = [*assessed * bool(failed), *unchecked * overturns]
         yield from ((answer, x) for x in _say_survival(data, doubtful, failing))
@@ -244,7 +243,8 @@ def _say_plainly(data: ReportData, doubtful: Sequence[str]) -> Iterator[tuple[st
             for row in stated.rows[:1]:
                 times = f", at {row.factor} times {row.demand}" * (row.factor != "-")
                 yield answer, f"{row.result}: {row.outcome}{times * (name != 'risk')}"
-    yield from ((answer if fails else margin, x) for fails, x in less if fails or not data.runs)
+    less = [words for x, words, _ in margins.say_less(data) if x < 1.0 or not data.runs]
+    yield from ((depends, words) for words in less)
     yield from [] if data.runs and overturns else ((left, x) for x in unchecked)
     yield from [(answer, ": ".join(data.other_plane))] if data.other_plane else []
 

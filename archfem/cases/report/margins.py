@@ -119,21 +119,21 @@ def build_transverse(data: ReportData) -> list[TextBlock]:
 
 
 def describe_margin(data: ReportData) -> Iterator[str]:
-    """Yield the factors on the demands of an earthquake, the least first, maybe as ranges."""
-    for k, (least, is_ranked, texts) in enumerate(rank_margins(data)):
-        rank = ("the least margin is ", "the next is ", "then follows ")[min(k, 2)] * is_ranked
-        stated = least < np.inf and (not data.runs or least < 1.0)  # a push or study, in the head
-        if not (k or is_ranked) and stated:
-            yield f"the least margin is {format_ratio(least)}, as said above"
-        yield from [*(f"{rank}{x}" for x in texts[:1]), *texts[1:]]
+    """Yield the factors on the demands of an earthquake: margins, the least first, then pushes."""
+    found = rank_margins(data)
+    ranks = "the least margin is ", "the next is ", "then follows "
+    for k, texts in enumerate(texts for _, is_margin, texts in found if is_margin):
+        yield f"{ranks[min(k, 2)]}{texts[0]}"
+        yield from texts[1:]
+    for texts in (texts for _, is_margin, texts in found if not is_margin):
+        yield from texts
 
 
 def rank_margins(data: ReportData) -> list[tuple[float, bool, list[str]]]:
     """Return what `list_margins` yields, the least first.
 
-    That at rest, if it counts, is among them where it is less than all. Where the least is across
-    the plane, the next stands in the same sentence. What the head states is counted and not
-    repeated.
+    That at rest, if it counts, is among them where it is less than all. Of what a push may overturn
+    across the plane, unchecked, the least is said to be in the plane.
     """
     margins = sorted(list_margins(data), key=lambda each: each[0])
     at_rest = list_margins_at_rest(data.case.structure, data.case.limit.strength)
@@ -144,20 +144,20 @@ def rank_margins(data: ReportData) -> list[tuple[float, bool, list[str]]]:
             left_out = say_loads_left_out(data.case)
             margins.insert(0, (*ranked, [f"{format_ratio(factor)} at rest, of {of}{left_out}"]))
     push, demand = find_unchecked_push(data) or (np.nan, 0.0)
-    if margins and push < demand * margins[0][0]:
-        across = f"{push / demand:.3g} across the plane of the drawing, which was not checked"
-        _, is_ranked, texts = margins[0]
-        first = "; ".join([across, *("in it " * is_ranked + x for x in texts[:1])])
-        margins[: bool(texts)] = [(push / demand, True, [first, *texts[1:]])]
+    for factor, _, texts in [each for each in margins if each[1]][:1]:
+        if push < demand * factor:
+            texts[0] += "; it is of the plane of the drawing alone"
     return margins
 
 
 def list_margins(
     data: ReportData, *, across: bool = True
 ) -> Iterator[tuple[float, bool, list[str]]]:
-    """Yield factors on demands with their sentences, and whether they lack a subject and verb.
+    """Yield factors on demands, whether they are margins, and sentences.
 
-    A push that is no margin has an infinite one.
+    The first sentence of a margin lacks its subject and verb. To move by a push is no collapse, and
+    a study is of other properties: neither is a margin. A push below which it moves has an infinite
+    factor.
     """
     checks = read_numbers(Ratios, data.statements.get("assessment"))
     for least, texts in sorted(_describe_check(data, each) for each in checks)[:1]:
