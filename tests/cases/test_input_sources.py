@@ -132,6 +132,18 @@ def test_cases_that_differ_in_a_source_show_it_in_their_columns():
     assert ("radius", "2.95 m", "given (survey of May 2026)") in same.rows
 
 
+def test_more_cases_than_a_page_is_broad_have_a_row_for_each_value():
+    tables = {label: tables_with({}) for label in "ABCDE"}
+    tables["B"]["structure"] = tables["D"]["structure"] = {**tables["B"]["structure"], "width": 2.0}
+    data = {label: ReportData(af.Case.of(each), {}) for label, each in tables.items()}
+    _, differing = compare_inputs(data)
+    first = f"{data['A'].case.structure.width:g} m"
+    assert [row[2] for row in differing.rows if row[1].startswith((first, "2 m"))] == [
+        "A, C and E",
+        "B and D",
+    ]
+
+
 def test_inputs_of_one_case_alone_stand_in_a_table_without_columns_of_the_others():
     cases = {label: tables_with({}) for label in "ABC"}
     del cases["A"]["motion"], cases["B"]["motion"]

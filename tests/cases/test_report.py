@@ -711,6 +711,18 @@ def test_the_lengths_of_a_wall_are_named_by_its_plane(undrawn):
         assert words in text
 
 
+def test_a_wall_that_leans_is_as_thick_as_its_beds_are_deep(undrawn):
+    outlines = [
+        [[0.1 * y + x, y] for x, y in ((0.0, low), (0.5, low), (0.5, low + 1.0), (0.0, low + 1.0))]
+        for low in (-1.0, 0.0, 1.0)
+    ]
+    blocks = [{"outline": each, "fixed": each == outlines[0]} for each in outlines]
+    settings = {"structure": {"shape": "blocks", "blocks": blocks, "above": 0.0, "width": 3.0}}
+    data = report_data.ReportData(af.Case.of(settings), {})
+    text = build_structure_section(data).pieces[0].text
+    assert text.startswith("0.5 m thick, 2 m high and 3 m long; ")
+
+
 def test_materials_that_differ_in_weight_alone_stand_once(unlike_weights, unplotted):
     tables = {**unlike_weights, "model": {"fidelity": "rigid"}}
     data, weights = report_data.ReportData(af.Case.of(tables), {}), tables["materials"]

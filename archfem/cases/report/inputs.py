@@ -39,7 +39,7 @@ from archfem.masonry.loads import AttachedLoad
 from archfem.masonry.materials import Contact, Material
 from archfem.masonry.out_of_plane import find_openings
 from archfem.masonry.shapes.bridge_parts import Backfill
-from archfem.masonry.structure import Structure, describe_piers, find_clear_spans
+from archfem.masonry.structure import Structure, describe_piers, find_clear_spans, join_words
 from archfem.motion.design_spectra import CodeSpectrum
 from archfem.statics.mechanism_assessment import kinematic_assessment
 from archfem.statics.pushover import pushover
@@ -54,6 +54,9 @@ _FUNCTIONS: dict[str, Callable[..., Any]] = {
     "pushover": pushover,
     "assessment": kinematic_assessment,
 }
+
+# Most cases whose inputs stand side by side; a page cuts more off
+MAX_CASES_ABREAST = 4
 
 # Arguments of shapes that have rows of their own, or no influence
 _OWN_ROWS = {"width", "gravity", "name"}
@@ -126,10 +129,22 @@ def compare_inputs(parts: Mapping[str, ReportData]) -> list[Grid]:
         else:
             texts = ("; ".join(map(_join_mark, rows)) for rows in own.values())
             differing.append((quantity, *(text or "-" for text in texts)))
-    several = Grid(("", *parts), differing, "Inputs that differ between the cases", "words")
+    head = ["", *parts]
+    if len(parts) > MAX_CASES_ABREAST:
+        head, differing = ["", "", "cases"], [*_list_values(differing, [*parts])]
+    several = Grid(head, differing, "Inputs that differ between the cases", "words")
     alone.sort(key=lambda row: [*parts].index(row[0]))
     single = Grid(("case", "", "", ""), alone, "Inputs of one case alone", "words")
     return [each for each in (Grid((), same, _CAPTION), several, single) if each.rows]
+
+
+def _list_values(rows: Sequence[Sequence[str]], labels: Sequence[str]) -> Iterator[Sequence[str]]:
+    """Yield each value of a quantity in a row of its own, with the cases that have it."""
+    for quantity, *texts in rows:
+        for text in dict.fromkeys(texts):
+            having = [label for label, own in zip(labels, texts, strict=True) if own == text]
+            yield quantity, text, join_words(having)
+            quantity = ""  # of the rows below too
 
 
 def _join_mark(row: Sequence[str]) -> str:

@@ -47,7 +47,7 @@ from archfem.masonry.materials import COURSE_LENGTH
 from archfem.masonry.structure import Structure, join_names, join_words
 from archfem.motion.record_selection import SELECTION_RULES
 from archfem.statics.assessment_checks import LIMIT_STATES, LimitState
-from archfem.units import MPa, format_mm, kN
+from archfem.units import Ends, MPa, format_mm, kN
 from archfem.view.pages.document import FigureBlock, Grid, Section, TextBlock
 from archfem.view.structure import (
     draw_dimensions,
@@ -253,11 +253,12 @@ def _describe_extent(structure: Structure) -> str:
     # the ground is no part of its size
     moving = [structure.blocks[number] for number in structure.free]
     length, height = np.ptp(np.concatenate([block.drawn() for block in moving]), axis=0)
-    # the width of a wall is its thickness, that of a column across its plane its length
-    along, width = ("thick", "long") if structure.above is not None else ("long", "wide")
-    width = "thick" if structure.heads.any() else width
+    along, width = f"{length:.3g} m long", "thick" if structure.heads.any() else "wide"
+    if structure.above is not None:  # across the plane of a wall, which may lean
+        depths = Ends.of(joint.depth for joint in structure.joints)
+        along, width = f"{depths:.3g} m thick", "long"
     text = (
-        f"{length:.3g} m {along}, {height:.3g} m high and {structure.width:g} m {width}; "
+        f"{along}, {height:.3g} m high and {structure.width:.4g} m {width}; "
         f"{len(moving)} blocks that can move, weighing {structure.weight / kN:.4g} kN, and "
         f"{len({*structure.face_names})} joints."
     )
