@@ -716,7 +716,8 @@ def test_a_wall_that_leans_is_as_thick_as_its_beds_are_deep(undrawn):
         [[0.1 * y + x, y] for x, y in ((0.0, low), (0.5, low), (0.5, low + 1.0), (0.0, low + 1.0))]
         for low in (-1.0, 0.0, 1.0)
     ]
-    blocks = [{"outline": each, "fixed": each == outlines[0]} for each in outlines]
+    named = [{"name": f"{k}", "outline": each} for k, each in enumerate(outlines)]
+    blocks = [{**named[0], "fixed": True}, *named[1:]]
     settings = {"structure": {"shape": "blocks", "blocks": blocks, "above": 0.0, "width": 3.0}}
     data = report_data.ReportData(af.Case.of(settings), {})
     text = build_structure_section(data).pieces[0].text
