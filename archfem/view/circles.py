@@ -58,7 +58,7 @@ def draw_circle_fit(curves: Structure | Mapping[str, Array]) -> Figure:
         below.plot(np.degrees(angles), circle.distances / mm, **look)
         reach = max(reach, 1.1 * float(np.abs(circle.distances).max()) / mm)
     below.set_ylim(-reach, reach)
-    style.add_legend_below(figure, 2, handles=above.get_legend_handles_labels()[0])
+    style.add_legend_below(figure, 2)
     return figure
 
 

@@ -25,7 +25,7 @@ from archfem.limit.rating import Rating
 from archfem.limit.vehicles import MovingLoad
 from archfem.masonry.loads import PointLoad
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
-from archfem.masonry.structure import Structure, rigid_motion_matrix
+from archfem.masonry.structure import Structure
 from archfem.statics.assessment_checks import UPPER_BOUND, AssessmentCheck
 from archfem.statics.mechanism_assessment import KinematicAssessment
 from archfem.view import style
@@ -59,15 +59,13 @@ def _draw_mechanism(axes: Axes, structure: Structure, found: Collapse, factors: 
     if found.fill_motion is not None:
         _draw_fill(axes, structure, found)
     elif found.soil is not None and found.soil["backed"].any():
-        _hatch_backing(
-            axes, structure, float(found.soil["y"].values[found.soil["backed"].values].max())
-        )
+        levels = found.soil["y"].values[found.soil["backed"].values]
+        _hatch_backing(axes, structure, float(levels.max()))
     if found.motion.any():
         motion = scale_motion(structure, found.motion)
         dilates = " with dilatancy" * (found.outcome is Outcome.BRACKETED)
         _draw_motion(axes, outline_moving_blocks(structure, motion), f"mechanism{dilates}")
-        # on the undeformed joints, whose x is that of the text
-        _mark_hinges(axes, structure, found, 0.0 * motion, {"label": "hinge", "ms": 7.5})
+        _mark_hinges(axes, structure, found, label="hinge", ms=7.5)
         _mark_sliding(axes, structure, found.sliding)
     # limit analysis counts the joints of all stones
     soft = set(find_yielding_blocks(structure))
@@ -102,15 +100,8 @@ def _draw_fill(axes: Axes, structure: Structure, found: Collapse) -> None:
     pressure = soil["pressure"].values / max(float(soil["pressure"].max()), 1e-300)
     tips = ends - structure.size / 12.0 * pressure[..., None] * outward
     faces = np.concatenate([ends, tips[:, ::-1]], axis=1)
-    axes.add_collection(
-        PolyCollection(
-            faces,
-            facecolors="none",
-            edgecolors=Colour.GREY,
-            linewidths=0.5,
-            label="pressure of the fill",
-        )
-    )
+    look: dict[str, Any] = {"edge": Colour.GREY, "width": 0.5, "label": "pressure of the fill"}
+    style.add_polygons(axes, list(faces), "none", **look)
 
 
 def _hatch_backing(axes: Axes, structure: Structure, level: float) -> None:
@@ -175,9 +166,8 @@ def draw_ratings(ratings: Sequence[Rating]) -> Figure:
     """
     drawn = ratings[: len(Colour.LINES)]
     structure, factors_of = drawn[0].structure, [found.factor for found in drawn]
-    top = max(
-        4.0 * max(1.0, min(factors_of)), 1.5 * max(filter(np.isfinite, factors_of), default=1)
-    )
+    largest = max(filter(np.isfinite, factors_of), default=1)
+    top = max(4.0 * max(1.0, min(factors_of)), 1.5 * largest)
     figure = style.new_figure(Size.PAGE, 2.8)
     upper = figure.subplots()
     for k, found in enumerate(drawn):
@@ -218,9 +208,9 @@ def draw_worst_places(ratings: Sequence[Rating]) -> Figure:
         axes.get_legend().remove()
         axes.set_axis_off()
         style.set_title(axes, f"{found.label}: {found.factor:.3g}")
-    labelled = {x.get_label(): x for axes in rows for x in axes.get_legend_handles_labels()[0]}
     # the size of the loads is another one in each panel
-    kept = [handle for label, handle in labelled.items() if not label.startswith("live load")]
+    every = {x.get_label(): x for axes in rows for x in axes.get_legend_handles_labels()[0]}
+    kept = [handle for label, handle in every.items() if not label.startswith("live load")]
     style.add_legend_below(figure, handles=kept)
     return figure
 
@@ -288,14 +278,12 @@ def _draw_factors(
     draw_structure(structure, axes=lower)
     _draw_mechanism(lower, structure, worst, factors)
     if np.isfinite(worst.factor):
-        style.set_title(
-            lower, f"{structure.name}: a mechanism at {worst.factor:.3g} ×{factors} {load}"
-        )
+        words = f"a mechanism at {worst.factor:.3g} ×{factors} {load}"
+        style.set_title(lower, f"{structure.name}: {words}")
     _mark_strips(lower, structure, strips)
     # below both panels: arrows may stand anywhere in the lower one
     lower.get_legend().remove()
-    handles = [axes.get_legend_handles_labels()[0] for axes in (upper, lower)]
-    style.add_legend_below(figure, handles=[*handles[0], *handles[1]])
+    style.add_legend_below(figure)
     margin = 0.03 * np.ptp(ends)
     lower.set_xlim(ends.min() - margin, ends.max() + margin)
     return figure
@@ -343,8 +331,7 @@ def draw_kinematic_assessment(found: KinematicAssessment) -> Figure:
     _draw_displaced_mechanism(left, found)
     _draw_capacity_curve(right, found)
     # in the panels it would lie on curves
-    handles = [axes.get_legend_handles_labels()[0] for axes in (left, right)]
-    style.add_legend_below(figure, 3, handles=[*handles[0], *handles[1]])
+    style.add_legend_below(figure, 3)
     return figure
 
 
@@ -361,8 +348,7 @@ def _draw_displaced_mechanism(axes: Axes, found: KinematicAssessment) -> None:
         blocks = path.blocks.moved(path.displacements[place])
         moved = [k for k in structure.free if np.abs(path.displacements[place, k]).max() > 1e-9]
         _draw_motion(axes, [blocks.outlines[k] for k in moved], "mechanism at the capacity")
-    rest = np.zeros((len(structure.blocks), 3))
-    _mark_hinges(axes, structure, found, rest, {"label": "hinge at rest", "ms": 6.5})
+    _mark_hinges(axes, structure, found, label="hinge at rest", ms=6.5)
     _mark_sliding(axes, structure, found.sliding)
     _draw_ties(axes, path.blocks)
     style.set_title(axes, f"alpha_0 = {found.alpha_0:.3f}, e* = {found.e_star:.2f}")
@@ -465,26 +451,17 @@ def _draw_motion(axes: Axes, outlines: Sequence[Array], label: str) -> None:
 
 
 def _mark_hinges(
-    axes: Axes,
-    structure: Structure,
-    found: Collapse | KinematicAssessment,
-    motion: Array,
-    look: dict[str, Any],
+    axes: Axes, structure: Structure, found: Collapse | KinematicAssessment, **look: Any
 ) -> None:
-    """Mark each hinge that turns visibly, where its blocks stay in contact, displaced."""
-    points, pairs = [], structure.pairs[[number for number, _ in found.hinges]]
+    """Mark each hinge that turns visibly, as built, where its blocks stay in contact."""
+    if not found.hinges:
+        return
+    numbers, sides = zip(*found.hinges, strict=True)
     velocity = found.motion if isinstance(found, Collapse) else found.path.velocity
-    turns = np.abs(np.diff(velocity[pairs, 2], axis=1))[:, 0]
-    for (number, side), turn in zip(found.hinges, turns, strict=True):
-        if turn < LEAST_TURN * turns.max():
-            continue
-        joint = structure.joints[number]
-        end = joint.ends[0 if side == "intrados" else 1]
-        matrix = rigid_motion_matrix(end[None, :], structure.blocks[joint.lower].centroid)[0]
-        points.append(end + matrix @ motion[joint.lower])
-    if points:
-        look = {"mfc": Colour.HINGE, "mec": "white", "mew": 0.8, "zorder": 6} | look
-        axes.plot(*np.array(points).T, "o", **look)
+    turns = np.abs(np.diff(velocity[structure.pairs[[*numbers]], 2], axis=1))[:, 0]
+    points = structure.ends[[*numbers], [int(side != "intrados") for side in sides]]
+    look |= {"mfc": Colour.HINGE, "mec": "white", "mew": 0.8, "zorder": 6}
+    axes.plot(*points[turns >= LEAST_TURN * turns.max()].T, "o", **look)
 
 
 def _mark_sliding(axes: Axes, structure: Structure, joints: Sequence[int]) -> None:

@@ -322,7 +322,7 @@ def _finish_panels(
     if len(panels) == 1:
         style.add_legend(first)
     else:
-        style.add_legend_below(figure, 8, handles=first.get_legend_handles_labels()[0])
+        style.add_legend_below(figure, 8)
     notes = {label: describe_assessed_joints(several[0]) for label, several in states.items()}
     style.add_note(figure, notes)
     return figure
@@ -398,9 +398,8 @@ def draw_joint(runs: Mapping[str, History], joint: str | int) -> Figure:
         for axes in column:
             axes.set_xlim(run.time[0], run.time[-1])
             axes.label_outer()
-    style.add_note(
-        figure, {label: describe_assessed_joints(run.joints) for label, run in runs.items()}
-    )
+    notes = {label: describe_assessed_joints(run.joints) for label, run in runs.items()}
+    style.add_note(figure, notes)
     return figure
 
 

@@ -77,7 +77,7 @@ def draw_spectra(motions: Sequence[Motion], *, damping: float = 0.05) -> Figure:
                 _draw_spectrum(axis, values, index, motion.name, width=1.0)
         alone = name == "horizontal" and any(len(motion.components) == 1 for motion in motions)
         _label_panel(axis, "horizontal or only component" if alone else name)
-    _add_common_legend(figure, axes)
+    style.add_legend_below(figure)
     return figure
 
 
@@ -154,7 +154,7 @@ def draw_suite(suite: Suite, target: DesignSpectrum | None = None) -> Figure:
         _label_panel(axis, name)
         _mark_matched_periods(axis, suite)
     _set_suite_title(figure, suite)
-    _add_common_legend(figure, axes)
+    style.add_legend_below(figure)
     return figure
 
 
@@ -220,12 +220,6 @@ def _tabulate(spectrum: Callable[[Array], Array]) -> Array:
         except InvalidInput:  # a tabulated spectrum ends at some period, and may lack a vertical
             continue
     return np.array(points).reshape(-1, 2).T
-
-
-def _add_common_legend(figure: Figure, axes: Sequence[Axes]) -> None:
-    """Explain the lines below all panels; the first panel has a line of every motion."""
-    handles, _ = axes[0].get_legend_handles_labels()
-    style.add_legend_below(figure, handles=handles)
 
 
 def _panels(count: int) -> tuple[Figure, Sequence[Axes]]:

@@ -96,9 +96,8 @@ def _draw_layers(axes: Axes, closed: Sequence[Outline], scale: float) -> None:
         points = outline.drawn
         room = scale * float(np.ptp(points[:, 0]))
         names = (outline.name, outline.name.removeprefix(outline.layer).strip(), str(number))
-        text = next(
-            (t for t in names if t and style.text_width(len(t), Size.NOTE) < room), names[-1]
-        )
+        fitting = (t for t in names if t and style.text_width(len(t), Size.NOTE) < room)
+        text = next(fitting, names[-1])
         look = {"ha": "center", "va": "center", "zorder": 6, "path_effects": style.white_halo(1.5)}
         style.annotate(axes, text, points.mean(axis=0), fontsize=Size.NOTE, **look)
 
@@ -107,14 +106,12 @@ def _mark_faults(axes: Axes, faults: Sequence[Array], kind: str) -> None:
     """Fill faults, and draw a ring around each, which may be too narrow to be seen."""
     if not faults:
         return
-    colour = FAULT_COLOURS[kind]
+    colour, label = FAULT_COLOURS[kind], f"{kind} ({len(faults)})"
     if kind == CLOSED_BY_SNAP:
-        style.add_polygons(
-            axes, faults, colour, edge=colour, zorder=5, label=f"{kind} ({len(faults)})"
-        )
+        style.add_polygons(axes, faults, colour, edge=colour, zorder=5, label=label)
         return
     # what is below a stone drawn twice stays visible
     style.add_polygons(axes, faults, f"{colour}80", edge=colour, width=1.5, zorder=5)
     places = np.array([fault.mean(axis=0) for fault in faults])
     look = {"mfc": "none", "mec": colour, "ms": 13.0, "mew": 1.6, "ls": "", "zorder": 7}
-    axes.plot(*places.T, "o", label=f"{kind} ({len(faults)})", **look)
+    axes.plot(*places.T, "o", label=label, **look)

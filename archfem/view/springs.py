@@ -47,9 +47,8 @@ def draw_mesh(model: Model, block: int | str | None = None) -> Figure:
     figure = style.new_figure(wide, high + 3.2)
     above, below = figure.subplots(2, 1, height_ratios=[high, 3.0])
     # at least 1.2 points on the page
-    gap = max(
-        1.2 / 72.0 / style.drawing_scale(structure), 0.08 * float(np.median(structure.depths))
-    )
+    least = 1.2 / 72.0 / style.drawing_scale(structure)
+    gap = max(least, 0.08 * float(np.median(structure.depths)))
     _draw_cells(above, model, _part_at_joints(model, gap))
     above.autoscale_view()
     count = len(model.cells.polygons)
@@ -61,16 +60,14 @@ def draw_mesh(model: Model, block: int | str | None = None) -> Figure:
     _draw_cells(below, model, shifts)
     springs = _spring_lines(model, np.flatnonzero(np.isin(points.joint, joints)), shifts)
     look = {"colors": Colour.HINGE, "linewidths": 0.8, "zorder": 4, "gid": "springs"}
-    below.add_collection(
-        LineCollection(list(springs), label="spring at a point of a joint", **look)
-    )
+    look["label"] = "spring at a point of a joint"
+    below.add_collection(LineCollection(list(springs), **look))
     (left, low), (right, top) = outline.min(axis=0), outline.max(axis=0)
     margin = 0.5 * max(right - left, top - low)
     below.set(xlim=(left - 2.5 * margin, right + 2.5 * margin), ylim=(low - margin, top + margin))
-    style.set_title(
-        below, f"{structure.blocks[number].name}, joints drawn open by {1e3 * gap:.0f} mm"
-    )
-    style.add_legend_below(figure, handles=below.get_legend_handles_labels()[0])
+    name = structure.blocks[number].name
+    style.set_title(below, f"{name}, joints drawn open by {1e3 * gap:.0f} mm")
+    style.add_legend_below(figure)
     return figure
 
 
@@ -158,10 +155,8 @@ def draw_spring_forces(dead: Equilibrium, block: int | str) -> Figure:
     points, structure = _joint_points(dead.model), dead.model.structure
     assert dead.model.operator is not None  # checked with its points
     # tractions are positive in tension
-    forces, number = (
-        0.0 - dead.model.operator.point_forces(dead.q)[0],
-        structure.block_number(block),
-    )
+    forces = 0.0 - dead.model.operator.point_forces(dead.q)[0]
+    number = structure.block_number(block)
     joints = [k for k, joint in enumerate(structure.joints) if number in joint.blocks]
     largest = float(np.abs(forces[np.isin(points.joint, joints)]).max(initial=0.0))
     if largest == 0.0:

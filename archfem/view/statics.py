@@ -162,9 +162,8 @@ class ModePanel:
         self._places, self._blocks = cells.places, DisplacedBlocks(axes, modes.model)
         frequency, (x, y) = modes.frequencies[number - 1], 100.0 * modes.mass_ratios[number - 1]
         local = ", local" if modes.local[number - 1] else ""
-        title = (
-            f"mode {number}: {frequency:.2f} Hz{local}\neffective mass: x {x:.0f} %, y {y:.0f} %"
-        )
+        masses = f"effective mass: x {x:.0f} %, y {y:.0f} %"
+        title = f"mode {number}: {frequency:.2f} Hz{local}\n{masses}"
         axes.set_title(title, fontsize=Size.LABEL, color=Colour.TEXT)
 
     def show_phase(self, factor: float) -> None:

@@ -163,9 +163,8 @@ def draw_backbones(
         draw_blocks(axes, structure)
         _draw_backbone(axes, structure, run.joints, dead.get(label))
         first, last = run.time[[0, -1]]
-        style.set_title(
-            axes, f"{label or structure.name}: thrust lines from {first:.4g} to {last:.4g} s"
-        )
+        title = f"thrust lines from {first:.4g} to {last:.4g} s"
+        style.set_title(axes, f"{label or structure.name}: {title}")
         axes.autoscale_view()
     _explain_panels(figure, {label: run.joints for label, run in runs.items()})
     return figure
@@ -216,15 +215,10 @@ def _lay_out_below(structures: Sequence[Structure]) -> tuple[Figure, Sequence[Ax
 
 def _explain_panels(figure: Figure, joints: Mapping[str, xr.Dataset]) -> None:
     """Add one legend for the marks of all panels, and a note on the joints that are assessed."""
-    marks: dict[str, Any] = {}
-    for axes in figure.axes:
-        handles, names = axes.get_legend_handles_labels()
-        marks |= dict(zip(names, handles, strict=True))
-    if marks:
-        style.add_legend_below(figure, handles=list(marks.values()))
-    style.add_note(
-        figure, {label: describe_assessed_joints(each) for label, each in joints.items()}
-    )
+    if any(axes.get_legend_handles_labels()[0] for axes in figure.axes):
+        style.add_legend_below(figure)
+    notes = {label: describe_assessed_joints(each) for label, each in joints.items()}
+    style.add_note(figure, notes)
 
 
 def title_at_instant(name: str, joints: xr.Dataset | None) -> str:
@@ -411,19 +405,15 @@ def draw_dimensions(axes: Axes, structure: Structure) -> None:
     away = 0.06 * max(right - left, top - bottom)
     look: dict[str, Any] = {"arrowstyle": "<->", "color": Colour.TEXT, "lw": 0.7, "shrinkA": 0}
     look["shrinkB"] = 0
+    text: dict[str, Any] = {"fontsize": Size.NOTE, "ha": "center", "va": "center"}
+    text["bbox"] = {"fc": "white", "ec": "none", "pad": 1.0}
     for one, other, turn in (
         ((left, top + away), (right, top + away), 0.0),
         ((right + away, bottom), (right + away, top), 90.0),
     ):
         axes.annotate("", one, other, arrowprops=look)
         (x, y), size = 0.5 * np.add(one, other), max(np.subtract(other, one))
-        text: dict[str, Any] = {
-            "fontsize": Size.NOTE,
-            "rotation": turn,
-            "ha": "center",
-            "va": "center",
-        }
-        axes.text(x, y, f"{size:.3g} m", bbox={"fc": "white", "ec": "none", "pad": 1.0}, **text)
+        axes.text(x, y, f"{size:.3g} m", rotation=turn, **text)
 
 
 def _keep_apart(texts: Sequence[Text]) -> None:
@@ -447,19 +437,14 @@ def _number_stones(axes: Axes, structure: Structure, part: str, inch: float, sig
         numbers, points = np.array(numbers)[room].tolist(), points[room]
     fitting = float(points.min())
     every = max(1, int(np.ceil(Size.NOTE / fitting)))
-    look: dict[str, Any] = {"ha": "center", "va": "center", "zorder": 8, "color": Colour.TEXT}
-    look["fontsize"] = Size.NOTE
+    look: dict[str, Any] = {"ha": "center", "va": "center", "zorder": 8, "fontsize": Size.NOTE}
     for number in numbers[::every]:
         style.annotate(axes, f"{sign}{number}", structure.centroids[number], (0.0, 0.0), **look)
 
 
 def _name_part(axes: Axes, joints: Sequence[Joint], inch: float, top: float) -> None:
     """Write the names of a part and of its joints, as many as fit in legible type below a top."""
-    look: dict[str, Any] = {
-        "color": Colour.TEXT,
-        "zorder": 8,
-        "path_effects": style.white_halo(1.6),
-    }
+    look: dict[str, Any] = {"zorder": 8, "path_effects": style.white_halo(1.6)}
     outward = -np.array([joint.tangent for joint in joints])
     # names stand upright in an opening, where they are nearer to one another than joints
     places = np.array([joint.ends[0] for joint in joints]) + Size.NOTE / 72.0 * inch * outward
@@ -558,9 +543,8 @@ def draw_critical(structure: Structure, run: History, model: Model | None = None
             style.structure_axes(structure, axes)
     draw_during(structure, run, joints, model, first)
     _draw_peak(last, structure, run, run.joints.sel(time=time, method="nearest"))
-    handles = {x.get_label(): x for a in (first, last) for x in a.get_legend_handles_labels()[0]}
     first.get_legend().remove()
-    style.add_legend_below(figure, handles=list(handles.values()))
+    style.add_legend_below(figure)
     return figure
 
 
@@ -575,9 +559,8 @@ def _draw_peak(axes: Axes, structure: Structure, run: History, joints: xr.Datase
     displaced = np.split(places + by * moved, np.flatnonzero(np.diff(block)) + 1)
     style.add_polygons(axes, outlines, "none", edge=Colour.UNDEFORMED, width=0.6, zorder=0)
     style.add_polygons(axes, displaced, block_colours(structure), gid="blocks")
-    draw_marks(
-        axes, joint_marks(structure, joints, shift=by * positions.peak_joint_ends(structure, run))
-    )
+    shift = by * positions.peak_joint_ends(structure, run)
+    draw_marks(axes, joint_marks(structure, joints, shift=shift))
     scale = "" if by == 1.0 else f", displacements × {by:g}"
     style.set_title(axes, title_at_instant("largest displacement", joints) + scale)
     _clip_to_stones(axes, structure, places + by * moved, block)

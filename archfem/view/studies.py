@@ -570,7 +570,7 @@ def draw_verdict_range(verdicts: VerdictRange) -> Figure:
         if falls.any():
             axes.axhline(top, color=Colour.GREY, lw=0.9, ls="--")
         axes.set(yscale="log", ylim=(0.7e-3 * top, 4.0 * top))
-    style.add_legend_below(figure, 3, handles=panels[0].get_legend_handles_labels()[0])
+    style.add_legend_below(figure, 3)
     shares_of = "; shares are of the variance of the outcome" * verdicts.is_mixed
     style.set_figure_title(figure, verdicts.headline + shares_of)
     return figure

@@ -286,10 +286,14 @@ def add_polygons(
 
 
 def add_legend_below(figure: Figure, columns: int = 4, **options: Any) -> None:
-    """Add a legend below all panels of a figure, of at most so many columns."""
-    options = {"frameon": False, "fontsize": Size.LABEL} | options
-    handles = [h for axes in figure.axes for h in axes.get_legend_handles_labels()[0]]
-    labels = [str(handle.get_label()) for handle in options.get("handles", handles)]
+    """Add a legend below all panels, what several have once, of at most so many columns."""
+    handles = list[Artist]()
+    for axes in figure.axes:
+        known = {handle.get_label() for handle in handles}
+        own = axes.get_legend_handles_labels()[0]
+        handles += [handle for handle in own if handle.get_label() not in known]
+    options = {"frameon": False, "fontsize": Size.LABEL, "handles": handles} | options
+    labels = [str(handle.get_label()) for handle in options["handles"]]
     columns = min(columns, legend_columns(labels, figure.get_figwidth()))
     figure.legend(loc="outside lower center", ncols=columns, **options)
 
