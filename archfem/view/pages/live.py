@@ -126,16 +126,9 @@ def describe_arch(structure: Structure, thrust: Array | None = None) -> dict[str
     structure = with_sliding_joints(structure)
     simulation = RigidBlockSimulation(structure)
     parameters, _ = prepare_steps(simulation, TRIED_STEPS[0])
-    joints = [
-        {"blocks": pair, "ends": ends, "friction": friction, "cohesion": cohesion}
-        for pair, ends, friction, cohesion in zip(
-            structure.pairs.tolist(),
-            structure.ends.tolist(),
-            structure.friction.tolist(),
-            structure.cohesion.tolist(),
-            strict=True,
-        )
-    ]
+    of_joints = {key: getattr(structure, key).tolist() for key in ("ends", "friction", "cohesion")}
+    columns = {"blocks": structure.pairs.tolist(), **of_joints}
+    joints = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
     values = simulation.bodies._asdict().items()
     has_thrust = thrust is not None and bool(np.isfinite(thrust).all())
     return {

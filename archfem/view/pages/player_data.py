@@ -23,17 +23,8 @@ from archfem.joints.criteria import assessed_joints, describe_assessed_joints, s
 from archfem.masonry.block import Block
 from archfem.masonry.structure import Structure, rigid_motion_matrix
 from archfem.models.model import Model, check_coordinate_count, check_model
+from archfem.view import positions
 from archfem.view.joint_marks import DRAWN_DISPLACEMENT, joint_pairs, round_magnification
-from archfem.view.positions import (
-    FallingBlocks,
-    block_kinds,
-    first_motion_instant,
-    ground_acceleration,
-    peak_displacements,
-    peak_instant,
-    peak_joint_ends,
-    recorded_fields,
-)
 
 # Default size of the packed part of a player [bytes]
 MAX_PACKED_BYTES = 3_000_000
@@ -167,16 +158,16 @@ class Scene:
         return Outlines(self.structure)
 
     @cached_property
-    def falls(self) -> FallingBlocks | None:
+    def falls(self) -> positions.FallingBlocks | None:
         """Positions of loose blocks; None if no block came loose."""
-        return FallingBlocks.of(self.structure, self.run)
+        return positions.FallingBlocks.of(self.structure, self.run)
 
     @cached_property
     def moved(self) -> tuple[Array, Array, Array] | None:
         """Times (f,) and displacements of outlines (f, p, 2) and joint ends (f, n_joints, 2, 2)."""
         if self.model is None or "q" not in self.run.dataset:
             return self.peak
-        times, fields = recorded_fields(self.run)
+        times, fields = positions.recorded_fields(self.run)
         between = (times[-1] - times[0]) / max(len(times) - 1, 1)
         # more than 40 frames per second cannot be distinguished
         chosen = _thin_out(len(times), int(1.0 / (40.0 * between)) if between > 0.0 else 1)
@@ -189,12 +180,11 @@ class Scene:
     @cached_property
     def peak(self) -> tuple[Array, Array, Array] | None:
         """Time and displacements as of frames, of the largest displacement alone."""
-        if (time := peak_instant(self.run)) is None:
+        if (time := positions.peak_instant(self.run)) is None:
             return None
-        points = peak_displacements(
-            self.structure, self.run, self.outlines.points, self.outlines.block
-        )
-        ends = peak_joint_ends(self.structure, self.run)
+        corners = self.outlines.points, self.outlines.block
+        points = positions.peak_displacements(self.structure, self.run, *corners)
+        ends = positions.peak_joint_ends(self.structure, self.run)
         return np.array([time]), points[None], ends[None]
 
     @cached_property
@@ -238,8 +228,8 @@ class Scene:
     @cached_property
     def initial_time(self) -> float:
         """Time shown at first, and in print [s]: of the largest displacement, if it is known."""
-        time = peak_instant(self.run)
-        return first_motion_instant(self.run) if time is None else time
+        time = positions.peak_instant(self.run)
+        return positions.first_motion_instant(self.run) if time is None else time
 
     @cached_property
     def marks(self) -> set[str]:
@@ -278,7 +268,7 @@ class Scene:
         if "opening" in joints:
             pack.add("opening", joints["opening"].values.T)
         pack.add("flags", _encode_flags(joints).T, 1.0)
-        times, ground = ground_acceleration(self.run)
+        times, ground = positions.ground_acceleration(self.run)
         pack.add_times("ground_time", times)
         pack.add("ground", ground.T)
         for name, motion in (("frame", self.moved), ("fall", self.fallen)):
@@ -310,7 +300,7 @@ class Scene:
     def _blocks(self) -> list[dict[str, Any]]:
         """Return name, kind and number of corners of the blocks, and of the grains of fill."""
         names = [block.name for block in self.structure.blocks]
-        kinds, rings = block_kinds(self.structure), self.outlines.rings
+        kinds, rings = positions.block_kinds(self.structure), self.outlines.rings
         if self.falls is not None and (grains := self.grains(0.0)):
             owners = self.falls.owners[-len(grains) :]
             names += [f"grain of {names[number]}" for number in owners]
@@ -344,7 +334,7 @@ class Scene:
             "state": None if falls is None else falls.state,
             "level": None if falls is None else falls.level,
             "mechanism": None if mechanism is None else mechanism.time,
-            "peak": peak_instant(self.run),
+            "peak": positions.peak_instant(self.run),
             "note": self.note,
             "pack": pack.head,
             "bytes": pack.text,
@@ -373,7 +363,7 @@ def _default_note(run: History) -> str:
     """Return the note in a page without displacements."""
     opening = ", with the openings of the joints between them" if "opening" in run.joints else ""
     only, apart, them = "no displacements", "", "them"
-    if peak_instant(run) is not None:
+    if positions.peak_instant(run) is not None:
         only, apart, them = "the largest displacement alone", " at all other instants", "others"
     remedy = f"fields_every = 8 in [record] of its case records {them}"
     return f"The run contains {only}: blocks are drawn undeformed{apart}{opening}; {remedy}."
@@ -395,18 +385,14 @@ def _encode_flags(joints: xr.Dataset) -> Array:
 def _joints(structure: Structure, joints: xr.Dataset) -> list[dict[str, Any]]:
     """Return name, ends, normal and friction limit of each joint, and whether it is judged."""
     limits = sliding_limits(joints.isel(time=0), History(joints).criteria)
-    return [
-        {
-            "name": joint.name,
-            "ends": _round(joint.ends),
-            "normal": _round(normal),
-            "judged": bool(shown),
-            "limit": round(float(limit), 4) if np.isfinite(limit) else None,
-        }
-        for joint, normal, shown, limit in zip(
-            structure.joints, structure.normals, joints["judged"].values, limits, strict=True
-        )
-    ]
+    columns = {
+        "name": [joint.name for joint in structure.joints],
+        "ends": _round([joint.ends for joint in structure.joints]),
+        "normal": _round(structure.normals),
+        "judged": joints["judged"].values.astype(bool).tolist(),
+        "limit": [round(float(x), 4) if np.isfinite(x) else None for x in limits],
+    }
+    return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 
 
 def _round(values: Any) -> Any:
