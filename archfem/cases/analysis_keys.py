@@ -17,14 +17,7 @@ from archfem.limit.fill_strength import Fill, PlasticFill
 from archfem.limit.rating import ASSUMED_STRENGTH, Rating, rate
 from archfem.limit.self_weight import check_options, self_weight_programme
 from archfem.limit.vehicles import VEHICLES, VEHICLES_OF_CODES, Vehicle
-from archfem.masonry.loads import (
-    Action,
-    AttachedLoad,
-    BodyForce,
-    PointLoad,
-    Settlement,
-    name_side,
-)
+from archfem.masonry.loads import Action, AttachedLoad, BodyForce, PointLoad, Settlement, name_side
 from archfem.masonry.materials import check_strength
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import Structure, join_names
@@ -214,7 +207,7 @@ def find_given_strength(structure: Structure, settings: Table) -> float | None:
     """Return the least strength that [materials] give for blocks at assessed joints [Pa]."""
     numbers = np.unique(structure.pairs[structure.judged])
     materials = {structure.blocks[number].material for number in numbers}
-    given = (x.strength for x in materials if "strength" in find_table(settings, x)[1])
+    given = (x.strength for x in materials if "strength" in find_table(settings, x).given)
     return min(filter(None, given), default=None)
 
 
@@ -264,9 +257,8 @@ def _read_loads(values: Table, section: str) -> tuple[tuple[Action, ...], tuple[
         points = values["point"]
         points = points if isinstance(points, list) else [points]
         live += [_point_load(point, f"{section}.point") for point in points]
-    return tuple(live), tuple(
-        _dead_load(load, f"{section}.dead") for load in values.get("dead", ())
-    )
+    dead = (_dead_load(load, f"{section}.dead") for load in values.get("dead", ()))
+    return tuple(live), tuple(dead)
 
 
 def _check_friction(value: Any, key: str) -> str | None:

@@ -9,8 +9,8 @@ from archfem._display import NOTE_MARK
 from archfem._validation import declared_keys
 from archfem.cases.analysis_keys import find_given_strength
 from archfem.cases.case import Case
-from archfem.cases.structure_keys import PRESETS, find_table
-from archfem.cases.toml_file import Table, format_key
+from archfem.cases.structure_keys import find_table
+from archfem.cases.toml_file import Table
 from archfem.limit.fill_strength import has_backing
 from archfem.limit.instability import describe_friction, describe_geometric_factor, least_friction
 from archfem.masonry.backfill import describe_held_ends
@@ -41,22 +41,18 @@ _OF_DRY = "dry stone has {:g} to {:g}".format(*DRY_FRICTION)
 
 # Values of materials and contacts that decide: name in texts, unit as number and text, and source
 DECIDING_VALUES = {
-    "materials": {
-        "young": ("E", GPa, " GPa", f"{_PAPER}; unused where blocks are rigid"),
-        "unit_weight": ("weight", kN, " kN/m³", f"{_PAPER}; stones weigh 16 to 27 kN/m³"),
-        "strength": ("strength", MPa, " MPa", f"{_PAPER}; {_OF_STRESS}"),
-    },
-    "contacts": {
-        "normal_stiffness": ("k_n", 1e9, " MPa/mm", f"{_PAPER}; measured ones differ tenfold"),
-        "shear_stiffness": ("k_s", 1e9, " MPa/mm", f"{_PAPER}; measured ones differ tenfold"),
-        "friction": ("μ", 1.0, "", f"{_OF_DRY}; 0.6 is customary"),
-    },
+    "young": ("E", GPa, " GPa", f"{_PAPER}; unused where blocks are rigid"),
+    "unit_weight": ("weight", kN, " kN/m³", f"{_PAPER}; stones weigh 16 to 27 kN/m³"),
+    "strength": ("strength", MPa, " MPa", f"{_PAPER}; {_OF_STRESS}"),
+    "normal_stiffness": ("k_n", 1e9, " MPa/mm", f"{_PAPER}; measured ones differ tenfold"),
+    "shear_stiffness": ("k_s", 1e9, " MPa/mm", f"{_PAPER}; measured ones differ tenfold"),
+    "friction": ("μ", 1.0, "", f"{_OF_DRY}; 0.6 is customary"),
 }
 
 
-def value_text(section: str, key: str, value: float | None) -> str:
+def value_text(key: str, value: float | None) -> str:
     """Return a deciding value with its unit; E of soils is in MPa."""
-    _, unit, name, _ = DECIDING_VALUES[section][key]
+    _, unit, name, _ = DECIDING_VALUES[key]
     if value is None or value == inf:
         return "not known" if value is None else "never slides"
     if key == "young" and value < 0.1 * GPa:
@@ -89,25 +85,22 @@ def list_materials_and_contacts(case: Case) -> list[Material | Contact]:
 
 def list_default_keys(case: Case, item: Material | Contact) -> list[str]:
     """Return the deciding values of a material or contact that the case does not give."""
-    section = "materials" if isinstance(item, Material) else "contacts"
-    name, given = find_table(case.settings, item)
-    # other values follow from a finish, or from the shape
-    preset = PRESETS[section].get(given.get("preset", name))
+    own = find_table(case.settings, item)
     return [
         key
-        for key in DECIDING_VALUES[section]
-        if key not in given
-        and getattr(item, key) is not None
-        # E of the pieces of a fill is that of its preset in their joints
-        and (key == "young" or getattr(item, key) == getattr(preset, key, None))
+        for key in DECIDING_VALUES
+        if key not in own.given
+        and (value := getattr(item, key, None)) is not None
+        # other values follow from a finish, or from the shape; E of the pieces of a fill is that of
+        # its preset in their joints
+        and (key == "young" or value == getattr(own.preset, key, None))
     ]
 
 
 def read_young(case: Case, item: Material) -> float:
     """Return E as the case or a preset gives it, of pieces of a fill that of their joints [Pa]."""
-    key, given = find_table(case.settings, item)
-    known = PRESETS["materials"].get(given.get("preset", key), item)
-    return in_unit(given.get("young", known.young), "Pa", "young")
+    own = find_table(case.settings, item)
+    return in_unit(own.given.get("young", (own.preset or item).young), "Pa", "young")
 
 
 def list_fill_values(case: Case) -> Iterator[tuple[str, str, bool]]:
@@ -144,18 +137,16 @@ def _list_properties(case: Case) -> Iterator[Default]:
     # the E of rigid blocks is not used, but for that of a fill in the joints of its pieces
     elastic = {block.material for block, x in blocks if x != "rigid" or block.grain}
     for item in list_materials_and_contacts(case):
-        section = "materials" if isinstance(item, Material) else "contacts"
         for key in list_default_keys(case, item):
-            word, *_, reason = DECIDING_VALUES[section][key]
+            word, *_, reason = DECIDING_VALUES[key]
             value = getattr(item, key)
             if key == "young" and isinstance(item, Material):
                 if item not in elastic:
                     continue
                 value = read_young(case, item)
                 reason = reason if value == item.young else f"{_PAPER}; displacements depend on it"
-            words = f"{word} {value_text(section, key, value)}"
-            path = f"{section}.{format_key(find_table(case.settings, item)[0])}.{key}"
-            yield Default(item.name, words, path, reason)
+            path = f"{find_table(case.settings, item).path}.{key}"
+            yield Default(item.name, f"{word} {value_text(key, value)}", path, reason)
     if "width" not in case.settings["structure"]:
         reason = "across the plane; what overturns it there is in proportion to the width"
         yield Default("", f"width {case.structure.width:g} m", "structure.width", reason)
@@ -221,9 +212,8 @@ def list_spectrum_defaults(case: Case) -> Iterator[Default]:
 def describe_spectrum_defaults(case: Case) -> str:
     """Describe the values that the site's spectrum has by default; empty if it has none."""
     path = "assessment.spectrum" if case.assessment.spectrum else "suite.target"
-    return ", ".join(
-        each.words for each in list_spectrum_defaults(case) if each.key.startswith(path)
-    )
+    own = (each.words for each in list_spectrum_defaults(case) if each.key.startswith(path))
+    return ", ".join(own)
 
 
 def describe_defaults(case: Case) -> str:
@@ -259,13 +249,13 @@ def _explain_finishes(case: Case) -> Iterator[str]:
     """Explain each finish of the case in a line: its key, its law with the range, and sources."""
     structure = case.structure
     for contact, joint in {joint.contact: joint for joint in structure.joints}.items():
-        name, table = find_table(case.settings, contact)
-        if (finish := table.get("finish")) is None:
+        own = find_table(case.settings, contact)
+        if (finish := own.given.get("finish")) is None:
             continue
         ranges = list_finish_ranges(structure, contact, finish)
         values = ", ".join(f"{word} {text}" for word, text in ranges.values())
         sources = "; ".join(finish_range(structure, joint, finish).sources[:3])
-        yield f'contacts.{format_key(name)}.finish = "{finish}": {values}; {sources}'
+        yield f'{own.path}.finish = "{finish}": {values}; {sources}'
 
 
 def list_finish_ranges(

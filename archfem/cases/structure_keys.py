@@ -15,7 +15,7 @@ from dataclasses import dataclass, field, fields, is_dataclass, replace
 from itertools import product
 from math import inf
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -364,11 +364,17 @@ def _resolve_preset(settings: Table, section: str, name: str) -> Any:
     return _call(cls, f"{section}.{name}", **{**values, "name": given.get("name", name)})
 
 
-def find_table(settings: Table, item: Material | Contact) -> tuple[str, Table]:
-    """Return key and content of the table of a material or contact; no content for a preset.
+class DescribedItem(NamedTuple):
+    """How a case describes a material or contact."""
 
-    The key may differ from the name, which a table may give.
-    """
+    key: str  # of its table; it may differ from the name, which a table may give
+    given: Table  # content of the table; empty for a preset as it is
+    path: str  # of the table
+    preset: Any  # that has what the table leaves out, or None
+
+
+def find_table(settings: Table, item: Material | Contact) -> DescribedItem:
+    """Return the table of a material or contact."""
     section = "materials" if isinstance(item, Material) else "contacts"
     tables = settings.get(section, {})
     keys = [key for key, table in tables.items() if table.get("name", key) == item.name]
@@ -376,7 +382,9 @@ def find_table(settings: Table, item: Material | Contact) -> tuple[str, Table]:
     equal = (key for key in known if _resolve_preset(settings, section, key) == item)
     # what follows from a finish differs from stone to stone
     key = next(equal, next(iter(keys), item.name))
-    return key, tables.get(key, {})
+    given = tables.get(key, {})
+    preset = PRESETS[section].get(given.get("preset", key))
+    return DescribedItem(key, given, f"{section}.{format_key(key)}", preset)
 
 
 def _read_finish(table: dict[str, Any], section: str) -> dict[str, Any]:

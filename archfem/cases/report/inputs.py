@@ -10,27 +10,9 @@ import numpy as np
 
 from archfem._typing import Array
 from archfem._validation import declared_keys
-from archfem.cases.defaults import (
-    DECIDING_VALUES,
-    HINGE_REASON,
-    list_default_keys,
-    list_fill_values,
-    list_finish_ranges,
-    list_materials_and_contacts,
-    list_spectrum_defaults,
-    read_young,
-    value_text,
-)
+from archfem.cases import defaults, structure_keys
 from archfem.cases.motion_keys import MADE, find_matched_band
 from archfem.cases.report.report_data import STATIC_RESULTS, ReportData
-from archfem.cases.structure_keys import (
-    PARTS_BY_NAME,
-    PRESETS,
-    find_table,
-    keys_of_part,
-    list_shapes,
-    shape_keys,
-)
 from archfem.cases.toml_file import format_key, split_key_path
 from archfem.dynamics.schemes import EffectiveDamping, Rayleigh, interpret_damping
 from archfem.limit.collapse import collapse_factor
@@ -79,8 +61,7 @@ _SOURCES = {
     "confidence_factor": "of LC1, Circolare 7/2019, C8.5.4.1, from memory",
 }
 
-_WEIGHT = DECIDING_VALUES["materials"]["unit_weight"][0]
-_YOUNG = DECIDING_VALUES["materials"]["young"][0]
+_WEIGHT, _YOUNG = (defaults.DECIDING_VALUES[key][0] for key in ("unit_weight", "young"))
 
 # Keys of a spectrum given by points
 _TABLE_KEYS = ("periods", "values", "vertical_values")
@@ -203,8 +184,8 @@ def _mark_key(table: Mapping[str, Any], path: str) -> tuple[str, str]:
 def _structure_rows(data: ReportData) -> Iterator[Row]:
     """Yield the keys of [structure]; width and gravity also where they are defaults."""
     table, structure = data.case.settings.get("structure", {}), data.case.structure
-    kinds = shape_keys(table["shape"])
-    parts = {**PARTS_BY_NAME.get(table["shape"], {}), "backfill": Backfill}
+    kinds = structure_keys.shape_keys(table["shape"])
+    parts = {**structure_keys.PARTS_BY_NAME.get(table["shape"], {}), "backfill": Backfill}
     drawn = ("blocks", "joints") if "drawing.txt" in data.files else ()
     free, alone = len(structure.free), data.runs and not data.folder
     counts = {"blocks": f"{free} and {len(structure.blocks) - free} fixed"}
@@ -229,7 +210,8 @@ def _structure_rows(data: ReportData) -> Iterator[Row]:
     elif "measured" in kinds:  # lengths to an inner face are not those to the springing
         for part, words in describe_piers(structure).items():
             yield part or "pier", words, "inferred"
-    yield "structure", _list_left_out(list_shapes()[table["shape"]], {*table}), "default"
+    shape = structure_keys.list_shapes()[table["shape"]]
+    yield "structure", _list_left_out(shape, {*table}), "default"
     yield "width", f"{structure.width:g} m", *_mark_key(table, "structure.width")
     yield "gravity", f"{structure.gravity:g} m/s²", *_mark_key(table, "structure.gravity")
     if "joints" not in table and table["shape"] in ("blocks", "outlines"):
@@ -269,7 +251,7 @@ def _find_crown(stones: Sequence[Array], low: float, high: float) -> float:
 
 def _list_left_out(declaration: Callable[..., Any], given: set[str]) -> str:
     """List the lengths and words of a shape, or of its part, that the case leaves to defaults."""
-    kinds, found = keys_of_part(declaration), signature(declaration).parameters
+    kinds, found = structure_keys.keys_of_part(declaration), signature(declaration).parameters
     values = {key: each.default for key, each in found.items() if key not in given | _OWN_ROWS}
     return "; ".join(
         f"{_say_key(key)} {describe_value(value, kinds.get(key))}"
@@ -306,54 +288,47 @@ def describe_value(value: Any, kind: Any = None) -> str:
 def _property_rows(data: ReportData) -> Iterator[Row]:
     """Yield the values of materials and contacts, equal ones once."""
     groups = dict[Any, list[tuple[Material | Contact, list[Row]]]]()
-    items = list_materials_and_contacts(data.case)
+    items = defaults.list_materials_and_contacts(data.case)
     names = Counter(item.name for item in items if isinstance(item, Contact))
     sources = _read_sources(data)
     for item in items:
         rows, load = [*_list_given(data, item)], getattr(item, "stands_for", None)
         # what carries more than itself may differ in weight alone from its neighbour, and joints of
         # one name in stiffness alone, which depends on the pieces of fill beside them
-        finished = "finish" in find_table(data.case.settings, item)[1]
-        several = isinstance(item, Contact) and names[item.name] > 1 and not finished
+        own = structure_keys.find_table(data.case.settings, item)
+        several = isinstance(item, Contact) and names[item.name] > 1 and "finish" not in own.given
         varied = ("k_n", "k_s") if several else (_WEIGHT,) if load is not None else ()
         same = tuple(row[:3] for row in rows if row[0] not in varied)
-        table = _find_path(data, item)
-        sourced = table * any(_lies_in(source, table) for source in sources)
+        sourced = own.path * any(_lies_in(source, own.path) for source in sources)
         kind = type(item), item.name * several, varied, load, same, sourced
         groups.setdefault(kind, []).append((item, rows))
     for (cls, _, varied, load, *_), group in groups.items():
         (first, rows), *others = group
+        own = structure_keys.find_table(data.case.settings, first)
         name = first.name + f" and {len(others)} more" * bool(others)
         if load is not None:
-            yield f"{name}: stands also for", load, "given", f"{_find_path(data, first)}.stands_for"
+            yield f"{name}: stands also for", load, "given", f"{own.path}.stands_for"
         for word, text, mark, *path in rows:
             if word in varied and others:
-                section, key = "materials" if cls is Material else "contacts", _VARIED[word]
+                key = _VARIED[word]
                 values = [getattr(each, key) for each, _ in group]
-                ends = (value_text(section, key, x) for x in (min(values), max(values)))
+                ends = (defaults.value_text(key, x) for x in (min(values), max(values)))
                 text = " to ".join(dict.fromkeys(ends))
                 if cls is Contact and mark == "given":  # pieces of fill beside joints add to theirs
-                    own = find_table(data.case.settings, first)[1][key]
-                    alone = value_text(section, key, in_unit(own, "Pa/m", key))
+                    alone = defaults.value_text(key, in_unit(own.given[key], "Pa/m", key))
                     yield f"{name}: {word}", alone, mark, *path
                     word, mark = f"{word} with its pieces of fill", "inferred"
             yield f"{name}: {word}", text, mark, *path
-
-
-def _find_path(data: ReportData, item: Material | Contact) -> str:
-    """Return the path of the table of a material or contact."""
-    section = "materials" if isinstance(item, Material) else "contacts"
-    return f"{section}.{format_key(find_table(data.case.settings, item)[0])}"
 
 
 def _list_given(data: ReportData, item: Material | Contact) -> Iterator[Row]:
     """Yield the values of a material or contact; stiffer ones of pieces of fill are inferred."""
     for word, text, mark, *path in _list_properties(data, item):
         if isinstance(item, Material) and word == _YOUNG:
-            own = value_text("materials", "young", read_young(data.case, item))
+            own = defaults.value_text("young", defaults.read_young(data.case, item))
             if not text.startswith(own):
                 yield word, own, mark, *path
-                text = f"{value_text('materials', 'young', item.young)}, practically rigid"
+                text = f"{defaults.value_text('young', item.young)}, practically rigid"
                 text += ", as their joints have the E of the fill"
                 word, mark = f"{word} of its pieces", "inferred"
         stated = (_FURTHER_PROPERTIES["poisson"][0], *[_YOUNG] * (mark == "given"))
@@ -363,45 +338,40 @@ def _list_given(data: ReportData, item: Material | Contact) -> Iterator[Row]:
 
 def _list_properties(data: ReportData, item: Material | Contact) -> Iterator[Row]:
     """Yield the values of a material or contact."""
-    section = "materials" if isinstance(item, Material) else "contacts"
-    defaults, path = list_default_keys(data.case, item), _find_path(data, item)
-    _, given = find_table(data.case.settings, item)
+    open_keys = defaults.list_default_keys(data.case, item)
+    _, given, path, known = structure_keys.find_table(data.case.settings, item)
     unused = _UNUSED | ({"strength"} - given.keys()) if data.is_static else set()
     follows = {*FINISHED_KEYS} if "finish" in given else set()
-    for key, (word, *_, reason) in DECIDING_VALUES[section].items():
-        value = getattr(item, key)
-        text, mark = value_text(section, key, value), _mark(key in given)
+    for key in (key for key in defaults.DECIDING_VALUES if hasattr(item, key)):
+        (word, *_, reason), value = defaults.DECIDING_VALUES[key], getattr(item, key)
+        text, mark = defaults.value_text(key, value), _mark(key in given)
         if word == _WEIGHT and key in given:
-            own = value_text(section, key, in_unit(given[key], "N/m**3", key))
+            own = defaults.value_text(key, in_unit(given[key], "N/m**3", key))
             text = text if own == text else f"{own}, {text} with the spandrels"
-        if key in defaults:
+        if key in open_keys:
             text += f" ({reason if key == 'young' else reason.partition(';')[0]})"
         elif mark == "default" and value is not None:
             mark = "inferred"  # from the shape
         if key not in unused | follows:
             yield word, text, mark, f"{path}.{key}"
     if "finish" in given.keys() - unused and isinstance(item, Contact):
-        yield from _finish_rows(data, item, given["finish"])
+        yield "finish", _describe_finish(given["finish"]), "given", f"{path}.finish"
+        ranges = defaults.list_finish_ranges(data.case.structure, item, given["finish"])
+        yield from ((word, text, "inferred") for word, text in ranges.values())
     for key, (word, unit, name) in _FURTHER_PROPERTIES.items():
         if (key in given or getattr(item, key, None)) and key not in unused:
-            preset = PRESETS[section].get(given.get("preset", item.name), type(item))
-            derived = key not in given and getattr(item, key) != getattr(preset, key, None)
+            usual = getattr(known or type(item), key, None)
+            derived = key not in given and getattr(item, key) != usual
             mark = "inferred" if derived else _mark(key in given)
             yield word, f"{getattr(item, key) / unit:g}{name}", mark, f"{path}.{key}"
     if isinstance(item, Contact) and item.law is not None:
         yield "law", str(item.law), "given", f"{path}.law"
 
 
-def _finish_rows(data: ReportData, contact: Contact, finish: str) -> Iterator[Row]:
-    """Yield a finish and the values that follow from it, with their ranges."""
-    rough = finish in ("hewn", "weathered")
-    words = (
-        "; rougher faces are stiffer under little stress, so that they may move less, and close "
-    )
-    text = finish + f"{words}further" * rough
-    yield "finish", text, "given", f"{_find_path(data, contact)}.finish"
-    for word, text in list_finish_ranges(data.case.structure, contact, finish).values():
-        yield word, text, "inferred"
+def _describe_finish(finish: str) -> str:
+    """Return a finish, with what a rough one means."""
+    words = "; rougher faces are stiffer under little stress, so that they may move less"
+    return finish + f"{words}, and close further" * (finish in ("hewn", "weathered"))
 
 
 def _command_rows(data: ReportData) -> Iterator[Row]:
@@ -420,13 +390,11 @@ def _command_rows(data: ReportData) -> Iterator[Row]:
                 text = describe_value(value, unit)
                 yield f"{section}: {key.replace('_', ' ')}", text, "given", f"{section}.{key}"
         if section in _FUNCTIONS:
-            inherited = (
-                dict.fromkeys(data.case.assessment.of_limit) if section == "assessment" else {}
-            )
-            yield from _default_rows(section, {**inherited, **table})
+            inherited = data.case.assessment.of_limit if section == "assessment" else ()
+            yield from _default_rows(section, {**dict.fromkeys(inherited), **table})
         yield from _further_rows(data, section, table)
     if any(f"{name}.txt" in data.files for name in STATIC_RESULTS):
-        for path, text, given in list_fill_values(data.case):
+        for path, text, given in defaults.list_fill_values(data.case):
             section, _, key = path.split(".")
             yield f"{section}: fill, {key.replace('_', ' ')}", text, _mark(given), path
 
@@ -523,7 +491,7 @@ def _target_rows(data: ReportData) -> Iterator[Row]:
 def _spectrum_rows(data: ReportData, section: str, spectrum: Any) -> Iterator[Row]:
     """Yield the default values of a spectrum, and what follows from its code."""
     name = {"assessment": "assessment: spectrum", "suite": "target spectrum"}[section]
-    for each in list_spectrum_defaults(data.case):
+    for each in defaults.list_spectrum_defaults(data.case):
         if each.key.startswith(section):
             yield name, each.words, "default"
     if isinstance(spectrum, CodeSpectrum):
@@ -634,7 +602,7 @@ def _criteria_rows(data: ReportData) -> Iterator[Row]:
     until = settings.get("analysis", {}).get("until")
     own = until.get("criteria", {}) if isinstance(until, Mapping) else {}
     given = settings.get("criteria", own) or {}
-    reason = "" if "hinge" in given else f" ({HINGE_REASON})"
+    reason = "" if "hinge" in given else f" ({defaults.HINGE_REASON})"
     hinge = f"|e| ≥ {criteria.hinge:g}{reason}"
     yield "a joint hinges where", hinge, *_mark_key(given, "criteria.hinge")
     limit = "its own limit, μ + c A / N" if criteria.friction is None else f"{criteria.friction:g}"
