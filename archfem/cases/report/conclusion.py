@@ -14,7 +14,7 @@ from archfem.cases import result_text
 from archfem.cases.answers import RESULTS, Ratios, Row, Statement, read_numbers
 from archfem.cases.case import REPORT_KEYS
 from archfem.cases.defaults import list_default_keys, list_materials_and_contacts
-from archfem.cases.report import margins
+from archfem.cases.report import margins, outcomes
 from archfem.cases.report.demands import list_demands, name_spectrum, tabulate_demands
 from archfem.cases.report.doubts import (
     HISTORIES,
@@ -29,14 +29,7 @@ from archfem.cases.report.doubts import (
     spans_run,
 )
 from archfem.cases.report.motion_rules import find_missed, find_rule, name_norm
-from archfem.cases.report.outcomes import (
-    describe_ends,
-    describe_outcomes,
-    describe_peaks,
-    find_worst,
-    list_ranges_of_steps,
-    sentence,
-)
+from archfem.cases.report.outcomes import sentence
 from archfem.cases.report.report_data import SHOWN_RESULTS, ReportData
 from archfem.cases.report.scales import find_first_failures, say_fragile
 from archfem.cases.report.study_findings import say_what_changes
@@ -53,17 +46,9 @@ from archfem.view.pages.document import Grid, Section, TextBlock
 
 # Doubts of a result that the conclusion states; the others stand in the section of the result
 MAX_DOUBTS = 3
-SECTIONS = {
-    HISTORIES: "Response",
-    VARIATIONS: "Range over uncertain properties",
-    STUDIES: "Study of many cases",
-    RESULTS["limit"]: "Limit analysis",
-    RESULTS["pushover"]: "Pushover",
-    RESULTS["rating"]: "Rating for a vehicle",
-    RESULTS["assessment"]: "Kinematic assessment",
-    RESULTS["scale"]: "Scale of the motion",
-    RESULTS["risk"]: "Annual rate of collapse",
-}
+SECTIONS = {x: x.capitalize() for key, x in RESULTS.items() if key not in SHOWN_RESULTS}
+SECTIONS |= {HISTORIES: "Response", VARIATIONS: "Range over uncertain properties"}
+SECTIONS |= {STUDIES: "Study of many cases", RESULTS["rating"]: "Rating for a vehicle"}
 
 # Fidelity of the variations of a verdict
 VARIED_FIDELITY = "rigid"
@@ -132,15 +117,12 @@ def list_joint_facts(parts: Mapping[str, ReportData]) -> list[tuple[str, str]]:
     signed = [(key, _join_values(heads, key)) for key in dict.fromkeys(keys)]
     answer, margin, _, left = HEAD
     unchecked = [text for head in heads.values() for key, text in head if key == left]
-    said = {
-        name: " ".join(
-            text
-            for key, text in head
-            if key in (answer, margin) or (key == left and unchecked.count(text) == 1)
-        )
-        + "".join(f" In doubt: {text}." for key, text in head if key == "in doubt")
-        for name, head in heads.items()
-    }
+    said = dict[str, str]()
+    for name, head in heads.items():
+        alone = {left} if unchecked.count(dict(head).get(left, "")) == 1 else set()
+        texts = [text for key, text in head if key in {answer, margin, *alone}]
+        texts += [f"In doubt: {text}." for key, text in head if key == "in doubt"]
+        said[name] = " ".join(texts)
     ranks = {name: _rank_verdict(data) for name, data in parts.items()}
     place = min(each for each, _ in ranks.values())
     worst, listed = dict[str, str](), list[str]()
@@ -196,7 +178,7 @@ def _rank_verdict(data: ReportData) -> tuple[int, dict[str, float]]:
     Factors are those in the plane of the drawing, where all cases have them.
     """
     ranked = [*margins.list_margins(data, across=False)]
-    outcome = find_worst(data)[1] if data.runs else ""
+    outcome = outcomes.find_worst(data)[1] if data.runs else ""
     stated = data.statements.get("rating")
     rows = stated.rows if stated else []
     if data.case.report.get("norm"):  # decides, if it has a rating
@@ -336,7 +318,7 @@ def _say_survival(
     Too few motions decide none, nor do runs without joints. What fails otherwise comes before a
     survival, and behind a fall.
     """
-    verdicts, (_, answer) = [run.verdict for run in data.runs.values()], find_worst(data)
+    verdicts, (_, answer) = [run.verdict for run in data.runs.values()], outcomes.find_worst(data)
     in_doubt = " (in doubt, as below)" * (HISTORIES in doubtful)
     survives, reason = answer.startswith("survives"), _say_why_undecided(data)
     answer = f"{'under its motions ' * bool(survives and failed)}it {answer}{in_doubt}"
@@ -350,9 +332,9 @@ def _say_survival(
     lead = f"in its plane{in_doubt} it" if beside else f"{answer}: it"
     if survives and (reason or find_missed(data)):
         lead = f"it{in_doubt * (not reason)}"
-    first, *others = describe_outcomes(data)
-    outcomes = [f"{lead} {first}", *(f"it {each}" for each in others)]
-    yield from [*outcomes[:-1], f"{outcomes[-1]}{moved}"]
+    first, *others = outcomes.describe_outcomes(data)
+    said = [f"{lead} {first}", *(f"it {each}" for each in others)]
+    yield from [*said[:-1], f"{said[-1]}{moved}"]
     yield from () if survives else failed
 
 
@@ -509,7 +491,7 @@ def _build_paragraphs(data: ReportData, doubtful: Sequence[str]) -> dict[str, li
         stated = [each.sentences for name, each in data.statements.items() if name != "assessment"]
         stated = [sorted(each, key=lambda x: not _is_of_norm(data, x)) for each in stated]
         answer += [*stated[0]] if len(data.statements) == 1 and stated else [x for x, *_ in stated]
-    answer += [*describe_ends(data), *_describe_ranges(data)]
+    answer += [*outcomes.describe_ends(data), *_describe_ranges(data)]
     changes = [*_say_causes(data.verdict_ranges)]
     if not data.runs:  # the head has them beside runs
         changes += [text for study in data.own_studies for text in say_what_changes(study)]
@@ -569,7 +551,7 @@ def _capacity_rows(data: ReportData) -> Iterator[tuple[str, Row]]:
     """Yield each result with its demand, capacity or outcome, and factor; "-" where is none."""
     if data.runs:
         verdicts = [run.verdict for run in data.runs.values()]
-        demand, outcome = describe_peaks(data.runs.values()), verdicts[0].outcome
+        demand, outcome = outcomes.describe_peaks(data.runs.values()), verdicts[0].outcome
         outcome = result_text.count_outcomes(verdicts) if len(verdicts) > 1 else outcome
         outcome += f"; not run: {', '.join(data.missing)}" * bool(data.missing)
         # of a fall it is the way to the ground
@@ -579,7 +561,7 @@ def _capacity_rows(data: ReportData) -> Iterator[tuple[str, Row]]:
         if sizes.size and np.isfinite(sizes).all():
             largest, residual = map(format_mm, sizes.max(axis=0))
             over = "time steps" if data.fidelity == VARIED_FIDELITY else "time steps and fidelity"
-            steps = ", ".join(list_ranges_of_steps(data))
+            steps = ", ".join(outcomes.list_ranges_of_steps(data))
             under = f" under '{[*held][sizes[:, 0].argmax()]}'" * (len(data.runs) > 1)
             outcome += f"; displaced by up to {largest}{under}, {residual} at the end"
             outcome += f"; over {over} by {steps}" * bool(steps)

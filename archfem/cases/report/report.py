@@ -7,12 +7,7 @@ from pathlib import Path
 
 from archfem.cases.case import Case
 from archfem.cases.report.conclusion import list_facts, list_joint_facts
-from archfem.cases.report.report_data import (
-    ReportData,
-    build_live_page,
-    build_player,
-    label_parts,
-)
+from archfem.cases.report.report_data import ReportData, build_live_page, build_player, label_parts
 from archfem.cases.report.sections import build_joint_sections, build_sections, number_captions
 from archfem.cases.result_folder import ResultFolder
 from archfem.cases.run import Run

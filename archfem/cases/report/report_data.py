@@ -10,15 +10,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from archfem import _files
 from archfem._display import DOUBT_MARK
-from archfem._files import (
-    check_listed,
-    describe_deleted,
-    group_of,
-    hash_value,
-    path_inside,
-    read_file_list,
-)
 from archfem.cases.answers import RESULTS, Statement, cut_remedy
 from archfem.cases.case import Case
 from archfem.cases.provenance import STRUCTURE_SECTIONS
@@ -71,7 +64,7 @@ class ReportData:
         if not folders:
             return []
         # a case in a folder of results has the blocks of its drawing
-        given = hash_value(case.structure), case.hash_sections(STRUCTURE_SECTIONS)
+        given = _files.hash_value(case.structure), case.hash_sections(STRUCTURE_SECTIONS)
         found = [read_study(place, given) for place in folders]
         # of several cases each has those of its structure
         return [each for each in found if each.is_own or not self.label]
@@ -188,30 +181,30 @@ class ReportData:
     @property
     def inputs(self) -> str:
         """Digest of the case of the folder as it was computed; "" without one."""
-        owner = self.folder and group_of(read_file_list(self.folder), CASE_FILE)
+        owner = self.folder and _files.group_of(_files.read_file_list(self.folder), CASE_FILE)
         return owner.inputs if owner else ""
 
     @cached_property
     def files(self) -> dict[str, Path]:
         """Files of the folder by name that have the inputs of its case; the others are left out."""
-        listed = {} if self.folder is None else read_file_list(self.folder)
-        if self.folder is None or (owner := group_of(listed, CASE_FILE)) is None:
+        listed = {} if self.folder is None else _files.read_file_list(self.folder)
+        if self.folder is None or (owner := _files.group_of(listed, CASE_FILE)) is None:
             return {}
         groups = [group for group in listed.values() if group.inputs == owner.inputs]
         names = [name for group in groups for name in sorted(group.files)]
-        paths = {name: path_inside(self.folder, name) for name in names}
+        paths = {name: _files.path_inside(self.folder, name) for name in names}
         return {name: path for name, path in paths.items() if path.is_file()}
 
     @cached_property
     def deleted(self) -> str:
         """Say which listed files of the folder are missing; "" if none is."""
-        return "" if self.folder is None else describe_deleted(self.folder)
+        return "" if self.folder is None else _files.describe_deleted(self.folder)
 
     def read_text(self, name: str) -> str | None:
         """Return the text of a file of the folder, or None; its doubts are without remedies."""
         if name not in self.files:
             return None
-        check_listed(self.files[name], content := self.files[name].read_bytes())
+        _files.check_listed(self.files[name], content := self.files[name].read_bytes())
         lines = content.decode("utf-8").strip().splitlines()
         return "\n".join(cut_remedy(x) if x.startswith(DOUBT_MARK) else x for x in lines)
 
@@ -219,7 +212,7 @@ class ReportData:
         """Return the picture of a file of the folder, or an empty list."""
         if name not in self.files:
             return []
-        check_listed(self.files[name], self.files[name].read_bytes())
+        _files.check_listed(self.files[name], self.files[name].read_bytes())
         return [FigureBlock.read(self.files[name], caption)]
 
 

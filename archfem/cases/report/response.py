@@ -144,11 +144,8 @@ def _tabulate_joints(data: ReportData, run: History) -> Grid:
     # Most joints neither slide nor open in most runs.
     filled = [k for k in range(len(head)) if any(row[k] != "-" for row in rows)]
     empty = {title.split()[0] for k, title in enumerate(head) if k not in filled}
-    notes = {
-        "hinge": "No joint hinged.",
-        "slide": "None slid as a whole.",
-        "open": "None came apart.",
-    }
+    notes = {"hinge": "No joint hinged.", "slide": "None slid as a whole."}
+    notes["open"] = "None came apart."
     caption = (
         "Criteria per joint: eccentricity under dead load, least and largest, and largest V / N. "
         "Then when and how long at most it hinged, slid as a whole (|V| at its limit) and was open."

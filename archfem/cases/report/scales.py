@@ -7,7 +7,7 @@ import numpy as np
 from archfem.cases.answers import Scales, read_numbers
 from archfem.cases.report.doubts import peak_of_ground
 from archfem.cases.report.report_data import ReportData
-from archfem.dynamics.collapse_state import COLLAPSE_STATES
+from archfem.dynamics.collapse_state import COLLAPSE_STATES, FALLEN_STATES
 from archfem.dynamics.monitor import PULLED
 from archfem.dynamics.rigid_body.rocking_body import say_again
 from archfem.dynamics.scale_search import UNFINISHED
@@ -24,12 +24,7 @@ _STATES = {
 }
 
 # The same of runs that are not scaled, by their outcomes
-_FAILURES = {
-    "fallen": "falls",
-    "partly fallen": "falls",
-    "dislocated": "dislocated",
-    "mechanism": "mechanism",
-}
+_FAILURES = dict.fromkeys(FALLEN_STATES, "falls") | {x: x for x in ("dislocated", "mechanism")}
 
 
 def list_scales(data: ReportData) -> list[Scales]:

@@ -15,18 +15,13 @@ from archfem._display import DOUBT_MARK, NOTE_MARK
 from archfem._files import read_listed
 from archfem.cases.answers import Ratios, read_numbers
 from archfem.cases.defaults import describe_margins_at_rest
+from archfem.cases.report import response
 from archfem.cases.report.conclusion import build_conclusion, build_signatures, list_facts
 from archfem.cases.report.doubts import list_elastic_fill, list_ranges, list_varied, spans_run
 from archfem.cases.report.inputs import compare_inputs, describe_value, tabulate_inputs
 from archfem.cases.report.motion_rules import find_rule
 from archfem.cases.report.outcomes import sentence
 from archfem.cases.report.report_data import STATIC_RESULTS, ReportData
-from archfem.cases.report.response import (
-    HALF_WIDTH,
-    build_check_section,
-    build_ground_section,
-    build_run_sections,
-)
 from archfem.cases.report.study_findings import (
     StudyFindings,
     list_studied,
@@ -115,13 +110,13 @@ def build_sections(data: ReportData) -> list[Section]:
         build_structure_section(data),
         build_input_section(data),
         *build_static_sections(data),
-        build_ground_section(data),
-        *build_run_sections(data),
+        response.build_ground_section(data),
+        *response.build_run_sections(data),
         Section("Scale of the motion", _build_scale(data)),
         Section("Range over uncertain properties", _build_range(data)),
         Section("Annual rate of collapse", data.read_result("risk", *_RISK_CAPTIONS)),
         Section("Study of many cases", studies),
-        build_check_section(data),
+        response.build_check_section(data),
         build_method_section(data),
         build_source_section(data),
     ]
@@ -204,7 +199,7 @@ def build_structure_section(data: ReportData) -> Section:
     case, structure = data.case, data.case.structure
     extent = np.ptp(np.concatenate([block.drawn() for block in structure.blocks]), axis=0)
     beside = not data.label and data.dead is not None and extent[0] < MAX_SLENDERNESS * extent[1]
-    with limit_width(HALF_WIDTH) if beside else nullcontext():
+    with limit_width(response.HALF_WIDTH) if beside else nullcontext():
         # of several cases the drawings stand before their inputs
         figures = [] if data.label else [_draw_assessed(structure)]
         if data.dead is not None:
@@ -213,9 +208,10 @@ def build_structure_section(data: ReportData) -> Section:
             figures.append(_untitle(thrust, _THRUST))
         else:
             figures += data.read_figure("dead.png", _THRUST)
-    blocks: list[Any] = [
-        TextBlock(_describe_extent(structure)),
-        *_describe_drawing(data),
+    blocks: list[Any] = [TextBlock(_describe_extent(structure))]
+    if (drawing := data.read_text(DRAWING_FILE)) is not None:
+        blocks.append(TextBlock(f"The outlines were read from {drawing}."))
+    blocks += [
         *(replace(each, beside=beside) for each in figures),
         _tabulate_parts(structure),
         *([] if data.dead is None else [_tabulate_dead_load(data.dead)]),
@@ -277,12 +273,6 @@ def _name_support(structure: Structure, block: Block) -> str:
     return f"'{block.part}'" if block.part and whole else f"'{block.name}'"
 
 
-def _describe_drawing(data: ReportData) -> list[TextBlock]:
-    """Name the drawing of the blocks, its unit and tolerance, and how far corners were moved."""
-    text = data.read_text(DRAWING_FILE)
-    return [] if text is None else [TextBlock(f"The outlines were read from {text}.")]
-
-
 def _tabulate_parts(structure: Structure) -> Grid:
     """Tabulate the parts of a structure."""
     rows, fixed = [], list[str]()
@@ -302,15 +292,8 @@ def _tabulate_parts(structure: Structure) -> Grid:
         ends = dict.fromkeys(f"{choose(depths):.3g}" for choose in (min, max) if depths)
         row.append(" – ".join(ends) or "–")
         rows.append(row)
-    head = [
-        "part",
-        "role",
-        "blocks",
-        "of them fixed",
-        "material",
-        "weight [kN]",
-        "depth of joints [m]",
-    ]
+    head = ["part", "role", "blocks", "of them fixed", "material", "weight [kN]"]
+    head.append("depth of joints [m]")
     apart = f"; fixed as a whole: {join_names(fixed)}" if fixed else ""
     return Grid(head, rows, f"Parts that can move{apart}")
 
@@ -429,28 +412,24 @@ def _define_assessment(data: ReportData, text: str, moves: bool) -> Grid:
 
 def _build_scale(data: ReportData) -> list[Any]:
     """Build text and picture of each search of scales, with its runs by time step and outcome."""
-    return [
-        block
-        for pair, place in data.list_parts("scale.txt").items()
-        for block in _build_search(data, place.removesuffix(".txt"), pair)
-    ]
-
-
-def _build_search(data: ReportData, name: str, pair: str) -> list[Any]:
-    """Build text, picture and runs of a search of scales under one motion."""
-    under = f" under '{pair}'" if pair else ""
-    caption = f"Residual displacement{under} over the scale of the motion; falls are at the top."
-    blocks = data.read_result(name, caption)
-    if (runs := data.read_text(f"{name}.csv")) is None:
-        return blocks
-    scales: dict[tuple[str, str], list[str]] = {}
-    for step, scale, _, outcome, *_ in [*reader(runs.splitlines())][1:]:
-        scales.setdefault((step, outcome.partition(" (")[0]), []).append(scale)
-    rows = [(*key, ", ".join(found)) for key, found in scales.items()]
-    head = ("time step", "the structure", "at the scales [× the motion]")
-    text = blocks[0].text.rpartition("\n\n")[0]
-    table = Grid(head, rows, f"Runs of the search{under}", "words")
-    return [TextBlock(text, "lines"), table, *blocks[1:]]
+    built = list[Any]()
+    for pair, place in data.list_parts("scale.txt").items():
+        name, under = place.removesuffix(".txt"), f" under '{pair}'" if pair else ""
+        caption = (
+            f"Residual displacement{under} over the scale of the motion; falls are at the top."
+        )
+        text, *figures = data.read_result(name, caption)
+        if (runs := data.read_text(f"{name}.csv")) is None:
+            built += [text, *figures]
+            continue
+        scales: dict[tuple[str, str], list[str]] = {}
+        for step, scale, _, outcome, *_ in [*reader(runs.splitlines())][1:]:
+            scales.setdefault((step, outcome.partition(" (")[0]), []).append(scale)
+        rows = [(*key, ", ".join(found)) for key, found in scales.items()]
+        head = ("time step", "the structure", "at the scales [× the motion]")
+        table = Grid(head, rows, f"Runs of the search{under}", "words")
+        built += [replace(text, text=text.text.rpartition("\n\n")[0]), table, *figures]
+    return built
 
 
 def _build_study(data: ReportData, found: StudyFindings) -> list[Any]:

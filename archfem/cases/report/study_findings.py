@@ -14,12 +14,7 @@ import xarray as xr
 from archfem._files import hash_json, path_inside, read_file_list, read_listed, read_sealed_json
 from archfem._netcdf import read_dataset
 from archfem.cases.result_text import STATED_DOUBTS, UPPER_BOUNDS, mark_bound
-from archfem.cases.structure_keys import (
-    CONTACT_KEYS,
-    MATERIAL_KEYS,
-    list_shapes,
-    shape_keys,
-)
+from archfem.cases.structure_keys import CONTACT_KEYS, MATERIAL_KEYS, list_shapes, shape_keys
 from archfem.dynamics.collapse_state import COLLAPSE_STATES, FALLEN_STATES
 from archfem.errors import InvalidInput
 from archfem.masonry.structure import join_words, list_first
@@ -402,9 +397,8 @@ def _look_beside(found: StudyFindings, rows: list[Any], row: Any) -> tuple[list[
         beside = numbers[key][at - 1], numbers[key][at + 1]
         line = (x for x in rows if all(x[k] == row[k] for k in found.keys if k != key))
         sizes = [x[found.decides] for x in line if x[key] in beside]
-        step = max(
-            [step, *(abs(x / row[found.decides] - 1.0) for x in sizes if row[found.decides])]
-        )
+        steps = (abs(x / row[found.decides] - 1.0) for x in sizes if row[found.decides])
+        step = max([step, *steps])
     return ends, step
 
 
