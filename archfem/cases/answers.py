@@ -112,11 +112,9 @@ class Ratios(NamedTuple):
         found = None if self.floor is None else self.bodies or self.least
         texts = {"by displacements": self.moved, "of the mechanism found": found}
         texts |= {"with the weights apart": apart}
-        each = "; ".join(
-            f"{format_ratio(x)} {words}" for words, x in texts.items() if x is not None
-        )
+        each = [f"{format_ratio(x)} {words}" for words, x in texts.items() if x is not None]
         rest = " until it moves" * (self.moved is not None)
-        return " with e* = 1" * bool(found) + rest + (f" ({each})" if each else "")
+        return " with e* = 1" * bool(found) + rest + f" ({'; '.join(each)})" * bool(each)
 
     def __str__(self) -> str:
         """Return all ratios in words."""
@@ -446,11 +444,9 @@ def note_ties(case: Case) -> list[str]:
 def note_sense(case: Case) -> list[str]:
     """Return a note on the sense of push that the case leaves out."""
     found = case.assessment.directions
-    other = name_side(-found[0])
-    words = (
-        f"pushed to the {other} nothing was assessed, as the case gives direction = {found[0]:g}"
-    )
-    return [f"{NOTE_MARK}{words}"] * (len(found) == 1)
+    words = f"pushed to the {name_side(-found[0])} nothing was assessed"
+    given = f"as the case gives direction = {found[0]:g}"
+    return [f"{NOTE_MARK}{words}, {given}"] * (len(found) == 1)
 
 
 def note_band(case: Case, found: Iterable[KinematicAssessment]) -> list[str]:
@@ -478,8 +474,6 @@ def state_risk(found: Any) -> Statement:  # of `archfem.studies`, a room to the 
     outcome = f"median {name} {median:.3g} {unit}, falls at {rate.rate:.2g} a year"
     factors = zip(sizes, years, strict=True)
     factor = ", ".join(f"{median / size:.3g} on {each:.4g} years" for size, each in factors)
-    text = (
-        f"the structure falls at {rate}; in half of the cases from {median:.3g} {unit} of {name}; "
-    )
-    text += hazard.origin
+    half = f"in half of the cases from {median:.3g} {unit} of {name}"
+    text = f"the structure falls at {rate}; {half}; {hazard.origin}"
     return Statement([text], [Row("annual rate", demand, outcome, factor, {})], found.doubts)

@@ -16,13 +16,6 @@ from archfem._files import atomic_write
 from archfem._validation import check_words, declared_keys, validate_arguments
 from archfem.cases import analysis_keys, analysis_tables, motion_keys, provenance, toml_file
 from archfem.cases.analysis_keys import AssessmentSettings, LimitAnalysis, PushoverSettings
-from archfem.cases.analysis_tables import (
-    DEAD_LOAD_KEYS,
-    SECTION_FIELDS,
-    complete_path,
-    read_analysis,
-    write_analysis_tables,
-)
 from archfem.cases.risk_keys import RISK_KEYS, RiskSettings, parse_risk
 from archfem.cases.structure_keys import cached_structure, shape_keys, write_structure
 from archfem.cases.verdict_keys import VERDICT_KEYS, parse_verdict
@@ -142,7 +135,7 @@ class Case:
         if motion is not None and suite is not None:
             raise InvalidInput("a case has either one motion or a suite: take out one of the two")
         structure = cached_structure(settings, folder)
-        analysis = read_analysis(settings, structure, folder)
+        analysis = analysis_tables.read_analysis(settings, structure, folder)
         strength = analysis_keys.find_given_strength(structure, settings)
         limit = analysis_keys.parse_limit(settings.get("limit", {}), strength)
         assessed = settings.get("assessment", {})
@@ -336,16 +329,16 @@ def read_settings(path: Path, changes: Sequence[str] = ()) -> dict[str, Any]:
     settings = toml_file.read_with_base(path)
     for text in changes:
         path_of_value, value = toml_file.parse_change(text)
-        toml_file.apply_change(settings, complete_path(path_of_value), value)
+        toml_file.apply_change(settings, analysis_tables.complete_path(path_of_value), value)
     return settings
 
 
 @cache
 def section_keys() -> Mapping[str, toml_file.Table]:
     """Return the keys and kinds of each section whose keys do not depend on others in it."""
-    analysis = analysis_tables.analysis_keys()
+    analysis, fields = analysis_tables.analysis_keys(), analysis_tables.SECTION_FIELDS.items()
     return {
-        **{name: {key: analysis[key] for key in own} for name, own in SECTION_FIELDS.items()},
+        **{name: {key: analysis[key] for key in own} for name, own in fields},
         "motion": motion_keys.motion_keys(),
         "suite": motion_keys.suite_keys(),
         "criteria": declared_keys(Criteria),
@@ -356,7 +349,7 @@ def section_keys() -> Mapping[str, toml_file.Table]:
         "assessment": analysis_keys.assessment_keys(),
         "risk": RISK_KEYS,
         "verdict": VERDICT_KEYS,
-        "dead_load": DEAD_LOAD_KEYS,
+        "dead_load": analysis_tables.DEAD_LOAD_KEYS,
         "output": OUTPUT_KEYS,
         "report": _REPORT_KEYS,
     }
@@ -427,7 +420,8 @@ def case_of(subject: Case | Analysis, motion: Any = None, folder: Path | None = 
             return subject
     else:
         place = Path() if folder is None else folder
-        settings = write_structure(subject.structure) | write_analysis_tables(subject, folder)
+        settings = write_structure(subject.structure)
+        settings |= analysis_tables.write_analysis_tables(subject, folder)
         laws = [joint.contact.law for joint in subject.structure.joints]
         if own := provenance.find_extensions([subject.until, *map(type, laws)], folder):
             settings = {"extensions": own, **settings}

@@ -170,15 +170,12 @@ def build_spectrum(table: Table, section: str) -> DesignSpectrum:
 def build_pairs(settings: Table, folder: Path = Path()) -> tuple[Motion, ...]:
     """Return the pairs of a suite under their names, before spectral matching and rest."""
     files = folder / settings.get("folder", "")
-    return tuple(
-        # Without the transverse component, which plane structures do not feel.
-        replace(
-            build_motion(pair | {"rest": 0.0}, files, f"suite.pairs.{name}"),
-            name=name,
-            transverse=None,
-        )
+    pairs = {
+        name: build_motion(pair | {"rest": 0.0}, files, f"suite.pairs.{name}")
         for name, pair in settings["pairs"].items()
-    )
+    }
+    # Without the transverse component, which plane structures do not feel.
+    return tuple(replace(pair, name=name, transverse=None) for name, pair in pairs.items())
 
 
 def find_matched_band(suite: Table | None) -> tuple[float, float] | None:
@@ -191,12 +188,8 @@ def find_matched_band(suite: Table | None) -> tuple[float, float] | None:
 
 def build_suite(settings: Table, folder: Path = Path()) -> Suite:
     """Return a suite of pairs, matched to its target spectrum if the case says so."""
-    suite = Suite(
-        settings.get("name", "suite"),
-        build_pairs(settings, folder),
-        scale=settings.get("scale", 1.0),
-        reduction=settings.get("reduction", 1.0),
-    )
+    factors = {key: settings.get(key, 1.0) for key in ("scale", "reduction")}
+    suite = Suite(settings.get("name", "suite"), build_pairs(settings, folder), **factors)
     target = build_target_spectrum(settings)
     if target and (band := find_matched_band(settings)):
         suite = suite.matched(target, band=band)

@@ -236,10 +236,8 @@ def dead_load_files(result: DeadLoadResult) -> Files:
         files["dead_stress.png"] = draw_stress(model, dead)
         files["dead_stress.txt"] = strength_use_table(result.strength_use)
     if "free_body" in case.output:
-        block = case.output["free_body"]
-        files["free_body.png"] = draw_free_body(
-            case.structure, dead.joints, block, cells=model.cells
-        )
+        given = case.structure, dead.joints, case.output["free_body"]
+        files["free_body.png"] = draw_free_body(*given, cells=model.cells)
     return files
 
 

@@ -25,13 +25,8 @@ HAZARD_KEYS: dict[str, Any] = {
     "period": "s",
     "source": str,  # where the curve is from
 }
-RISK_KEYS: dict[str, Any] = {
-    "hazard": dict,
-    "samples": int,
-    "precision": "1",
-    "seed": int,
-    "alternatives": dict,
-}
+RISK_KEYS: dict[str, Any] = {"hazard": dict, "samples": int, "precision": "1", "seed": int}
+RISK_KEYS |= {"alternatives": dict}
 ALTERNATIVE_KEYS: dict[str, Any] = {"weight": "1", "set": [str]}
 
 

@@ -250,10 +250,7 @@ Result = Collapse | DeadLoadResult | Pushover | Suite | Run
 
 @validate_arguments
 def run_case(
-    case: Case,
-    folder: str | Path | None = None,
-    *,
-    pairs: Collection[str] | None = None,
+    case: Case, folder: str | Path | None = None, *, pairs: Collection[str] | None = None
 ) -> Iterator[Result]:
     """Carry out a case, and yield each result as soon as it is computed.
 

@@ -136,10 +136,8 @@ def describe_thickness(case: Case, ring: Ring) -> tuple[list[Row], list[str]]:
     rows = [Row(RESULTS["thickness"], at_rest, words, f"{factor:.4g}", {"most": factor})]
     whole = geometric_factor(case.structure, limit.strength)
     if len(ring.stones) < len(case.structure.free) and whole:
-        depth = f"{1.0 / whole:.3g} of what is built"
-        rows.append(
-            Row("least depth of all joints", at_rest, depth, f"{whole:.4g}", {"most": whole})
-        )
+        depth, result = f"{1.0 / whole:.3g} of what is built", "least depth of all joints"
+        rows.append(Row(result, at_rest, depth, f"{whole:.4g}", {"most": whole}))
     if limit.friction is not None:
         with suppress(InvalidInput):  # without sliding it may stand at any thickness
             rough = find(friction=None)

@@ -29,17 +29,8 @@ DEFAULT_RANGES: dict[str, tuple[Any, ...]] = {
 RANGES = {**DEFAULT_RANGES, "finish": ("as given", *FINISHES), "scale": (1.0,)}
 
 # Values at which a run is as given
-NEUTRAL: dict[str, Any] = {
-    "joint_rule": "exact",
-    "finish": "as given",
-    "k_n": 1.0,
-    "k_s": 1.0,
-    "friction": 0.0,
-    "damping_ratio": 1.0,
-    "scale": 1.0,
-    "sign": "as given",
-    "dt": "as given",
-}
+NEUTRAL = {"joint_rule": "exact", "finish": "as given", "k_n": 1.0, "k_s": 1.0, "friction": 0.0}
+NEUTRAL |= {"damping_ratio": 1.0, "scale": 1.0, "sign": "as given", "dt": "as given"}
 
 
 def default_ranges(*structures: Structure) -> dict[str, tuple[Any, ...]]:

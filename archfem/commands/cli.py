@@ -293,11 +293,8 @@ def _add_installation_commands(commands: Any) -> None:
     add("--out", metavar="DIR", help="copy it there, with all that it refers to")
     about = "write a commented case to begin with"
     add = _add_command(commands, "new", about, "tools", description=about)
-    add(
-        "kind",
-        choices=("ring", "bridge", "wall", "portal"),
-        help="of structure; a wall across its plane",
-    )
+    kinds = ("ring", "bridge", "wall", "portal")
+    add("kind", choices=kinds, help="of structure; a wall across its plane")
     add("--out", metavar="CASE.toml", help="the file (its kind.toml)")
     _add_command(commands, "schema", "print the JSON schema of case files, for editors", "tools")
     about = "what is installed, what is missing, how to get it"

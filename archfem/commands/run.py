@@ -12,26 +12,15 @@ from typing import Any
 
 import numpy as np
 
+from archfem import _files
 from archfem._display import DOUBT_MARK, NOTE_MARK, ProgressReport, write_progress_line
-from archfem._files import (
-    DRAFT_PREFIX,
-    create_result_folder,
-    group_of,
-    intact_file_list,
-    path_inside,
-    replace_results,
-)
+from archfem._files import create_result_folder
 from archfem._optional import can_film
-from archfem.cases import answers, result_text, structure_text
+from archfem.cases import answers, defaults, result_text, structure_text
 from archfem.cases import result_folder as results
 from archfem.cases.analysis_keys import name_vehicles, parse_rating, rate_case
 from archfem.cases.answers import RESULTS, state_ratings
 from archfem.cases.case import Case, sign
-from archfem.cases.defaults import (
-    describe_defaults,
-    describe_fill_defaults,
-    describe_spectrum_defaults,
-)
 from archfem.cases.run import (
     CASE_FILE,
     RATING_FILE,
@@ -131,15 +120,15 @@ def write_results(
         print(text)
         return
     name, inputs, place = name_group(command, pair), case.hash_inputs(), PurePath(pair or "")
-    owner = group_of(intact_file_list(Path(out)), CASE_FILE)
+    owner = _files.group_of(_files.intact_file_list(Path(out)), CASE_FILE)
     if owner is not None and owner.inputs != inputs:
         others = f"{NOTE_MARK}{out} has results of another case, drawing or version of archfem"
         text += f"\n{others}: a report shows those of one alone; run all again, or name another"
     # a reader of the text, such as `head`, may leave before its end
     with _print_at_end(Path(out), name, text):
         folder = create_result_folder(out)
-        with replace_results(folder, name, inputs) as draft:
-            run = intact_file_list(folder).get("run")
+        with _files.replace_results(folder, name, inputs) as draft:
+            run = _files.intact_file_list(folder).get("run")
             files: Files = {str(place / key): content for key, content in draw().items()}
             # a run has the case of the folder, in which [report] may have changed
             if run is None or run.inputs == inputs:
@@ -154,7 +143,7 @@ def name_group(command: str, pair: str | None) -> str:
 
 def _name_published_files(text: str, folder: Path, command: str) -> str:
     """Replace the names of files of a draft by those of the result folder, unless it is left."""
-    draft = folder / f"{DRAFT_PREFIX}{command}"
+    draft = folder / f"{_files.DRAFT_PREFIX}{command}"
     if draft.exists():
         return text
     lines = text.replace(str(draft), str(folder)).splitlines(keepends=True)
@@ -189,7 +178,7 @@ def modes(options: argparse.Namespace) -> int:
     case, folder = Case.read(options.case, options.changes), create_result_folder(options.out)
     print(case.title)
     given = folder, "modes"
-    with _print_at_end(*given), replace_results(*given, case.hash_inputs()) as draft:
+    with _print_at_end(*given), _files.replace_results(*given, case.hash_inputs()) as draft:
         at_rest = DeadLoadResult.of(case)
         print(result_text.describe_dead_load(at_rest))
         computed = print_modes(at_rest, options.count, draft)
@@ -269,9 +258,10 @@ def _show_assessment(
         lines = [x for x in str(result).splitlines() if not x.startswith(DOUBT_MARK)]
         texts.append("\n".join([f"{name}: {lines[0]}", *lines[1:]]))
     of_fill = describe_fill(case.assessment.options.get("fill"), case.structure)
-    spectrum = describe_spectrum_defaults(case)
+    spectrum = defaults.describe_spectrum_defaults(case)
     spectrum = f"spectrum, by default: {spectrum}" * bool(spectrum)
-    texts.append("\n".join(filter(None, [of_fill, describe_fill_defaults(case), spectrum])))
+    of_case = [of_fill, defaults.describe_fill_defaults(case), spectrum]
+    texts.append("\n".join(filter(None, of_case)))
     text = "\n\n".join(filter(None, [*texts, "\n".join(result_text.mark_remarks(every))]))
 
     def draw() -> Files:
@@ -334,7 +324,7 @@ def _vary(
     """Return table and sentences of the variations of a rating, and those that Ctrl-C left out."""
     from archfem.studies.variations import vary_rating
 
-    folder = None if out is None else path_inside(Path(out), "rating_variations")
+    folder = None if out is None else _files.path_inside(Path(out), "rating_variations")
     varied, sentences, left = vary_rating(case, table, found, folder)
     remedy = "give --out, which keeps the others"
     if folder is not None:
@@ -387,7 +377,7 @@ def accuracy(options: argparse.Namespace) -> int:
     from archfem.view.studies import draw_accuracy
 
     case, folder = Case.read(options.case, options.changes), create_result_folder(options.out)
-    compared = case_accuracy(case, path_inside(folder, "settings"), workers=options.workers)
+    compared = case_accuracy(case, _files.path_inside(folder, "settings"), workers=options.workers)
     text = result_text.describe_accuracy(compared)
     files: Files = {"accuracy.txt": text, "accuracy.png": draw_accuracy(compared)}
     write_results("accuracy", case, options.out, text, lambda: files)
@@ -413,7 +403,7 @@ def risk(options: argparse.Namespace) -> int:
         *(case.analysis, motions, case.risk.hazard),
         alternatives=alternatives or None,
         workers=options.workers,
-        out=path_inside(folder, "risk_samples.nc"),
+        out=_files.path_inside(folder, "risk_samples.nc"),
         target=case.target,
         **case.risk.options,
     )
@@ -560,12 +550,12 @@ def _print_run(run: Run, at_rest: DeadLoadResult) -> None:
             f"{float(history.time[-1]):.2f} s{took}; {history.outcome}"
         )
         print(f"wrote {run.path}")
-    defaults = describe_defaults(run.case)
+    listed = defaults.describe_defaults(run.case)
     given = run.case.structure, history, at_rest.dead.joints
     across, falls = check_across(run.case.structure, {motion.name: motion})
     # what all motions do across is printed once, after their runs
     said, text = (
-        "\n\n".join(filter(None, [result_text.describe_run(*given, count, falls), line, defaults]))
+        "\n\n".join(filter(None, [result_text.describe_run(*given, count, falls), line, listed]))
         for count, line in ((MAX_PRINTED_JOINTS, ""), (None, across))
     )
     print(said)

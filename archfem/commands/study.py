@@ -55,11 +55,7 @@ def study(options: argparse.Namespace) -> int:
 
 def _write_results(definition: "Study", table: xr.Dataset, folder: Path) -> list[Doubt]:
     """Print, write and draw the table of a study, with comparisons, and return its doubts."""
-    from archfem.cases.report.study_findings import (
-        collect_findings,
-        say_below_site,
-        say_what_changes,
-    )
+    from archfem.cases.report import study_findings
     from archfem.studies.comparison import file_name, study_table, write_finding
     from archfem.studies.study import NOT_COMPUTED, Comparison
     from archfem.view.studies import draw_findings, draw_study
@@ -71,8 +67,8 @@ def _write_results(definition: "Study", table: xr.Dataset, folder: Path) -> list
     text = study_table(findings) if findings else format_table(table)
     if isinstance(definition, Comparison) and definition.statements:
         text = f"{definition.answers(table)}\n\n{text}"
-    found = collect_findings(definition.title, text, table)
-    said = [*say_what_changes(found), *say_below_site(found)]
+    found = study_findings.collect_findings(definition.title, text, table)
+    said = [*study_findings.say_what_changes(found), *study_findings.say_below_site(found)]
     said += [f"{DOUBT_MARK}{doubt}" for doubt in found.doubts]
     text = "\n\n".join(filter(None, [text, "\n".join(said)]))
     print(text)

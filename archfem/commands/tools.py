@@ -74,9 +74,8 @@ def _check_case(options: argparse.Namespace) -> int:
     print(structure_text.describe_supports(case.structure))
     print(structure_text.describe_depths(case.structure))
     for section, name, used in list_unused_tables(case.settings, case.structure):
-        print(
-            f"{NOTE_MARK}[{section}.{format_key(name)}] counts for nothing: there are {used} alone"
-        )
+        place = f"[{section}.{format_key(name)}]"
+        print(f"{NOTE_MARK}{place} counts for nothing: there are {used} alone")
     case.limit.check(case.structure)
     doubts = list[Doubt]()
     if case.pushover is not None:
