@@ -803,7 +803,9 @@ def test_the_verdict_of_several_cases_is_the_worst_and_names_its_case(case):
     facts = conclusion.list_joint_facts(parts)
     assert facts[1][1].startswith("The worst of 7 cases is fallen 2.0: It does not survive: ")
     assert facts[2][0] == "margin"
-    least = "of stands 0.9 0.9 times the earthquake; of stands 1.4 1.4 times the earthquake; "
+    least = "; ".join(
+        f"of stands {x} {x} times the earthquake by linear, right" for x in (0.9, 1.4)
+    )
     assert facts[2][1].startswith(f"The least margins are {least}")
     assert facts[2][1].endswith("; of stands None not known.")
     assert facts[3][0] == "not checked"  # the same for all
@@ -823,8 +825,8 @@ def test_margins_side_by_side_are_in_the_plane_and_what_is_across_it_is_said_onc
     facts = conclusion.list_joint_facts(parts)
     said = dict(facts)
     assert said["margin"] == (
-        "The least margins are of weak 0.6 times the earthquake; "
-        "of strong 1.5 times the earthquake."
+        "The least margins are of weak 0.6 times the earthquake by linear, right; "
+        "of strong 1.5 times the earthquake by linear, right."
     )
     assert conclusion._rank_verdict(parts["strong"])[0] == 1  # it may overturn
     assert sum("cross the plane of" in text for _, text in facts) == 1
@@ -848,17 +850,19 @@ def test_cases_are_ranked_by_the_kind_of_their_demand(case, fails):
         vars(data)["transverse_push"] = np.nan
         stated = answers.Statement(["in words"], [rows[name]])
         vars(data)["statements"] = {rows[name].result: stated}
-    facts = dict(conclusion.list_joint_facts(parts))
+    facts, push = (
+        dict(conclusion.list_joint_facts(parts)),
+        "times the site's acceleration by a push",
+    )
     assert facts["margin"] == (
-        "The least margins are of vale 2 times the earthquake; of hill 3 times the earthquake; "
-        "of road 4 times the vehicle."
+        f"The least margins are of vale 2 {push}; of hill 3 {push}; of road 4 times the vehicle."
     )
     if fails:  # a failure is the worst of whatever kind
         assert facts["verdict"].startswith("The worst of 3 cases is road: Rating for LM1: factor 4")
         return
     assert facts["verdict"] == (
-        "The worst of 3 cases, each by its kind of demand, are vale (2 times the earthquake) and "
-        "road (4 times the vehicle)."
+        f"The worst of 3 cases, each by its kind of demand, are vale (2 {push}) and road (4 times "
+        "the vehicle)."
     )
     assert {*parts} < {*facts}
 
@@ -885,9 +889,9 @@ def test_the_least_margins_of_several_cases_are_at_most_what_is_an_upper_bound(c
     for name, data in parts.items():
         vars(data).update(statements=stated[name], transverse_push=np.nan)
     facts = dict(conclusion.list_joint_facts(parts))
-    assert facts["margin"].replace(" times the earthquake", "") == (
-        "The least margins are of exact 1.2; of path at most 1.3; of searched at most 1.4; of "
-        "sliding at most 1.5; of other 1.6."
+    assert facts["margin"].replace(" times the site's acceleration by a push", "") == (
+        "The least margins are of path at most 1.3 times the earthquake by c; of exact 1.2; of "
+        "searched at most 1.4; of sliding at most 1.5; of other 1.6."
     )
     alone = (
         "Pushed sideways as rigid blocks it begins to move at most at 1.5 times the site's "
@@ -1277,7 +1281,8 @@ def test_a_joint_head_states_what_differs_and_of_which_check_a_margin_is(case):
     assert signed == expected | {"place": "Vale (B)"}
     earth = "1.4 times the earthquake"
     rest = f"of B {earth} until it begins to move, 1.25 by displacements (damage, right)"
-    assert facts["margin"] == f"The least margins are of A {earth}; {rest}; of C {earth}."
+    by = f"{earth} by damage, right"
+    assert facts["margin"] == f"The least margins are of A {by}; {rest}; of C {by}."
 
 
 def test_without_a_norm_a_rating_without_a_code_comes_first(case):

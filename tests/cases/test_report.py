@@ -1040,8 +1040,8 @@ def test_a_report_of_several_folders_has_the_worst_verdict_and_the_inputs_once(
     assert f"cases {broad}; {slender} verdict" in words
     worst = "verdict The worst of 2 cases is B: "
     assert f"{worst}By the kinematic assessment it does not withstand" in words
-    of = [f"{x} times the earthquake" for x in ratios]
-    assert f"margin The least margins are of B {of[1]}; of A {of[0]}." in words
+    of = [rf"{x} times the earthquake by [^;]+" for x in ratios]
+    assert re.search(f"margin The least margins are of B {of[1]}; of A {of[0]}\\. ", words)
     assert " A By the kinematic assessment it withstands" in words
     assert "A B breadth 0.9 m (given) 0.3 m (given)" in words
     assert words.count("heights 1, 1 given") == words.count("place, date signature") == 1
@@ -1081,12 +1081,12 @@ def test_a_report_of_several_folders_has_the_worst_verdict_and_the_inputs_once(
     margin = re.findall(r"least margin ([\d.]+)", capsys.readouterr().out)[-1]
     arguments = ["study", str(compared), "--out", str(both), "--workers", "1"]
     assert af.commands.main(arguments) in (0, 3)
-    for place, of_slender in ((shown, least), (both, ratios[1])):
+    for place in (shown, both):  # whatever a study varies
         given = ["report", folders[1], tied, "--study", str(place), "--out", str(page)]
         assert af.commands.main(given) == 0
         words = " ".join(words_of(page).split())
-        says = [f"of {x} {y} times the earthquake" for x, y in (("A", of_slender), ("B", margin))]
-        assert f"The least margins are {'; '.join(says)}." in words
+        says = [f"of {x} {y} times the earthquake" for x, y in (("A", ratios[1]), ("B", margin))]
+        assert re.search(f"The least margins are {' by [^;]+; '.join(says)}", words)
     capsys.readouterr()
     given = ["report", folders[0], folders[0], "--study", str(shown)]
     assert af.commands.main(given) == 1

@@ -256,9 +256,7 @@ def test_a_verdict_names_the_least_that_it_needs(lorry_rating, low, words):
 
 
 @pytest.mark.parametrize(("without", "doubted"), [(0.9, True), (1.1, False)])
-def test_what_passes_with_pressure_of_the_fill_alone_is_in_doubt(
-    lorry_rating, without, doubted
-):
+def test_what_passes_with_pressure_of_the_fill_alone_is_in_doubt(lorry_rating, without, doubted):
     moving = _scaled(lorry_rating.moving, 1.5 / lorry_rating.factor)
     found = replace(lorry_rating, moving=moving, crushing={}, fill=GRAVEL, without_pressure=without)
     remarks = doubt_rating(found, LimitAnalysis([], "coulomb", 1e7))

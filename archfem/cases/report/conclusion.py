@@ -66,7 +66,7 @@ _SIGNED = {key.replace("_", " ") for key in REPORT_KEYS}
 DEFAULT_STIFFNESS = "the stiffness of joints is a default: measured ones differ tenfold"
 
 # Demands of which factors of several cases are multiples, in words
-KINDS = "the earthquake", "the vehicle", "the given load"
+KINDS = "the earthquake", "the site's acceleration by a push", "the vehicle", "the given load"
 
 # Project in the templates of new cases
 PLACEHOLDER = "Name of the project"
@@ -166,6 +166,8 @@ def _say_factor(data: ReportData, factor: float, kind: str) -> str:
     bounds += [least for least, words, _ in margins.say_less(data) if "≤" in words]
     until = ""
     for check in checks:
+        if check.decisive == factor and kind == KINDS[0]:
+            until = f" by {check.name}"
         if check.displaced is not None and check.decisive == factor:
             by = f"{format_ratio(check.displaced)} by displacements ({check.name})"
             until = f" until it begins to move, {by}"
@@ -183,14 +185,17 @@ def _rank_verdict(data: ReportData) -> tuple[int, dict[str, float]]:
     rows = stated.rows if stated else []
     if data.case.report.get("norm"):  # decides, if it has a rating
         rows = [row for row in rows if _is_of_norm(data, row.demand)] or rows
-    loads = read_numbers(PushFactors, data.statements.get("limit"))
+    stated_loads = (data.statements.get(name) for name in ("limit", "pushover"))
+    loads = [load for each in stated_loads for load in read_numbers(PushFactors, each)]
     factors = [load.least for load in loads if not load.site]
     fails = [x < 1.0 for x, is_ranked, _ in ranked if is_ranked] + [x < 1.0 for x in factors]
     fails += [least < 1.0 for least, *_ in margins.say_less(data)]
     fails += [scale < 1.0 for scale, *_ in margins.say_across(data)] + [_say_unchecked(data)[1]]
     fails += [not x.numbers["passes"] or x.numbers["least"] < 1.0 for x in rows]
-    shaken, rated = (x for x, *_ in ranked), (x.numbers["least"] for x in rows)
-    every = zip(KINDS, (min(x, default=np.inf) for x in (shaken, rated, factors)), strict=True)
+    shaken = [x for x, is_margin, _ in ranked if is_margin]
+    pushed = [load.least for load in loads if load.site and not shaken]
+    demands = shaken, pushed, [x.numbers["least"] for x in rows], factors
+    every = zip(KINDS, (min(x, default=np.inf) for x in demands), strict=True)
     undecided = outcome.startswith("may") or (bool(data.runs) and bool(_say_why_undecided(data)))
     places = outcome == "does not survive", any(fails), undecided, "damage" in outcome, True
     return places.index(True), {kind: least for kind, least in every if least < np.inf}

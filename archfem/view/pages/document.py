@@ -72,7 +72,8 @@ class FigureBlock:
         """Return a matplotlib figure as a vector graphic."""
         disable_math(figure)
         buffer = BytesIO()
-        with matplotlib.rc_context({"svg.fonttype": "path", "path.simplify_threshold": 0.5}):
+        fixed = {"svg.fonttype": "path", "svg.hashsalt": "archfem"}
+        with matplotlib.rc_context({**fixed, "path.simplify_threshold": 0.5}):
             figure.savefig(
                 buffer, format="svg", transparent=True, metadata={"Date": None}, **_WITHOUT_MARGIN
             )
