@@ -31,7 +31,7 @@ from archfem.limit.collapse_warnings import (
     warn_sliding,
 )
 from archfem.limit.fill_bounds import FillBounds, bound_least_factor, refine_bounds
-from archfem.limit.fill_range import FillRange, say_part, vary_fill
+from archfem.limit.fill_range import FillAssumption, FillRange, say_part, vary_fill
 from archfem.limit.fill_strength import Fill, PlasticFill, find_clear_springing, place_backing
 from archfem.limit.linear_programme import Optimum, Programme, RigidBlocks
 from archfem.limit.mechanism_kinematics import RigidRegions
@@ -371,20 +371,45 @@ def _solve_range(given: tuple[Any, Any, Any, Any, Any], fill: Fill) -> Collapse:
     try:
         with keep_warnings() as said:
             result = _solve_loads(*given, fill)
-        over = None if np.isnan(result.factor) else _vary_assumptions(result, *given[3:], fill)
-        result = replace(result, over_fill=over)
-        if over is None or over.ends[0] == result.factor:
+        others = {} if np.isnan(result.factor) else _vary_assumptions(given, fill, result, said)
+        if not others:
             return result
-        _, assumed = vary_fill(fill)[min(over.values, key=over.values.__getitem__)]
-        of_given = said
-        with keep_warnings() as said:
-            least = replace(_solve_loads(*given, assumed), over_fill=over)
+        falls = Outcome.INFEASIBLE
+        values = {k: 0.0 if x.outcome is falls else x.factor for k, (x, _) in others.items()}
+        over = FillRange(values)
+        result = replace(result, over_fill=over)
+        if over.ends[0] == result.factor:
+            return result
+        least, of_least = others[min(values, key=values.__getitem__)]
         # what is in doubt at a larger factor alone
-        notes = tuple(x for x in of_given if x not in said)
-        return replace(result, notes=notes, least=replace(least, notes=notes))
+        notes = tuple(x for x in said if x not in of_least)
+        said = of_least
+        return replace(result, notes=notes, least=replace(least, over_fill=over, notes=notes))
     finally:
         for warning in said:
             logger.warning("%s", warning)
+
+
+def _vary_assumptions(
+    given: tuple[Any, Any, Any, Any, Any], fill: Fill, found: Collapse, said: list[str]
+) -> dict[FillAssumption, tuple[Collapse, list[str]]]:
+    """Return results and warnings under all assumptions on a fill that is pushed, one known."""
+    results = dict[FillAssumption, tuple[Collapse, list[str]]]()
+    pushed = sum_body_forces([*found._loads, *found.dead])[0]
+    for assumption, (_, assumed) in vary_fill(fill).items() if pushed else ():
+        each, own = found, said
+        if assumed != fill:
+            try:
+                with keep_warnings() as own:
+                    each = _solve_loads(*given, assumed)
+            except Interrupted as error:
+                raise Interrupted(found) from error
+        if each.outcome is Outcome.BRACKETED:
+            words = "the range over the fill leaves out %s, with which %s"
+            logger.warning(words, assumption, each.outcome.sentence)
+        else:
+            results[assumption] = each, own
+    return results
 
 
 def _solve_loads(
@@ -557,36 +582,6 @@ def _solve_collapse(
     if friction == "coulomb":
         above |= warn_sliding(structure, result.sliding, result.factor)
     return replace(result, solutions=solutions, bounded=above)
-
-
-def _vary_assumptions(
-    found: Collapse, friction: str | None, strength: float | None, fill: Fill
-) -> FillRange | None:
-    """Return the factors of a push under all assumptions on a fill, that of itself being known."""
-    if found.structure is None or not sum_body_forces([*found._loads, *found.dead])[0]:
-        return None
-    values = {}
-    for assumption, (_, assumed) in vary_fill(fill).items():
-        if assumed == fill:
-            values[assumption] = found.factor
-            continue
-        given = found.structure, friction, strength, assumed, found.dead
-        stones, programme = self_weight_programme(*given)
-        if not is_balanced(programme.minimise_residual(), programme):
-            values[assumption] = 0.0
-            continue
-        loaded = programme.with_load_factor(stones.load(found._loads))
-        optimum = loaded.solve()
-        if friction == "nonassociated":
-            optimum, solutions = search_nonassociated(loaded, optimum, -1.0)
-            if solutions.interrupted:
-                raise Interrupted(found)
-            if optimum is None and np.isfinite(solutions.bracket[0]):
-                words = "the range over the fill leaves out %s, with which %s"
-                logger.warning(words, assumption, Outcome.BRACKETED.sentence)
-                continue
-        values[assumption] = np.inf if optimum is None else -optimum.value
-    return FillRange(values)
 
 
 def _read_without_optimum(
