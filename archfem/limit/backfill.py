@@ -6,12 +6,12 @@ gives the active and the passive pressure on the stones' faces (Rankine). A load
 in a fan down to the stones that it meets first (Flamant).
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 from math import radians, tan
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -596,6 +596,15 @@ def hold_backed(structure: Structure, level: float | None) -> Structure:
     return replace(structure, blocks=tuple(blocks))
 
 
+def refuse_missing_fill(soil: Collection[Any]) -> None:
+    """Refuse the strength of a fill where no block is one."""
+    if not soil:
+        raise InvalidInput(
+            "fill is given, but no block is soft enough to be one (role 'other', and softer than "
+            "the joints around it): leave fill out, or build the structure with its backfill"
+        )
+
+
 def attach_fill(structure: Structure, fill: object) -> BlocksWithFill:
     """Separate the stones of a structure from its fill, and check that the fill has a strength."""
     if fill is not None and not isinstance(fill, Fill):
@@ -615,11 +624,8 @@ def attach_fill(structure: Structure, fill: object) -> BlocksWithFill:
             "fill=af.limit.Fill(friction_angle=35.0), or in a case fill = "
             '{ friction_angle = "35 degree" } in [limit]; or push a finite-element model over'
         )
-    if fill is not None and not names:
-        raise InvalidInput(
-            "fill is given, but no block is soft enough to be one (role 'other', and softer than "
-            "the joints around it): leave fill out, or build the structure with its backfill"
-        )
+    if fill is not None:
+        refuse_missing_fill(names)
     regions = find_rigid_regions(structure)
     if set(regions.blocks) & set(soil):
         raise InvalidInput(f"there is nothing but fill, {names}: limit analysis is of stones")

@@ -48,6 +48,11 @@ class Rows:
         shape = max(self.count, count), size
         return sparse.csr_matrix((entries, tuple(places)), shape=shape)
 
+    def cones(self, size: int) -> tuple[sparse.csr_matrix, Array]:
+        """Return matrix and right sides of cones, of whose rows all first ones were added first."""
+        order = np.arange(self.count).reshape(3, -1).T.ravel()
+        return self.matrix(size)[order], self.bounds[order]
+
     @property
     def bounds(self) -> Array:
         """Right sides (n,)."""

@@ -34,7 +34,13 @@ from scipy import sparse
 from archfem._display import ProgressReport
 from archfem._typing import Array, Flags, Numbers
 from archfem.errors import DidNotConverge, InvalidInput, logger
-from archfem.limit.backfill import SELF_WEIGHT, BlocksWithFill, hold_backed, sum_body_forces
+from archfem.limit.backfill import (
+    SELF_WEIGHT,
+    BlocksWithFill,
+    hold_backed,
+    refuse_missing_fill,
+    sum_body_forces,
+)
 from archfem.limit.cone_programme import Rows, solve_cones
 from archfem.limit.fill_mesh import HELD, SURFACE, FillMesh, mesh_fill
 from archfem.limit.fill_strength import PlasticFill, as_pressure, place_backing
@@ -351,14 +357,10 @@ class FilledBlocks:
         found = []
         for slope, constant in cones:
             rows = Rows()
-            for each, values, right in (
-                ([0, 1], [slope, slope], constant),
-                ([0, 1], [-1.0, 1.0], 0.0),
-                ([2], [-2.0], 0.0),
-            ):
-                rows.add(start[:, None] + np.array(each), np.array(values), right)
-            order = np.arange(3 * len(start)).reshape(3, -1).T.ravel()
-            found.append((rows.matrix(size)[order], rows.bounds[order]))
+            rows.add(start[:, None] + [0, 1], np.array([slope, slope]), constant)
+            rows.add(start[:, None] + [0, 1], np.array([-1.0, 1.0]))
+            rows.add(start[:, None] + [2], -2.0)
+            found.append(rows.cones(size))
         return found
 
     def _crushing_cones(self, first: int, size: int) -> list[tuple[sparse.csr_matrix, Array]]:
@@ -374,8 +376,7 @@ class FilledBlocks:
             rows.add((own + end * count)[:, None], -1.0, crushing + 0.5 * tension)
             rows.add((own + end * count)[:, None], 1.0, crushing - 0.5 * tension)
             rows.add(np.stack([own, own + count], axis=1), -2.0, 2.0 * tension)
-            order = np.arange(3 * count).reshape(3, -1).T.ravel()
-            found.append((rows.matrix(size)[order], rows.bounds[order]))
+            found.append(rows.cones(size))
         return found
 
 
@@ -500,27 +501,25 @@ def refine_bounds(
     structure = hold_backed(structure, place_backing(fill, structure).backing)
     regions = find_rigid_regions(structure)
     soil = tuple(number for number in structure.free if number not in regions.blocks)
-    if not set(soil) & set(find_yielding_blocks(structure)):
-        raise InvalidInput(
-            "fill is given, but no block is soft enough to be one (role 'other', and softer than "
-            "the joints around it): leave fill out, or build the structure with its backfill"
-        )
-    if bodies := set(find_bodies(structure)) & {structure.blocks[number].name for number in soil}:
-        raise InvalidInput(
-            f"{sorted(bodies)} on a plastic fill would be a part of it: give the fill by law "
-            "'pressure', or weight without mass as a load that stays"
-        )
-    if friction == "nonassociated":
-        raise InvalidInput(
-            "friction = 'nonassociated' and a plastic fill: bounds need associated flow in both; "
-            "take friction='coulomb'"
-        )
+    _check_bounded(structure, soil, friction)
     area = sum(structure.blocks[number].area for number in soil)
     # equilateral triangles of side s have the area √3 s² / 4
     size = float(np.sqrt(4.0 / np.sqrt(3.0) * area / first))
     mesh = mesh_fill(structure, soil, size, fill.holds_ends)
-    loads, best = (live, [SELF_WEIGHT, *dead]), None
-    filled = _load_blocks(structure, regions, loads, friction, strength, fill, mesh)
+    stones = BlocksWithFill(structure, as_pressure(fill), regions)  # for the fan of loads
+    blocks = RigidBlocks(regions.structure)
+
+    def forces(actions: Sequence[Action]) -> tuple[Array, Array]:
+        pulls = [action for action in actions if isinstance(action, BodyForce)]
+        points = [action for action in actions if isinstance(action, PointLoad)]
+        load = blocks.dimensionless(blocks.load(pulls) + stones.load(points))
+        return load, np.array(sum_body_forces(pulls))
+
+    rough = np.full(len(regions.structure.joints), np.inf)
+    coefficients = rough if friction is None else regions.structure.friction
+    loads = *forces(live), *forces([SELF_WEIGHT, *dead])
+    filled = FilledBlocks(blocks, mesh, fill, regions, *loads, coefficients, strength)
+    best = None
     while best is None or len(best.filled.mesh.triangles) <= most:
         try:
             best = FillBounds(filled, filled.bound_below(), filled.bound_above())
@@ -534,6 +533,21 @@ def refine_bounds(
             return
         filled = replace(filled, mesh=filled.mesh.refined(best.widest()))
     _doubt_bounds(best, fill.gap)
+
+
+def _check_bounded(structure: Structure, soil: Sequence[int], friction: str | None) -> None:
+    """Refuse what the bounds do not cover: no fill, bodies on it, friction without dilatancy."""
+    refuse_missing_fill({*soil} & {*find_yielding_blocks(structure)})
+    if bodies := set(find_bodies(structure)) & {structure.blocks[number].name for number in soil}:
+        raise InvalidInput(
+            f"{sorted(bodies)} on a plastic fill would be a part of it: give the fill by law "
+            "'pressure', or weight without mass as a load that stays"
+        )
+    if friction == "nonassociated":
+        raise InvalidInput(
+            "friction = 'nonassociated' and a plastic fill: bounds need associated flow in both; "
+            "take friction='coulomb'"
+        )
 
 
 def _doubt_bounds(best: FillBounds, gap: float) -> None:
@@ -585,29 +599,3 @@ def bound_least_factor(searches: Mapping[Any, Iterator[FillBounds]]) -> dict[Any
                 *(lower, min(each.above.factor for each in found.values())),
             )
             return found
-
-
-def _load_blocks(
-    structure: Structure,
-    regions: RigidRegions,
-    loads: tuple[Sequence[Action], Sequence[Action]],
-    friction: str | None,
-    strength: float,
-    fill: PlasticFill,
-    mesh: FillMesh,
-) -> FilledBlocks:
-    """Return stones and fill with their loads."""
-    stones = BlocksWithFill(structure, as_pressure(fill), regions)  # for the fan of loads
-    blocks = RigidBlocks(regions.structure)
-
-    def forces(actions: Sequence[Action]) -> tuple[Array, Array]:
-        pulls = [action for action in actions if isinstance(action, BodyForce)]
-        points = [action for action in actions if isinstance(action, PointLoad)]
-        load = blocks.dimensionless(blocks.load(pulls) + stones.load(points))
-        return load, np.array(sum_body_forces(pulls))
-
-    (live, pull), (dead, dead_pull) = map(forces, loads)
-    rough = np.full(len(regions.structure.joints), np.inf)
-    coefficients = rough if friction is None else regions.structure.friction
-    given = blocks, mesh, fill, regions, live, pull, dead, dead_pull, coefficients
-    return FilledBlocks(*given, strength)

@@ -44,6 +44,13 @@ class DeepenedBlocks(RigidBlocks):
         return (RigidBlocks(self.structure).balance @ ends).tocsr()
 
 
+def deepen(dead: Programme, factor: float) -> Programme:
+    """Return the programme with joints deepened by a factor."""
+    crushing = None if dead.crushing is None else factor * dead.crushing
+    blocks, cohesion = DeepenedBlocks(dead.blocks.structure, factor), factor * dead.cohesion
+    return replace(dead, blocks=blocks, cohesion=cohesion, crushing=crushing)
+
+
 def explain_instability(structure: Structure) -> str | None:
     """Return why rigid blocks cannot rest under their weight, and the remedy; None if they can."""
     refuse_bonds(structure)
@@ -285,15 +292,10 @@ def _stands(
 
     A bound of the residual above `enough` suffices [mean block weights].
     """
-    blocks: RigidBlocks = dead.blocks
-    coefficient: Array = blocks.structure.friction
+    coefficient: Array = dead.blocks.structure.friction
     if friction is not None:
         coefficient = np.maximum(coefficient, friction)
-    coefficient = np.minimum(coefficient, cap)
-    deepened, cohesion = DeepenedBlocks(blocks.structure, depth), depth * dead.cohesion
-    crushing = None if dead.crushing is None else depth * dead.crushing
-    relaxed = replace(dead, blocks=deepened, friction=coefficient, cohesion=cohesion)
-    relaxed = replace(relaxed, crushing=crushing)
+    relaxed = replace(deepen(dead, depth), friction=np.minimum(coefficient, cap))
     return is_balanced(relaxed.minimise_residual(enough), relaxed)
 
 
@@ -306,17 +308,13 @@ def _least_friction(dead: Programme, name: str, lower: float, upper: float) -> f
 
 
 def _least_value(
-    dead: Programme,
-    name: str,
-    lower: float,
-    upper: float,
-    precision: float = 1e-3,
-    enough: float = 1e-3,
+    dead: Programme, name: str, lower: float, upper: float, enough: float = 1e-3
 ) -> float:
     """Return the least value of a property with which blocks stand, by bisection."""
+    precision = 1e-3
     if dead.crushing is not None and enough > 0.0:
         # crushing cuts of states take long: upwards from where the first bound lets blocks stand
-        lower = least = _least_value(dead, name, lower, upper, precision, -np.inf)
+        lower = least = _least_value(dead, name, lower, upper, -np.inf)
         step = precision
         while not _stands(dead, **{name: least}):
             lower, least, step = least, min(upper, least * (1.0 + step)), 2.0 * step

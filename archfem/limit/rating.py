@@ -706,8 +706,8 @@ def _find_least_factors(
     if moving is not None:
         at = dict(zip(rows, np.tile(moving.factors_at(places), len(vehicles)), strict=True))
         guides["factor"] = np.array([at[row] for row in axles])
-    strips, factors = cut_road(structure, area_load), dict[str, Any]()
-    forces = [stones.load([strip]) for strip in strips]
+    strips = {strip: stones.load([strip]) for strip in cut_road(structure, area_load)}
+    factors = dict[str, Any]()
     for name in track_progress("other states", [name for name in _GUIDES if name in states]):
         given = states[name]
         stones, dead = self_weight_programme(structure, **given)
@@ -715,7 +715,7 @@ def _find_least_factors(
             continue
         guide = next((guides[x] for x in _GUIDES[name] if x in guides), np.zeros(len(axles)))
         # these are worst with sliding that dilates: without, one of the next may be
-        worst, guides[name] = find_worst_rows(dead, axles, strips, forces, guide)
+        worst, guides[name] = find_worst_rows(dead, axles, strips, guide)
         worst = dict(islice(worst.items(), 1 if given["friction"] != "nonassociated" else 3))
         factors[name] = min(collapse_factors(stones, dead, worst, given).values())
     crushed = [name for name in states if name.startswith(_CRUSHING)]

@@ -1,7 +1,7 @@
 """Least thickness of structures, and least depth of joints that carries axles, by bisection."""
 
 from collections.abc import Callable
-from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -10,7 +10,7 @@ from archfem._validation import check_between, check_type, validate_arguments
 from archfem.errors import InvalidInput, InvalidStructure
 from archfem.limit.collapse import stands
 from archfem.limit.fill_strength import Fill
-from archfem.limit.instability import DeepenedBlocks
+from archfem.limit.instability import deepen
 from archfem.limit.self_weight import is_balanced, self_weight_programme
 from archfem.limit.vehicles import MovingLoad
 from archfem.masonry.loads import PointLoad
@@ -57,54 +57,63 @@ def minimum_thickness(
     """
     check_between(tolerance, "tolerance", 1e-9, 1.0, ends="[)")
 
-    def is_stable(thickness: float) -> bool:
-        return stands(build(thickness), friction=friction, strength=strength, fill=fill)
+    is_stable = partial(stands, friction=friction, strength=strength, fill=fill)
 
-    low, high = _find_bracket(build, is_stable)
+    def is_enough(thickness: float) -> bool:
+        built = _attempt(build, thickness)
+        # what cannot be built is thinner than one that can, which stands
+        return not isinstance(built, InvalidStructure) and is_stable(built)
+
+    return _halve(*_find_bracket(build, is_stable), is_enough, tolerance)[1]
+
+
+def _attempt(build: Callable[[float], Structure], thickness: float) -> Structure | InvalidStructure:
+    """Return a structure of a thickness, or why it cannot be built."""
+    try:
+        return build(thickness)
+    except InvalidStructure as error:
+        return error
+
+
+def _halve(
+    low: float, high: float, is_high: Callable[[float], bool], tolerance: float
+) -> tuple[float, float]:
+    """Halve an interval to a relative tolerance, at whose upper end alone a condition holds."""
     while high - low > tolerance * high:
         middle = 0.5 * (low + high)
-        try:
-            stable = is_stable(middle)
-        except InvalidStructure:  # thinner than one that can be built, which stands
-            stable = False
-        low, high = (low, middle) if stable else (middle, high)
-    return high
+        low, high = (low, middle) if is_high(middle) else (middle, high)
+    return low, high
 
 
 def _find_bracket(
-    build: Callable[[float], Structure], is_stable: Callable[[float], bool], tolerance: float = 1e-9
+    build: Callable[[float], Structure], is_stable: Callable[[Structure], bool]
 ) -> tuple[float, float]:
     """Return an unstable thickness and a stable one, at most twice as large [m]."""
     thin, is_start = _find_thin_member(build)
-    if is_stable(thin):
+    if is_stable(build(thin)):
         if not is_start:
             return 0.5 * thin, thin
         raise InvalidInput(
             f"it stands at {thin:.3g} m, the least thickness tried, at which joints are hardly "
             "more than points: there is no least one to look for above it"
         )
-    while True:
-        try:
-            if is_stable(2.0 * thin):
-                return thin, 2.0 * thin
-        except InvalidStructure as error:
-            refusal = error
-            break
+    while not isinstance(built := _attempt(build, 2.0 * thin), InvalidStructure):
+        if is_stable(built):
+            return thin, 2.0 * thin
         thin *= 2.0
-    low, high = thin, 2.0 * thin  # the largest one between that can be built must stand
-    while high - low > tolerance * high:
-        middle = 0.5 * (low + high)
-        try:
-            build(middle)
-            low = middle
-        except InvalidStructure as error:
-            high, refusal = middle, error
-    if is_stable(low):
+
+    def is_refused(thickness: float) -> bool:
+        return isinstance(_attempt(build, thickness), InvalidStructure)
+
+    # the largest one between that can be built must stand
+    low, high = _halve(thin, 2.0 * thin, is_refused, 1e-9)
+    if is_stable(build(low)):
         return thin, low
+    refusal = _attempt(build, high)
     raise InvalidInput(
         f"no thickness makes it stand: {low:.6g} m does not, and no greater one can be built "
         f"({refusal}): change the other lengths"
-    ) from refusal
+    )
 
 
 def _find_thin_member(build: Callable[[float], Structure]) -> tuple[float, bool]:
@@ -122,24 +131,21 @@ def _double_until_built(
 ) -> tuple[float, Structure]:
     """Return the first thickness that can be built, and its structure."""
     while thickness < largest:
-        try:
-            return thickness, build(thickness)
-        except InvalidStructure:  # as of unequal stones that no longer touch
-            thickness *= 2.0
+        # as of unequal stones that no longer touch
+        if not isinstance(built := _attempt(build, thickness), InvalidStructure):
+            return thickness, built
+        thickness *= 2.0
     return largest, build(largest)
 
 
 def _largest_member(build: Callable[[float], Structure]) -> tuple[float, float]:
     """Return the largest thickness that can be built, from 100 m down, and its size [m]."""
     for thickness in 10.0 ** np.arange(2, -7, -1):
-        try:
-            built = build(float(thickness))
-        except InvalidStructure as error:
-            refusal = error
-            continue
-        check_type(built, Structure, f"build({thickness:g})", "make a structure, thickness given")
-        return float(thickness), built.size
-    raise InvalidInput(f"build makes no structure 1e-6 to 100 m thick: {refusal}")
+        if not isinstance(built := _attempt(build, float(thickness)), InvalidStructure):
+            remedy = "make a structure, thickness given"
+            check_type(built, Structure, f"build({thickness:g})", remedy)
+            return float(thickness), built.size
+    raise InvalidInput(f"build makes no structure 1e-6 to 100 m thick: {built}")
 
 
 def find_geometric_factor(
@@ -153,9 +159,7 @@ def find_geometric_factor(
     axles = stones.load([load for load in moving.worst.live if isinstance(load, PointLoad)])
 
     def factor_of(share: float) -> float:
-        blocks = DeepenedBlocks(dead.blocks.structure, share)
-        crushing = None if dead.crushing is None else share * dead.crushing
-        changed = replace(dead, blocks=blocks, cohesion=share * dead.cohesion, crushing=crushing)
+        changed = deepen(dead, share)
         if not is_balanced(changed.minimise_residual(), changed):
             return np.nan
         optimum = changed.with_load_factor(axles).solve()

@@ -507,7 +507,8 @@ def _solve_rows(
         stands = is_balanced(dead.minimise_residual(), dead)
         loads = {row: stones.load(row) for row in rows}
         if strips and stands:
-            laid, loads = _lay_strips(dead, loads, strips, [stones.load([s]) for s in strips])
+            pairs = _lay_strips(dead, loads, {strip: stones.load([strip]) for strip in strips})
+            laid, loads = {row: pair[0] for row, pair in pairs.items()}, dict(pairs.values())
     if not is_plastic:
         factors = collapse_factors(stones, dead, loads, options) if stands else {}
         return laid, {row: factors.get(laid[row], np.nan) for row in rows}, {}
@@ -532,9 +533,9 @@ class _RoadMechanisms:
     axles, and of the strips of a distributed load that sink in it.
     """
 
-    def __init__(self, dead: Programme, strips: Sequence[Array]) -> None:
-        self._dead = dead
-        self.road = np.array(strips).reshape(len(strips), len(dead.load))
+    def __init__(self, dead: Programme, strips: Mapping[PointLoad, Array]) -> None:
+        self._dead, self._strips = dead, np.array([*strips])
+        self.road = np.array([*strips.values()]).reshape(len(strips), len(dead.load))
         self._before: Optimum | None = None
         self._motions, self._resistances = np.zeros((0, len(dead.load))), np.zeros(0)  # power of 1
         # the first ones are of the distributed load alone, on stretches: else a search ends early
@@ -582,32 +583,28 @@ class _RoadMechanisms:
             factor = self.solve(axles + self.road[adverse].sum(axis=0))
         return factor, adverse
 
+    def join(self, row: AxleRow, axles: Array, adverse: Flags) -> tuple[AxleRow, Array]:
+        """Return a row of axles with the strips that are adverse to it, and the forces of all."""
+        return (*row, *self._strips[adverse]), axles + self.road[adverse].sum(axis=0)
+
 
 def _lay_strips(
-    dead: Programme, axles: dict[AxleRow, Array], strips: AxleRow, forces: Sequence[Array]
-) -> tuple[dict[AxleRow, AxleRow], dict[AxleRow, Array]]:
+    dead: Programme, axles: dict[AxleRow, Array], strips: Mapping[PointLoad, Array]
+) -> dict[AxleRow, tuple[AxleRow, Array]]:
     """Return each row of axles with the strips of the least factor, and the forces of all."""
     # At each place the best mechanism so far selects the strips; that of these is added, until none
     # is better.
-    known = _RoadMechanisms(dead, forces)
-    road = known.road
-    bare = np.zeros(len(road), dtype=bool)
+    known, bare = _RoadMechanisms(dead, strips), np.zeros(len(strips), dtype=bool)
     places = track_progress("places", axles)
     chosen = {row: (known.solve(axles[row]), bare) for row in places}
     # and back with the mechanisms of all places
     for row in track_progress("places with distributed load", (*axles, *reversed(axles))):
         chosen[row] = known.lay(axles[row], *chosen[row])
-    laid = {row: _join_row(row, strips, chosen[row][1]) for row in axles}
-    return laid, {laid[row]: axles[row] + road[chosen[row][1]].sum(axis=0) for row in axles}
+    return {row: known.join(row, axles[row], chosen[row][1]) for row in axles}
 
 
 def find_worst_rows(
-    dead: Programme,
-    axles: dict[AxleRow, Array],
-    strips: AxleRow,
-    forces: Sequence[Array],
-    guide: Array,
-    margin: float = 0.1,
+    dead: Programme, axles: dict[AxleRow, Array], strips: Mapping[PointLoad, Array], guide: Array
 ) -> tuple[dict[AxleRow, Array], Array]:
     """Return the solved rows, the least factor first, with adverse strips, and the next guide.
 
@@ -615,12 +612,12 @@ def find_worst_rows(
     then all are. Factors of a weaker state are bounds from below, which end the search exactly.
     Those of a stronger state are scaled by the least share of them so far, less a margin.
     """
-    # The margin: crushing takes much the same share at all places of nearly the least factor.
-    known, rows, loads = _RoadMechanisms(dead, forces), [*axles], np.array([*axles.values()])
+    known, rows, loads = _RoadMechanisms(dead, strips), [*axles], np.array([*axles.values()])
     factors, sets = np.full(len(rows), np.inf), np.zeros((len(rows), len(strips)), dtype=bool)
     solved, share = np.zeros(len(rows), dtype=bool), 1.0
     for k in track_progress("places", guide.argsort(kind="stable").tolist()):
-        if (1.0 - margin * (share < 1.0)) * share * guide[k] > factors.min():
+        # less a tenth: crushing takes much the same share at all places of nearly the least factor
+        if (1.0 - 0.1 * (share < 1.0)) * share * guide[k] > factors.min():
             break
         factors[k], sets[k] = known.lay(loads[k], known.solve(loads[k]), sets[k])
         solved[k] = True
@@ -631,17 +628,9 @@ def find_worst_rows(
         k = int(above.argmin())
         factor, sets[k] = known.lay(loads[k], factors[k], sets[k] if solved[k] else None)
         factors[k], solved[k] = min(factor, above[k]), True  # the bound ends it in any case
-    worst = {
-        _join_row(rows[k], strips, sets[k]): loads[k] + known.road[sets[k]].sum(axis=0)
-        for k in factors.argsort(kind="stable")
-        if solved[k]
-    }
+    order = (k for k in factors.argsort(kind="stable") if solved[k])
+    worst = dict(known.join(rows[k], loads[k], sets[k]) for k in order)
     return worst, np.where(solved, np.minimum(factors, above), share * guide)
-
-
-def _join_row(row: AxleRow, strips: AxleRow, adverse: Flags) -> AxleRow:
-    """Return a row of axles with the strips that are adverse to it."""
-    return (*row, *(strip for strip, counts in zip(strips, adverse, strict=True) if counts))
 
 
 def collapse_factors(

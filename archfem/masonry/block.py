@@ -1,5 +1,6 @@
 """Blocks: plane bodies with polygonal or annular outlines, their area and centroid."""
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -120,6 +121,22 @@ def find_side_of_line(points: Array, line: Array, near: float, arcs: Sequence[in
         if side == 0 and low < length - near and high > near:
             side = 1 if end > start else -1
     return side if abs(covered - length) <= 4.0 * near else 0
+
+
+def trace_boundary(cells: Sequence[Numbers] | Sequence[list[int]]) -> list[int]:
+    """Return the points around cells of one sense in order; none where the boundary is no loop."""
+    ends = Counter(
+        (int(a), int(b)) for cell in cells for a, b in zip(cell, np.roll(cell, -1), strict=True)
+    )
+    # an edge between two cells occurs in both directions, one on the boundary in one
+    rim = [(a, b) for a, b in ends if (b, a) not in ends]
+    after = dict(rim)
+    loop = [rim[0][0]] if rim else []
+    while rim and (following := after.get(loop[-1], loop[0])) != loop[0] and len(loop) <= len(rim):
+        loop.append(following)
+    # an edge in one direction twice is of cells that overlap
+    is_loop = len(loop) == len(rim) == len(after) and max(ends.values(), default=1) == 1
+    return loop if is_loop else []
 
 
 # Coordinates x and y [m]

@@ -22,8 +22,9 @@ from archfem._optional import require_package
 from archfem._typing import Array, Numbers
 from archfem._validation import validate_arguments
 from archfem.errors import InvalidInput
+from archfem.masonry.block import trace_boundary
 from archfem.masonry.structure import rigid_motion_matrix
-from archfem.masonry.survey.drawings import trace_boundary, write_dxf
+from archfem.masonry.survey.drawings import write_dxf
 from archfem.models.model import Cells, Model, check_coordinate_count
 
 

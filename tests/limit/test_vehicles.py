@@ -237,7 +237,7 @@ def test_a_search_for_the_worst_place_solves_each_once(strength, rounds, monkeyp
     monkeypatch.setattr(
         linear_programme, "solve_linear", lambda *given: [solved.append(1), solve(*given)][1]
     )
-    worst, factors = find_worst_rows(dead, axles, (), [], np.zeros(len(rows)))
+    worst, factors = find_worst_rows(dead, axles, {}, np.zeros(len(rows)))
     assert len(solved) <= rounds * len(rows)
     # of a place and its mirror image either is the worst
     assert expected[next(iter(worst))] == pytest.approx(min(expected.values()), rel=1e-5)
@@ -247,7 +247,7 @@ def test_a_search_for_the_worst_place_solves_each_once(strength, rounds, monkeyp
     assert factors[reached].tolist() == pytest.approx(own, rel=1e-5)  # of the cuts
     row = next(iter(worst))
     small = {row: 1e-9 * axles[row], rows[0]: 0.0 * axles[row]}
-    _, factors = find_worst_rows(dead, small, (), [], np.zeros(2))
+    _, factors = find_worst_rows(dead, small, {}, np.zeros(2))
     assert factors[0] == pytest.approx(1e9 * expected[row], rel=1e-5)
     assert factors[1] > 1e12 * factors[0]
 

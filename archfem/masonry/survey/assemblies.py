@@ -13,6 +13,7 @@ import numpy as np
 from archfem._typing import Array
 from archfem._validation import short_repr
 from archfem.errors import InvalidInput
+from archfem.masonry.block import trace_boundary
 
 # Deviation from a plane over the size of an assembly, as by single precision and meshes of CAD [-]
 FLATNESS = 1e-4
@@ -116,10 +117,5 @@ def _trace_front(
     if away.min(axis=1).max() > near:
         return None
     # the edges of the front that only one of its faces has
-    parts = [face for face in block.faces if front[face].all()]
-    edges = [edge for face in parts for edge in zip(face, [*face[1:], face[0]], strict=True)]
-    after = {a: b for a, b in edges if (b, a) not in edges}
-    outline = [next(iter(after), -1)]
-    while len(outline) <= len(after) and after.get(outline[-1], outline[0]) != outline[0]:
-        outline.append(after[outline[-1]])
-    return outline if len(outline) == len(after) == front.sum() else None
+    outline = trace_boundary([face for face in block.faces if front[face].all()])
+    return outline if len(outline) == front.sum() else None

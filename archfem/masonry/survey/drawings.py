@@ -27,7 +27,7 @@ from archfem._optional import require_package
 from archfem._typing import Array, Numbers
 from archfem._validation import short_repr
 from archfem.errors import InvalidInput
-from archfem.masonry.block import measure_polygon
+from archfem.masonry.block import measure_polygon, trace_boundary
 from archfem.masonry.structure import suggest_name
 from archfem.masonry.survey.assemblies import is_assembly, read_plane_assembly, trace_elevation
 from archfem.masonry.survey.dxf import MAX_ENTITIES, POLYLINES, Entity, load_dxf
@@ -566,22 +566,6 @@ def _check_plane(
     if np.any(np.ptp(points[:, 2:], axis=0) > 1e-6 * np.ptp(points[:, :2])):
         raise InvalidInput(f"{problem} in the plane of x and y: {verb} an elevation in it")
     return points[:, :2]
-
-
-def trace_boundary(cells: Sequence[Numbers]) -> list[int]:
-    """Return the points around anticlockwise cells in order; none where the boundary is no loop."""
-    ends = Counter(
-        (int(a), int(b)) for cell in cells for a, b in zip(cell, np.roll(cell, -1), strict=True)
-    )
-    # an edge between two cells occurs in both directions, one on the boundary in one
-    rim = [(a, b) for a, b in ends if (b, a) not in ends]
-    after = dict(rim)
-    loop = [rim[0][0]] if rim else []
-    while rim and (following := after.get(loop[-1], loop[0])) != loop[0] and len(loop) <= len(rim):
-        loop.append(following)
-    # an edge in one direction twice is of cells that overlap
-    is_loop = len(loop) == len(rim) == len(after) and max(ends.values()) == 1
-    return loop if is_loop else []
 
 
 def _trace_outline(cells: list[Numbers], points: Array, name: str) -> list[int]:
