@@ -54,8 +54,6 @@ class Linkage:
     def held(self) -> Numbers:
         """Numbers of the ties that keep their length, where the contacts alone do not keep it."""
         kept = list[int]()
-        if not self.start.ties:
-            return np.array(kept, dtype=np.intp)
         bodies, contacts = Bodies(self.start, self.mechanism.body), self.mechanism.contacts
         normal, along = bodies.rates(contacts) * bodies.units
         rows = np.vstack([normal, along[[not contact.slip for contact in contacts]]])
@@ -131,8 +129,6 @@ class LinkageState:
     @cached_property
     def shortening_rates(self) -> Array:
         """Rates at which the held ties become shorter (n_held, 3 n_bodies)."""
-        if not len(self.linkage.held):  # sparse matrices without rows would take a fifth of a path
-            return np.zeros((0, 3 * self.bodies.count))
         forces = self.bodies.tie_forces[self.linkage.held].toarray()
         return np.asarray(forces / self.held_sizes[:, None])
 

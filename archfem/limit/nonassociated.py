@@ -545,8 +545,9 @@ def starting_forces(
     programme: Programme, start: Optimum | None, number: int, seed: int
 ) -> list[Array]:
     """Return the forces of the associated optimum and of a number of random vertices."""
-    forces = _random_vertices(programme, start, number, np.random.default_rng(seed))
-    return forces if start is None else [start.forces, *forces]
+    rng, first = np.random.default_rng(seed), [] if start is None else [start.forces]
+    vertices = [_random_vertex(programme, start, rng) for _ in range(number)]
+    return first + [forces for each in vertices for forces in each]
 
 
 def _relax_starts(programme: Programme, start: Optimum | None, number: int) -> list[Array]:
@@ -556,7 +557,7 @@ def _relax_starts(programme: Programme, start: Optimum | None, number: int) -> l
     rng, states = np.random.default_rng(0), list[Array]()
     first = [] if start is None else [start.forces]
     for chain in range(1 + number // (1 + len(DILATANCY_SHARES))):
-        for forces in _random_vertices(programme, start, 1, rng) if chain else first:
+        for forces in _random_vertex(programme, start, rng) if chain else first:
             states.append(forces)
             normal = normal_forces(forces)
             for share, count in DILATANCY_SHARES + SETTLING_SHARES * (chain == 0):
@@ -579,40 +580,33 @@ def _limit_dilatancy(programme: Programme, normal: Array, share: float) -> Progr
     return replace(limited, friction=friction)
 
 
-def _random_vertices(
-    programme: Programme, start: Optimum | None, number: int, rng: np.random.Generator
-) -> list[Array]:
-    """Return forces of random vertices of the admissible states; fewer where there are none."""
-    forces = []
-    for _ in range(number):
-        with suppress(DidNotConverge):  # no equilibrium under so much load
-            if (state := _random_vertex(programme, start, rng)) is not None:
-                forces.append(state.forces)
-    return forces
-
-
 def _random_vertex(
     programme: Programme, start: Optimum | None, rng: np.random.Generator
-) -> Optimum | None:
-    """Minimise a randomly weighted sum of compressions, under a random fraction of the load."""
+) -> list[Array]:
+    """Return forces of a random vertex of the admissible states, if there is one."""
+    # the least randomly weighted sum of compressions, under a random fraction of the load
     joints = len(programme.blocks.structure.depths)
     cost = np.concatenate([rng.random(2 * joints), np.zeros(joints)])
     if programme.force_cost is not None:  # a settlement: its work at random weight
         size = _largest_magnitude(programme.force_cost)
-        cost = cost + rng.uniform(-1, 1) * programme.force_cost / size
-        return replace(programme, force_cost=cost).solve()
-    assert programme.columns is not None
-    live, others = programme.columns[:, :1], programme.columns[:, 1:]
-    if start is None:  # unbounded: a load of 0.1 to 10 times the weight
-        live_size = float(abs(live).sum())
-        weight = float(np.abs(programme.load).sum())
-        factor = 10.0 ** rng.uniform(-1, 1) * weight / live_size if live_size > 0.0 else 0.0
+        cost, loaded = cost + rng.uniform(-1, 1) * programme.force_cost / size, programme
     else:
-        factor = float(rng.random() * start.unknowns[0])
-    load = programme.load - live @ np.array([factor])
-    costs, bounds = programme.unknown_cost[1:], programme.upper_bounds[1:]
-    loaded = replace(programme, load=load, columns=others, unknown_cost=costs, upper_bounds=bounds)
-    return replace(loaded, force_cost=cost).solve()
+        assert programme.columns is not None
+        live, others = programme.columns[:, :1], programme.columns[:, 1:]
+        if start is None:  # unbounded: a load of 0.1 to 10 times the weight
+            live_size = float(abs(live).sum())
+            weight = float(np.abs(programme.load).sum())
+            factor = 10.0 ** rng.uniform(-1, 1) * weight / live_size if live_size > 0.0 else 0.0
+        else:
+            factor = float(rng.random() * start.unknowns[0])
+        load = programme.load - live @ np.array([factor])
+        costs, bounds = programme.unknown_cost[1:], programme.upper_bounds[1:]
+        loaded = replace(programme, load=load, columns=others, unknown_cost=costs)
+        loaded = replace(loaded, upper_bounds=bounds)
+    with suppress(DidNotConverge):  # no equilibrium under so much load
+        if (state := replace(loaded, force_cost=cost).solve()) is not None:
+            return [state.forces]
+    return []
 
 
 def _bound_objective(programme: Programme, known: Optimum | None) -> float:
