@@ -4,7 +4,7 @@ import re
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from csv import writer
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fnmatch import fnmatch
 from functools import lru_cache
 from io import StringIO
@@ -123,12 +123,12 @@ SELECTION_RULES: Mapping[str, SelectionRule] = {
 
 @dataclass(frozen=True, eq=False)
 class SelectedRecord:
-    """A record that was selected, and its scale.
+    """A record that may be or was selected, and its scale.
 
     Attributes:
         motion: as recorded; its horizontal is the selected component.
         event: earthquake by date or name, "" where it is unknown.
-        scale: factor on all components [-].
+        scale: factor on all components [-]; 1 before the selection.
         sources: for each component of the motion, its file and number of the channel, from 1.
     """
 
@@ -350,14 +350,6 @@ def _tabulate_target(spectrum: DesignSpectrum, rule: SelectionRule, periods: Arr
     return values
 
 
-class _Candidate(NamedTuple):
-    """A motion that may be selected."""
-
-    motion: Motion
-    event: str  # "" where it is unknown
-    sources: Mapping[str, tuple[Path, int]]  # file and channel of each component
-
-
 def _list_files(folder: str | PathLike[str]) -> tuple[tuple[Path, int, int], ...]:
     """List the files of a folder, with time of change and size, by which content is cached."""
     place = Path(folder)
@@ -370,7 +362,7 @@ def _list_files(folder: str | PathLike[str]) -> tuple[tuple[Path, int, int], ...
 @lru_cache(maxsize=1)  # a folder takes memory, and is usually searched with several settings
 def _read_candidates(
     folder: Path, files: tuple[tuple[Path, int, int], ...], measure: Measure
-) -> tuple[tuple[_Candidate, ...], Mapping[str, str]]:
+) -> tuple[tuple[SelectedRecord, ...], Mapping[str, str]]:
     """Read all files; return candidates, and files that are not used with reasons."""
     skipped: dict[str, str] = {}
     groups: dict[Path, list[_Source]] = defaultdict(list)
@@ -383,7 +375,7 @@ def _read_candidates(
         alone = len(channels) == 1
         key = _strip_direction(path, channels[0].direction) if alone else path
         groups[key] += [_Source(path, k, channel) for k, channel in enumerate(channels, 1)]
-    found: list[_Candidate] = []
+    found: list[SelectedRecord] = []
     for sources in groups.values():
         refusal = _refuse_group(sources, measure)
         try:
@@ -425,7 +417,7 @@ def _refuse_group(sources: Sequence[_Source], measure: Measure) -> str:
     return "" if all(np.any(each.samples) for each in level) else "at rest"
 
 
-def _combine_components(sources: Sequence[_Source], measure: Measure) -> Iterator[_Candidate]:
+def _combine_components(sources: Sequence[_Source], measure: Measure) -> Iterator[SelectedRecord]:
     """Yield a motion for each horizontal component, or one for the pair."""
     level = [each for each in sources if not each.channel.is_vertical]
     upright = [each for each in sources if each.channel.is_vertical]
@@ -439,7 +431,8 @@ def _combine_components(sources: Sequence[_Source], measure: Measure) -> Iterato
         name = f"{first.path.stem} {first.channel.direction}" if several else first.path.stem
         rows = join_channels({key: each.channel for key, each in parts.items()})
         motion = Motion(**rows, name=name)
-        yield _Candidate(motion, event, {k: (each.path, each.number) for k, each in parts.items()})
+        places = {key: (each.path, each.number) for key, each in parts.items()}
+        yield SelectedRecord(motion, event, 1.0, places)
 
 
 def _find_event(path: Path) -> str:
@@ -474,28 +467,28 @@ def _format_date(year: str, month: str | int, day: str) -> str:
 
 
 def _name_events(
-    candidates: Sequence[_Candidate], events: Mapping[str, str]
-) -> tuple[_Candidate, ...]:
+    candidates: Sequence[SelectedRecord], events: Mapping[str, str]
+) -> tuple[SelectedRecord, ...]:
     """Replace events by those that were given for file names."""
     named = list(candidates)
     for pattern, event in events.items():
         found = False
         for index, each in enumerate(candidates):
             if any(fnmatch(path.name, pattern) for path, _ in each.sources.values()):
-                named[index], found = each._replace(event=event), True
+                named[index], found = replace(each, event=event), True
         if not found:
             raise InvalidInput(f"events: no record that can be used has a file {pattern!r}")
     return tuple(named)
 
 
-def _number_events(candidates: Sequence[_Candidate]) -> Numbers:
+def _number_events(candidates: Sequence[SelectedRecord]) -> Numbers:
     """Return a number of the event of each candidate (n,); files of an unknown one share it."""
     keys = [each.event or min(each.sources.values()) for each in candidates]
     return np.array([keys.index(key) for key in keys])
 
 
 def _check_events(
-    candidates: Sequence[_Candidate],
+    candidates: Sequence[SelectedRecord],
     count: int,
     folder: str | PathLike[str],
     skipped: Mapping[str, str],
@@ -517,7 +510,7 @@ def _spectrum_of_motion(motion: Motion, measure: Measure, periods: tuple[float, 
     return _compute_spectrum(motion, measure, np.array([0.0, *periods]))
 
 
-def _compute_spectra(motions: Sequence[_Candidate], measure: Measure, periods: Array) -> Array:
+def _compute_spectra(motions: Sequence[SelectedRecord], measure: Measure, periods: Array) -> Array:
     """Return peak acceleration and spectrum of each candidate (n, 1 + m) [m/s²]."""
     return np.array([_spectrum_of_motion(each.motion, measure, tuple(periods)) for each in motions])
 
@@ -603,7 +596,7 @@ def _measure_miss(
 
 
 def _scale_records(
-    chosen: Sequence[_Candidate], spectrum: DesignSpectrum, settings: dict[str, Any]
+    chosen: Sequence[SelectedRecord], spectrum: DesignSpectrum, settings: dict[str, Any]
 ) -> RecordSelection:
     """Scale the selected records, and check them at more periods than the search does."""
     rule, (first, last) = settings["rule"], settings["band"]
@@ -614,13 +607,10 @@ def _scale_records(
     mean = fine.ratios.mean(axis=0, keepdims=True)
     factor = fine.common_factor(mean, fine.scales.min(), fine.scales.max())[0]
     final = factor * fine.scales
-    records = (
-        SelectedRecord(each.motion, each.event, float(scale), each.sources)
-        for each, scale in zip(chosen, final, strict=True)
-    )
+    pairs = zip(chosen, final, strict=True)
     return RecordSelection(
         **settings,
-        records=tuple(records),
+        records=tuple(replace(each, scale=float(scale)) for each, scale in pairs),
         periods=periods,
         spectra=final[:, None] * spectra[:, 1:],
         target=target[1:],

@@ -76,8 +76,11 @@ VARIED = ("k_n", "k_s", "friction", "damping_ratio")
 # least number of answers to which a lognormal is fitted [-]
 FIRST_ROUND = 8
 
-# Variables of the table that are results
-RESULTS = ("lower", "upper", "runs", "admissible_step", "lacks_joints", "error")
+# Variables of the table that are results, and their values before a run; an error has any length
+RESULTS = {
+    **{"lower": 0.0, "upper": inf, "admissible_step": inf, "runs": 0, "lacks_joints": 0},
+    "error": np.array("", dtype=object),
+}
 
 # Peak acceleration at which those begin [m/s²]
 FIRST_PEAK = 2.0
@@ -229,16 +232,10 @@ def collapse_risk(  # noqa: PLR0913  (one call, one argument for each thing that
     for begin, end in ((0, FIRST_ROUND), (FIRST_ROUND, samples)):
         todo = [k for k in range(begin, end) if not table["runs"].values[k]]
         scales = _first_scales(table, hazard.measure, begin)
-        points = [
-            (
-                k,
-                RiskSample(
-                    *(tree[labels[k]][1], records[order[k]], tuple(draws[k].items())),
-                    *(float(scales[order[k]]), between, width),
-                ),
-            )
-            for k in todo
-        ]
+        points = []
+        for k in todo:
+            varied = tree[labels[k]][1], records[order[k]], tuple(draws[k].items())
+            points.append((k, RiskSample(*varied, float(scales[order[k]]), between, width)))
         for k, row in evaluate_with_progress(points, bracket_capacity, workers, "risk"):
             _store_row(table, k, row)
             if out is not None:
@@ -353,16 +350,11 @@ def _describe_samples(
 ) -> xr.Dataset:
     """Return the table of all samples, without results."""
     count = len(draws)
-    columns: dict[str, Any] = {name: ("sample", [row[name] for row in draws]) for name in ranges}
-    columns |= {"alternative": ("sample", labels), "record_number": ("sample", order)}
-    columns |= {"lower": ("sample", np.zeros(count)), "upper": ("sample", np.full(count, inf))}
-    columns["admissible_step"] = ("sample", np.full(count, inf))
-    columns |= {
-        "runs": ("sample", np.zeros(count, int)),
-        "lacks_joints": ("sample", np.zeros(count, int)),
-        "error": ("sample", np.array([""] * count, dtype=object)),
-    }
-    return xr.Dataset(columns, attrs={"properties": json.dumps(list(ranges))})
+    columns: dict[str, Any] = {name: [row[name] for row in draws] for name in ranges}
+    columns |= {"alternative": labels, "record_number": order}
+    columns |= {name: np.full(count, value) for name, value in RESULTS.items()}
+    variables = {name: ("sample", column) for name, column in columns.items()}
+    return xr.Dataset(variables, attrs={"properties": json.dumps(list(ranges))})
 
 
 def _continue_file(out: str | Path | None, table: xr.Dataset) -> None:
@@ -402,10 +394,8 @@ def _first_scales(table: xr.Dataset, measure: str, begin: int) -> Array:
 
 def _store_row(table: xr.Dataset, number: int, row: Mapping[str, Any]) -> None:
     """Store the bracket of a sample, or the text of its error."""
-    for name in RESULTS[:-1]:
-        if name in row["found"]:
-            table[name].values[number] = row["found"][name]
-    table["error"].values[number] = str(row["error"])
+    for name, value in {**row["found"], "error": str(row["error"])}.items():
+        table[name].values[number] = value
 
 
 @validate_methods
@@ -592,17 +582,11 @@ class CollapseRisk(ResultDisplay):
         # middles of brackets vary by their width too (Sheppard's correction)
         rounding = float(np.mean(np.log(np.where(bounded, high / low, 1.0)) ** 2)) / 12.0
         total = max(float(np.var(logs, ddof=1)) - rounding, 0.0)
-        parts = {
-            name: variance_component(logs, self._of_answered(name))
-            for name in ("record_number", "alternative")
-        }
+        names = {"records": "record_number", "alternatives": "alternative"}
+        parts = {k: variance_component(logs, self._of_answered(x)) for k, x in names.items()}
         rest = float(np.maximum(total - sum(parts.values()), 0.0))  # nan remains
-        return {
-            "total": sqrt(total),
-            "records": sqrt(parts["record_number"]),
-            "alternatives": sqrt(parts["alternative"]),
-            "properties": sqrt(rest),
-        }
+        parts = {"total": total, **parts, "properties": rest}
+        return {name: sqrt(variance) for name, variance in parts.items()}
 
     def disaggregation(self, bins: int = 12) -> tuple[Array, Array]:
         """Return the edges of bins of intensity (bins + 1,), and the share of the rate in each.
@@ -727,10 +711,3 @@ class CollapseRisk(ResultDisplay):
             InvalidInput: there is no such file, or it is damaged or of another version.
         """
         return cls(read_dataset(path, FILE_KIND))
-
-
-def draw_risk_result(found: CollapseRisk) -> Any:
-    """Draw fragility, hazard, and the intensities of the falls."""
-    from archfem.view.studies import draw_collapse_risk  # matplotlib is slow to import
-
-    return draw_collapse_risk(found)

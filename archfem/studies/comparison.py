@@ -189,13 +189,10 @@ def _build_finding(
 ) -> Finding:
     """The findings of a case, from its rows by pair."""
     first = next(iter(rows.values()))  # dead load and mode are the same in all rows
+    searched, names = {} if search is None else rows, MECHANISM_DEFINITIONS
     scales = {
-        pair: {
-            name: (row[f"scale: {name}"], row[f"survives: {name}"])
-            for name in MECHANISM_DEFINITIONS
-        }
-        for pair, row in rows.items()
-        if search is not None
+        pair: {name: (row[f"scale: {name}"], row[f"survives: {name}"]) for name in names}
+        for pair, row in searched.items()
     }
     runs = {pair: _run_findings(row) for pair, row in rows.items()}
     roles, dead = _select(first, "role"), _select(first, "dead")

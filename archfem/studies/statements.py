@@ -163,9 +163,9 @@ def capacity_findings(case: Case) -> dict[str, Any]:
     return {**factors, "peak": push.factor, "order": order}
 
 
-def _first(rows: Rows) -> Mapping[str, Any]:
-    """Return the findings under the first pair, for those that are the same under all."""
-    return next(iter(rows.values()))
+def _first(rows: Rows, pair: str = "") -> Mapping[str, Any]:
+    """Return the findings under a pair; by default the first, for those the same under all."""
+    return rows[pair] if pair else next(iter(rows.values()))
 
 
 def _values(row: Mapping[str, Any], prefix: str) -> list[float]:
@@ -183,14 +183,14 @@ def _describe_mechanisms(rows: Rows, statement: Statement) -> str:
 
 def _describe_instant(rows: Rows, statement: Statement) -> str:
     """Return class and time of the first mechanism under a pair."""
-    row = rows[statement.pair] if statement.pair else _first(rows)
+    row = _first(rows, statement.pair)
     kind = row.get(f"mechanism: {statement.definition}", "")
     return f"{kind} at {row[f'time: {statement.definition}']:.3f} s" if kind else "none"
 
 
 def _describe_joint(rows: Rows, statement: Statement) -> str:
     """Return the largest |e| and |V|/N of a joint under a pair."""
-    row = rows[statement.pair] if statement.pair else _first(rows)
+    row = _first(rows, statement.pair)
     e, used = (row[f"{size} of {statement.joint}"] for size in ("eccentricity", "friction"))
     return f"|e| {e:.2f}, |V|/N {used:.2f}"
 

@@ -300,14 +300,9 @@ def evaluate_variation(variation: Variation) -> dict[str, Any]:
     if changes["sign"] == "reversed":
         motion = motion.reversed()
     state = prepare_runs(replace(analysis, structure=structure), changes)(motion)
-    return {
-        "outcome": state.kind,
-        "displacement": state.displacement,
-        "residual": state.residual,
-        "time": np.nan if state.time is None else state.time,
-        "admissible_step": state.admissible_step,
-        "lacks_joints": state.lacks_joints,
-    }
+    time = np.nan if state.time is None else state.time
+    same = ("displacement", "residual", "admissible_step", "lacks_joints")
+    return {"outcome": state.kind, "time": time, **{name: getattr(state, name) for name in same}}
 
 
 def prepare_runs(
@@ -524,11 +519,8 @@ def _list_rating_changes(case: Case, found: Rating) -> Iterator[Change]:
         yield "abutments", FREE, free
     yield from _list_changed_weights(case, found)
     if np.isfinite(found.strength):
-        yield (
-            "strength",
-            "half the strength of the stones",
-            {"limit.strength": 0.5 * found.strength},
-        )
+        half = {"limit.strength": 0.5 * found.strength}
+        yield "strength", "half the strength of the stones", half
     for section in ("limit", "structure"):  # as weight and pressure, or in pieces
         fill = case.settings.get(section, {}).get("fill", {})
         for by in (-5.0, 5.0) if "friction_angle" in fill else ():
