@@ -214,13 +214,8 @@ def compare_runs(
             f"the reference, {settings[0].label}, did not reach the end of the motion: there is "
             "nothing to compare with; take a weaker motion (motion.scale) or a shorter one"
         )
-    trials = [
-        SettingResult(
-            setting,
-            run.size,
-            run.seconds,
-            np.inf if run.peaks is None else largest_difference(run.peaks, reference),
-        )
-        for setting, run in zip(settings, runs, strict=True)
-    ]
+    trials = []
+    for setting, run in zip(settings, runs, strict=True):
+        error = np.inf if run.peaks is None else largest_difference(run.peaks, reference)
+        trials.append(SettingResult(setting, run.size, run.seconds, error))
     return Accuracy(tuple(trials[2:]), settings[0], trials[1].error, duration, tolerance)

@@ -32,12 +32,11 @@ from archfem.joints.resultants import eccentricity_and_friction, joint_dataset
 from archfem.limit.mechanism_count import (
     MECHANISM_KINDS,
     OVER_RECORD,
-    Mechanism,
     counted_mechanism,
     counted_mechanisms,
     matching_definitions,
 )
-from archfem.limit.mechanism_kinematics import get_verifier
+from archfem.limit.mechanism_kinematics import VerifiedMechanism, get_verifier
 from archfem.masonry.parts import select_assessed_parts
 from archfem.masonry.structure import Structure, join_joint_names
 
@@ -232,25 +231,15 @@ class CountedMechanism:
         """
         if self.over == "record":
             return _monitor_record(structure, criteria)
-        verifier, unbroken = get_verifier(structure), DurationCounter(criteria.duration)
+        verifier, count = get_verifier(structure), partial(counted_mechanism, kinds=self.kinds)
 
-        def count(joints: xr.Dataset) -> Mechanism | None:
-            return counted_mechanism(joints, kinds=self.kinds)
-
-        assessed = np.flatnonzero(structure.judged).tolist()
-        scan = FailureScan(
-            structure, criteria, assessed, lambda state: _as_condition(count(state.joint_states()))
-        )
-
-        def reason(conditions: frozenset[str], resultants: Array, step: float) -> str | None:
-            if not unbroken.add_step(bool(conditions), step):
-                return None
-            joints = scan.joint_states(resultants)
+        def describe(joints: xr.Dataset) -> str:
             counted, motion = count(joints), verifier.verify(joints)
             assert counted is not None
             return f"a mechanism of {counted.part} by {join_joint_names(counted.names)}; {motion}"
 
-        return FailureMonitor(scan, criteria.failures, reason)
+        assessed = np.flatnonzero(structure.judged).tolist()
+        return _monitor_lasting(structure, criteria, assessed, criteria.failures, count, describe)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -283,21 +272,18 @@ class MovingMechanism:
             structure: structure of the run.
             criteria: failure criteria of the run.
         """
-        verifier, unbroken = get_verifier(structure), DurationCounter(criteria.duration)
+        verifier = get_verifier(structure)
 
-        def moves(state: FailureState) -> frozenset[str]:
-            motion = verifier.verify_if_moving(state.joint_states())
-            return _as_condition(motion if motion and motion.kind in self.kinds else None)
+        def find(joints: xr.Dataset) -> VerifiedMechanism | None:
+            motion = verifier.verify_if_moving(joints)
+            return motion if motion and motion.kind in self.kinds else None
 
-        scan = FailureScan(structure, criteria, verifier.rigid_regions.joints, moves)
-
-        def reason(conditions: frozenset[str], resultants: Array, step: float) -> str | None:
-            if not unbroken.add_step(bool(conditions), step):
-                return None
-            motion = verifier.verify(scan.joint_states(resultants))
+        def describe(joints: xr.Dataset) -> str:
+            motion = verifier.verify(joints)
             return f"a mechanism that moves, by {join_joint_names(motion.moved.names)}; {motion}"
 
-        return FailureMonitor(scan, 1, reason)
+        scanned = verifier.rigid_regions.joints
+        return _monitor_lasting(structure, criteria, scanned, 1, find, describe)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -399,6 +385,29 @@ def _joint_condition(number: int) -> str:
     return f"joint {number}"
 
 
+def _monitor_lasting(
+    structure: Structure,
+    criteria: Criteria,
+    numbers: Sequence[int],
+    min_failures: int,
+    find: Callable[[xr.Dataset], object | None],
+    describe: Callable[[xr.Dataset], str],
+) -> FailureMonitor:
+    """Return a monitor that ends a run, in words, once a mechanism that is found has lasted."""
+    unbroken = DurationCounter(criteria.duration)
+
+    def query(state: FailureState) -> frozenset[str]:
+        return frozenset() if find(state.joint_states()) is None else frozenset({"mechanism"})
+
+    scan = FailureScan(structure, criteria, numbers, query)
+
+    def reason(conditions: frozenset[str], resultants: Array, step: float) -> str | None:
+        lasts = unbroken.add_step(bool(conditions), step)
+        return describe(scan.joint_states(resultants)) if lasts else None
+
+    return FailureMonitor(scan, min_failures, reason)
+
+
 def _monitor_record(structure: Structure, criteria: Criteria) -> FailureMonitor:
     """Return a monitor that ends a run once enough joints of a part have failed during the run."""
     assessed, ever_failed = np.flatnonzero(structure.judged), RecordCounter(structure, criteria)
@@ -459,11 +468,6 @@ def applicable_definitions(
     # without forces all joints are apart, so that all definitions that can be met are
     joints = joint_dataset(structure, np.zeros((len(structure.joints), 3)), criteria=criteria)
     return tuple(name for name, mechanism in counted_mechanisms(joints).items() if mechanism)
-
-
-def _as_condition(mechanism: object) -> frozenset[str]:
-    """Return the set {"mechanism"} if there is a mechanism, else an empty set."""
-    return frozenset() if mechanism is None else frozenset({"mechanism"})
 
 
 def _check_kinds(kinds: Any) -> None:

@@ -198,12 +198,9 @@ class MeetingMonitor:
     def _bodies(self) -> Bodies:
         """Convex pieces of all blocks."""
         structure = self.model.structure
-        if self.model.large_displacements:
-            return make_bodies(structure, 0.0)
         # the level of the ground matters to loose stones alone
-        return make_bodies(
-            structure, 0.0, min(block.points[:, 1].min() for block in structure.blocks)
-        )
+        lowest = min(block.points[:, 1].min() for block in structure.blocks)
+        return make_bodies(structure, 0.0, None if self.model.large_displacements else lowest)
 
     @cached_property
     def _owner(self) -> NDArray[np.intp]:

@@ -26,7 +26,6 @@ from archfem.dynamics.schemes import (
     HHT,
     Conserving,
     EffectiveDamping,
-    Newmark,
     Scheme,
     Viscous,
     check_large_displacement_scheme,
@@ -175,54 +174,52 @@ def _state_step_errors(
     history: History, adaptive: AdaptiveStepper, dt: float | None, tolerance: float
 ) -> History:
     """Return the history with the errors of its steps, and the doubts that follow."""
-    history.dataset.attrs["slip_error"] = float(adaptive.slip_error.total.max(initial=0.0))
+    attrs, share = history.dataset.attrs, adaptive.unmet_share
+    attrs["slip_error"] = float(adaptive.slip_error.total.max(initial=0.0))
     if dt is None:
-        return _state_tolerance(history, tolerance, adaptive.unmet_share)
-    history = _doubt_steps_of_sliding(history, adaptive.slip_error, dt)
+        attrs |= {"tolerance": tolerance, "tolerance_unmet": share}
+        doubts = _doubt_shortest_steps(tolerance, share)
+    else:
+        doubts = _doubt_steps_of_sliding(history, adaptive.slip_error, dt)
+        doubts += _doubt_constant_steps(tolerance, share, dt)
+    return history.with_doubts((*history.doubts, *doubts)) if doubts else history
+
+
+def _doubt_shortest_steps(tolerance: float, share: float) -> list[Doubt]:
+    """Return a doubt where over 2 % of the shortest steps missed the tolerance."""
+    words = f"the shortest steps erred by more than {tolerance:g} in |e| in {{:.0%}} of the run"
+    remedy = "compare with constant steps of 0.1 ms or less (`--set analysis.dt=1e-4`), "
+    return [Doubt(words, f"{remedy}or with more damping", (share,))] if share > 0.02 else []
+
+
+def _doubt_constant_steps(tolerance: float, share: float, dt: float) -> list[Doubt]:
+    """Return a doubt of a constant step [s] where three quarters of them missed the tolerance."""
     # displacements of rings and stacks then differed by 6 % and more from those of short steps
-    if adaptive.unmet_share <= 0.75:
-        return history
-    doubt = Doubt(
-        f"steps of {1e3 * dt:g} ms are long: in {{:.0%}} of them |e| may err by more than "
-        f"{tolerance:g}",
-        "leave dt out, and each step is as long as its error allows",
-        (adaptive.unmet_share,),
-    )
-    return history.with_doubts((*history.doubts, doubt))
+    words = f"steps of {1e3 * dt:g} ms are long: in {{:.0%}} of them |e| may err by more than "
+    remedy = "leave dt out, and each step is as long as its error allows"
+    return [Doubt(f"{words}{tolerance:g}", remedy, (share,))] if share > 0.75 else []
 
 
-def _state_tolerance(history: History, tolerance: float, share: float) -> History:
-    """State the tolerance of the steps in a history; doubt it where over 2 % of them missed it."""
-    history.dataset.attrs |= {"tolerance": tolerance, "tolerance_unmet": share}
-    doubt = Doubt(
-        f"the shortest steps erred by more than {tolerance:g} in |e| in {{:.0%}} of the run",
-        "compare with constant steps of 0.1 ms or less (`--set analysis.dt=1e-4`), "
-        "or with more damping",
-        (share,),
-    )
-    return history.with_doubts((*history.doubts, doubt)) if share > 0.02 else history
-
-
-def _doubt_steps_of_sliding(history: History, slip_error: SlipError, dt: float) -> History:
-    """Doubt a constant step [s] where the error of the slip is large; state a shorter one.
+def _doubt_steps_of_sliding(history: History, slip_error: SlipError, dt: float) -> list[Doubt]:
+    """Return a doubt of a constant step [s] where the slip errs by much; state a shorter one.
 
     In sliding blocks and rings the error was up to 1.5 times its sum over the steps, a third on
     average.
     """
     if not len(slip_error.joints):
-        return history
+        return []
     dataset, joints = history.dataset, slip_error.joints
     worst, error = int(joints[slip_error.total.argmax()]), float(slip_error.total.max())
     # a thousandth of the depth, by which |e| errs by a fifth of the default tolerance
     limit = 1e-3 * float(dataset["depth"].values[worst])
     if error <= limit:
-        return history
+        return []
     slip = dataset["slip"].transpose("time", "joint").values[:, joints]
     # a tenth of the largest slip on average
     largest = float(np.abs(slip - slip[0]).max())
     limit = max(limit, 0.3 * largest)
     if error <= limit:
-        return history
+        return []
     sizes: tuple[float, ...] = error, largest
     said = "{:mm}, where the largest slip is {:mm}"
     remedy = "or leave dt out"
@@ -235,12 +232,9 @@ def _doubt_steps_of_sliding(history: History, slip_error: SlipError, dt: float) 
     unit = 10.0 ** floor(log10(shorter))
     shorter = floor(shorter / unit) * unit
     history.dataset.attrs["admissible_step"] = shorter
-    doubt = Doubt(
-        f"steps of {1e3 * dt:g} ms are long for sliding: of '{{}}' the slip may be wrong by {said}",
-        f"take {1e3 * shorter:g} ms or less, `--set analysis.dt={shorter:g}`, {remedy}",
-        (str(dataset["name"].values[worst]), *sizes),
-    )
-    return history.with_doubts((*history.doubts, doubt))
+    words = f"steps of {1e3 * dt:g} ms are long for sliding: of '{{}}' the slip may be wrong by"
+    remedy = f"take {1e3 * shorter:g} ms or less, `--set analysis.dt={shorter:g}`, {remedy}"
+    return [Doubt(f"{words} {said}", remedy, (str(dataset["name"].values[worst]), *sizes))]
 
 
 def _resolve_steps(
@@ -269,17 +263,17 @@ def _check_motion(motion: Motion) -> None:
 
 def _check_types(**arguments: Any) -> None:
     """Refuse arguments of the wrong class; None stands for the default."""
-    # classes of optional arguments, their names in messages, and valid examples
-    kinds: dict[str, tuple[tuple[type, ...], str, str]] = {
-        "start": ((Equilibrium, State), "start", "give dead_load(model), or last_state(run)"),
-        "scheme": ((Conserving, Newmark, HHT), "scheme", "give Conserving(), Newmark() or HHT()"),
-        "record": ((Record,), "record", "give Record(every=…, fields_every=…)"),
-        "criteria": ((Criteria,), "criteria", "give Criteria(hinge=…, failures=…)"),
-        "newton": ((Newton,), "newton", "give Newton(tolerance=…)"),
+    # classes of optional arguments, and valid examples
+    kinds: dict[str, tuple[Any, str]] = {
+        "start": (Equilibrium | State, "dead_load(model), or last_state(run)"),
+        "scheme": (Scheme, "Conserving(), Newmark() or HHT()"),
+        "record": (Record, "Record(every=…, fields_every=…)"),
+        "criteria": (Criteria, "Criteria(hinge=…, failures=…)"),
+        "newton": (Newton, "Newton(tolerance=…)"),
     }
     for name, value in arguments.items():
         if value is not None:
-            check_type(value, *kinds[name])
+            check_type(value, kinds[name][0], name, f"give {kinds[name][1]}")
 
 
 def _make_recorder(
@@ -346,10 +340,7 @@ def _announce_long_run(
         logger.warning(
             "the run takes about %.3g minutes at its pace (%.3g of %g s in %.3g s): Ctrl-C ends it "
             "with what was computed%s",
-            whole / 60.0,
-            done,
-            duration,
-            spent,
+            *(whole / 60.0, done, duration, spent),
             "" if dt else ", and a given dt skips the comparison of steps",
             extra={"of_run": True},  # of the machine: no doubt about the answer
         )

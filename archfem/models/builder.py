@@ -89,12 +89,8 @@ def _use_quadrature_points(settings: Discretisation) -> Discretisation:
 
 def _check_plain_joints(structure: Structure) -> None:
     """Refuse joints whose law is not written as weak forms."""
-    names = {
-        joint.contact.name
-        for joint in structure.joints
-        if joint.contact.dilatancy > 0.0 or joint.contact.tension > 0.0
-    }
-    if names:
+    contacts = {joint.contact for joint in structure.joints}
+    if names := {x.name for x in contacts if x.dilatancy > 0.0 or x.tension > 0.0}:
         raise InvalidInput(
             f"contacts {sorted(names)} have dilatancy or tension, which fidelity='monolithic' does "
             "not write: use 'full', which is the same model"

@@ -130,14 +130,11 @@ def check_small_model(small: Model) -> LinearBlockModel:
             "is the same model, or a lower one"
         )
     if not small.operator.points.is_plain:
-        of = [
-            joint
-            for joint in small.structure.joints
-            if joint.contact.dilatancy or joint.contact.tension
-        ]
+        joints = small.structure.joints
+        first = next(x for x in joints if x.contact.dilatancy or x.contact.tension)
         raise InvalidInput(
             "joints with dilatancy or tension do not exist with large displacements, as at "
-            f"'{of[0].name}' of contact '{of[0].contact.name}': leave these out, or give "
+            f"'{first.name}' of contact '{first.contact.name}': leave these out, or give "
             "displacements 'small', which follow no fall"
         )
     return small
