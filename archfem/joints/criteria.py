@@ -307,13 +307,8 @@ def unbroken_durations(flagged: NDArray[np.bool_], time: Array) -> Array:
 
 def envelope(joints: xr.Dataset) -> xr.Dataset:
     """Return the `lowest` and `highest` eccentricity and largest `friction` of each joint [-]."""
-    return xr.Dataset(
-        {
-            "lowest": joints["eccentricity"].min("time"),
-            "highest": joints["eccentricity"].max("time"),
-            "friction": joints["friction"].max("time"),
-        }
-    )
+    e, friction = joints["eccentricity"], joints["friction"].max("time")
+    return xr.Dataset({"lowest": e.min("time"), "highest": e.max("time"), "friction": friction})
 
 
 @validate_arguments

@@ -178,13 +178,13 @@ class Tbec2018(CodeSpectrum):
 
     _corner_names: ClassVar[Sequence[str]] = ("T_A", "T_B", "T_L")
 
-    # Site factors of TBEC-2018, table 2.1: linear between the columns, constant outside
-    _short_period_factors: ClassVar = {
-        "ZA": (0.8, 0.8, 0.8, 0.8, 0.8, 0.8),
-        "ZB": (0.9, 0.9, 0.9, 0.9, 0.9, 0.9),
-        "ZC": (1.3, 1.3, 1.2, 1.2, 1.2, 1.2),
-        "ZD": (1.6, 1.4, 1.2, 1.1, 1.0, 1.0),
-        "ZE": (2.4, 1.7, 1.3, 1.1, 0.9, 0.8),
+    # Site factors F_S and F_1 of tables 2.1 and 2.2: linear between the columns, constant outside
+    _site_factors: ClassVar = {
+        "ZA": ((0.8, 0.8, 0.8, 0.8, 0.8, 0.8), (0.8, 0.8, 0.8, 0.8, 0.8, 0.8)),
+        "ZB": ((0.9, 0.9, 0.9, 0.9, 0.9, 0.9), (0.8, 0.8, 0.8, 0.8, 0.8, 0.8)),
+        "ZC": ((1.3, 1.3, 1.2, 1.2, 1.2, 1.2), (1.5, 1.5, 1.5, 1.5, 1.5, 1.4)),
+        "ZD": ((1.6, 1.4, 1.2, 1.1, 1.0, 1.0), (2.4, 2.2, 2.0, 1.9, 1.8, 1.7)),
+        "ZE": ((2.4, 1.7, 1.3, 1.1, 0.9, 0.8), (4.2, 3.3, 2.8, 2.4, 2.2, 2.0)),
     }
 
     ss: float
@@ -199,7 +199,7 @@ class Tbec2018(CodeSpectrum):
         check_fields(self)
         if self.site == "ZF":
             raise InvalidInput("ground class ZF has no code spectrum: it needs a site study")
-        check_choice(self.site, "ground class", self._short_period_factors)
+        check_choice(self.site, "ground class", self._site_factors)
         if (end := self.sd1 / self.sds) > 6.0:  # T_L
             raise InvalidInput(
                 f"S_S {self.ss:g}, S_1 {self.s1:g} g: T_B = S_D1 / S_DS = {end:.3g} s is beyond "
@@ -210,21 +210,13 @@ class Tbec2018(CodeSpectrum):
     def sds(self) -> float:
         """Design spectral acceleration at short periods S_DS = F_S S_S [g]."""
         levels = 0.25, 0.50, 0.75, 1.00, 1.25, 1.50
-        return self.ss * float(np.interp(self.ss, levels, self._short_period_factors[self.site]))
+        return self.ss * float(np.interp(self.ss, levels, self._site_factors[self.site][0]))
 
     @property
     def sd1(self) -> float:
         """Design spectral acceleration at 1 s S_D1 = F_1 S_1 [g]."""
-        # site factors of table 2.2, as those of table 2.1
         levels = 0.10, 0.20, 0.30, 0.40, 0.50, 0.60
-        factors = {
-            "ZA": (0.8, 0.8, 0.8, 0.8, 0.8, 0.8),
-            "ZB": (0.8, 0.8, 0.8, 0.8, 0.8, 0.8),
-            "ZC": (1.5, 1.5, 1.5, 1.5, 1.5, 1.4),
-            "ZD": (2.4, 2.2, 2.0, 1.9, 1.8, 1.7),
-            "ZE": (4.2, 3.3, 2.8, 2.4, 2.2, 2.0),
-        }
-        return self.s1 * float(np.interp(self.s1, levels, factors[self.site]))
+        return self.s1 * float(np.interp(self.s1, levels, self._site_factors[self.site][1]))
 
     def _branches(self) -> tuple[SpectrumBranches, SpectrumBranches | None]:
         sds, end = self.sds, self.sd1 / self.sds

@@ -294,18 +294,15 @@ def measure_intensity(motion: Motion, component: str = "horizontal") -> Intensit
     samples = motion.component(component)
     periods = np.linspace(0.1, 2.5, 97)
     spectrum = response_spectrum(motion, periods, component=component)
+    # ground that rests behind the record does not drift on
+    moved = motion.displacement(component)[: len(np.trim_zeros(samples, "b"))]
     start = end = 0.0
     if np.any(samples):
         start, end = signal_processing.find_significant_window(samples, motion.dt)
     return IntensityMeasures(
         pga=float(np.abs(samples).max()),
         pgv=float(np.abs(motion.velocity(component)).max()),
-        # ground that rests behind the record does not drift on
-        pgd=float(
-            np.abs(motion.displacement(component)[: len(np.trim_zeros(samples, "b"))]).max(
-                initial=0.0
-            )
-        ),
+        pgd=float(np.abs(moved).max(initial=0.0)),
         arias=float(signal_processing.integrate_arias(samples, motion.dt)[-1]),
         cav=float(integrate.trapezoid(np.abs(samples), dx=motion.dt)),
         housner=float(integrate.trapezoid(spectrum * periods / (2.0 * np.pi), periods)),

@@ -139,16 +139,12 @@ def _rises(structure: Structure, joints: xr.Dataset) -> dict[str, float]:
 
 def history_findings(run: History, case: Case) -> dict[str, Any]:
     """Return largest |e| and friction over a run of the joints that a case names."""
-    named = run.joints.isel(joint=list(case.joints))
-    return {
-        f"{size} of {joint}": value
-        for size in ("eccentricity", "friction")
-        for joint, value in zip(
-            named["name"].values.tolist(),
-            abs(named[size]).max("time").fillna(inf).values.tolist(),
-            strict=True,
-        )
-    }
+    named, findings = run.joints.isel(joint=list(case.joints)), dict[str, Any]()
+    for size in ("eccentricity", "friction"):
+        largest = abs(named[size]).max("time").fillna(inf).values.tolist()
+        names = (f"{size} of {joint}" for joint in named["name"].values.tolist())
+        findings |= zip(names, largest, strict=True)
+    return findings
 
 
 def capacity_findings(case: Case) -> dict[str, Any]:

@@ -79,7 +79,7 @@ class AdaptiveStepper:
         shortest, longest = 1e-4, 2e-2  # not halved, and not doubled, any more [s]
         finest = int(np.floor(np.log2(shortest / sample) + 0.5))
         coarsest = max(int(np.floor(np.log2(longest / sample))), finest)
-        tick, level, done = sample * 2.0**finest, 0, 0
+        tick, done = sample * 2.0**finest, 0
         level = min(max(-finest - 1, 0), coarsest - finest)
         total, state = round((end - start.time) / tick), start
         while done < total:

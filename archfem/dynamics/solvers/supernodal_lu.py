@@ -36,6 +36,8 @@ class Elimination:
     # rows below each group
     parent: Indices
     # group of the first row below, -1 where there is none (groups,)
+    group_of: Indices
+    # group of each coordinate, in this order (n,)
 
     @classmethod
     def of(cls, pattern: sparse.csr_matrix) -> "Elimination":
@@ -56,12 +58,7 @@ class Elimination:
         group_of = np.repeat(np.arange(len(groups)), [end - start for start, end in groups])
         rows = [fill[end - 1] for _, end in groups]
         parent = np.array([group_of[own[0]] if len(own) else -1 for own in rows])
-        return cls(order[after], groups, rows, parent)
-
-    @property
-    def group_of(self) -> Indices:
-        """Group of each coordinate, in this order (n,)."""
-        return np.repeat(np.arange(len(self.groups)), [end - start for start, end in self.groups])
+        return cls(order[after], groups, rows, parent, group_of)
 
 
 def _postorder(parent: list[int]) -> Indices:

@@ -264,11 +264,10 @@ class RecordText:
         """Return the values of the units of acceleration in a header [m/s²]."""
         # Longer units first: each match is removed before the search for the next. A number with
         # an operator is a factor, as in gal/10; without one, as in 312 gal, it is a value.
+        per_square = r"\s*/\s*s(?:ec|n)?(?:\s*/\s*s(?:ec|n)?|\s*(?:\^|\*\*)?\s*2|²)"
         patterns = (
-            (r"mm\s*/\s*s(?:ec|n)?(?:\s*/\s*s(?:ec|n)?|\s*(?:\^|\*\*)?\s*2|²)", 1e-3),
-            (r"cms?\s*/\s*s(?:ec|n)?(?:\s*/\s*s(?:ec|n)?|\s*(?:\^|\*\*)?\s*2|²)", 1e-2),
-            (r"\bgals?\b", 1e-2),
-            (r"\bm\s*/\s*s(?:ec|n)?(?:\s*/\s*s(?:ec|n)?|\s*(?:\^|\*\*)?\s*2|²)", 1.0),
+            *((rf"mm{per_square}", 1e-3), (rf"cms?{per_square}", 1e-2)),
+            *((r"\bgals?\b", 1e-2), (rf"\bm{per_square}", 1.0)),
             (
                 r"units?\s*(?:of|:|=|in)?\s*\(?g\b|[(\[]\s*g(?=\s*(?:[/x×*·][^)\]]*)?[)\]])|\bin\s+g\b",
                 STANDARD_GRAVITY,
