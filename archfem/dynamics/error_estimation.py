@@ -162,8 +162,6 @@ def estimate_errors(runs: Sequence[RunPeaks], order: int = 2) -> list[float]:
     finest = runs[-1].peaks
     if len(runs) < 2 or finest is None or runs[-2].peaks is None:
         return [np.inf] * len(runs)
-    differences = [
-        np.inf if run.peaks is None else largest_difference(run.peaks, finest) for run in runs
-    ]
+    differences = [np.inf if x.peaks is None else largest_difference(x.peaks, finest) for x in runs]
     remaining = differences[-2] / (2.0**order - 1.0)
     return [difference + remaining for difference in differences]

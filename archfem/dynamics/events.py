@@ -316,6 +316,7 @@ class EveryMechanism:
         verifier = get_verifier(structure)
         scanned = sorted({*np.flatnonzero(structure.judged), *verifier.rigid_regions.joints})
         roles = {joint.part: joint.role for joint in structure.joints}
+        assessed = select_assessed_parts(roles)
         parts = np.array([structure.joints[number].part for number in scanned])
         required = {"verified", *applicable_definitions(structure, criteria)}
         timers = {name: DurationCounter(criteria.duration) for name in required - {OVER_RECORD}}
@@ -323,10 +324,7 @@ class EveryMechanism:
         ever_failed = RecordCounter(structure, criteria)
 
         def conditions_of(state: FailureState) -> frozenset[str]:
-            count = {
-                part: int(state.failed[parts == part].sum())
-                for part in select_assessed_parts(roles)
-            }
+            count = {part: int(state.failed[parts == part].sum()) for part in assessed}
             counted = matching_definitions(count, roles, criteria.failures)
             failed = {_joint_condition(scanned[k]) for k in np.flatnonzero(state.failed).tolist()}
             # once there was a motion, no further one is searched for
@@ -337,9 +335,7 @@ class EveryMechanism:
             if ever_failed.add_step(conditions, step):
                 met.add(OVER_RECORD)
             # every timer takes every step: one that does not hold starts again
-            met.update(
-                name for name, time in timers.items() if time.add_step(name in conditions, step)
-            )
+            met.update(n for n, timer in timers.items() if timer.add_step(n in conditions, step))
             return "a mechanism by each definition" if met >= required else None
 
         return FailureMonitor(FailureScan(structure, criteria, scanned, conditions_of), 1, reason)
@@ -365,7 +361,7 @@ class RecordCounter:
 
     def add_step(self, conditions: frozenset[str], step: float) -> str | None:
         """Add the failed joints of a step; return the part in which enough have failed, or None."""
-        duration = self._criteria.duration
+        duration, failures = self._criteria.duration, self._criteria.failures
         self._timers = {
             name: self._timers.get(name) or DurationCounter(duration)
             for name in conditions & self._waiting.keys()
@@ -374,10 +370,7 @@ class RecordCounter:
             if timer.add_step(True, step):
                 joint = self._waiting.pop(name)
                 self.failed.setdefault(joint.part, []).append(joint.name)
-        complete = (
-            part for part, names in self.failed.items() if len(names) >= self._criteria.failures
-        )
-        return next(complete, None)
+        return next((part for part, names in self.failed.items() if len(names) >= failures), None)
 
 
 def _joint_condition(number: int) -> str:

@@ -125,11 +125,8 @@ def loosen_fill(structure: Structure, start: LooseBlocks, fields: Mapping[int, F
     place = {number: new for new, number in enumerate(stones)}
     blocks = [structure.blocks[number] for number in stones]
     blocks += [_as_block(structure.blocks[g.block], g, k) for k, g in enumerate(kept)]
-    joints = [
-        replace(joint, blocks=(place[joint.blocks[0]], place[joint.blocks[1]]))
-        for joint in structure.joints
-        if place.keys() >= {*joint.blocks}
-    ]
+    between = (joint for joint in structure.joints if place.keys() >= {*joint.blocks})
+    joints = [replace(x, blocks=(place[x.blocks[0]], place[x.blocks[1]])) for x in between]
     options = structure.width, structure.gravity, structure.name
     rest, speeds = np.zeros((len(kept), 3)), np.array([g.velocity for g in kept]).reshape(-1, 3)
     return LooseFill(

@@ -77,10 +77,8 @@ class EnergyMeter:
         potential = self.model.energy(q) - float(self.weight @ q)
         increment = q - before[0]
         work = -float(increment @ (self.model.mass_influence @ ground))
-        loss = 0.5 * float(
-            increment @ (self._damping_forces(*before) + self._damping_forces(*after))
-        )
-        return np.array([kinetic, potential, work, loss])
+        forces = self._damping_forces(*before) + self._damping_forces(*after)
+        return np.array([kinetic, potential, work, 0.5 * float(increment @ forces)])
 
     def _damping_forces(self, q: Array, velocity: Array) -> Array:
         """Return the damping forces in a state (n,)."""

@@ -278,9 +278,7 @@ class CollapseScale:
     def _runs(self) -> list[ScaledRun]:
         """Runs of these, and of interrupted searches; of longer steps falls and dislocations."""
         made, longer = {**self._decisive, **self.searches}, self.longer.values()
-        moved = (
-            run for each in longer for run in each.runs if run.fall and run.fall.kind != "stands"
-        )
+        moved = (x for each in longer for x in each.runs if x.fall and x.fall.kind != "stands")
         return [*(run for search in made.values() for run in search.runs), *moved]
 
     @property
@@ -351,9 +349,7 @@ class CollapseScale:
         """Largest such scale by every time step, also of a search that Ctrl-C ended; 0 for none."""
         least = self.held
         for search in self.searches.values() if self.interrupted else ():
-            runs = [
-                (run.scale, bool(run.fall and run.fall.kind == "stands")) for run in search.runs
-            ]
+            runs = [(x.scale, bool(x.fall and x.fall.kind == "stands")) for x in search.runs]
             failed = min((scale for scale, stood in runs if not stood), default=inf)
             least = min(least, max((x for x, stood in runs if stood and x < failed), default=0.0))
         return least

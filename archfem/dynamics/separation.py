@@ -145,9 +145,8 @@ class MeetingMonitor:
 
     def _may_meet(self, corners: Array) -> bool:
         """Return whether any blocks without a joint have moved by more than is between them."""
-        farthest = np.maximum(
-            corners.max(axis=0) - self._corners, self._corners - corners.min(axis=0)
-        )
+        start = self._corners
+        farthest = np.maximum(corners.max(axis=0) - start, start - corners.min(axis=0))
         distances = np.hypot(*farthest.T)
         reach = np.zeros(len(self._room))
         # displacements of a rigid block are linear, and arcs bulge by half of a chord at most

@@ -318,10 +318,8 @@ def part_roles(joints: xr.Dataset) -> dict[str, str]:
     Args:
         joints: as made by `joint_dataset`, with `part` and `role`.
     """
-    parts, roles = (
-        np.atleast_1d(joints[key].values).astype(str).tolist() for key in ("part", "role")
-    )
-    return dict(zip(parts, roles, strict=True))
+    rows = (np.atleast_1d(joints[key].values).astype(str).tolist() for key in ("part", "role"))
+    return dict(zip(*rows, strict=True))
 
 
 def eccentricity_magnitude(joints: xr.Dataset) -> xr.DataArray:

@@ -234,9 +234,8 @@ def evaluate_law(law: JointLaw, gaps: Array, memory: Array, what: str) -> tuple[
 def evaluate_energy(law: JointLaw, gaps: Array, memory: Array, what: str) -> Array:
     """Return the energy of a law (p,) [J/m²]."""
     with report_user_errors(f"{what}, energy"):
-        return np.broadcast_to(
-            np.asarray(law.energy(gaps[0], gaps[1], memory), float), gaps[0].shape
-        )
+        energy = np.asarray(law.energy(gaps[0], gaps[1], memory), float)
+        return np.broadcast_to(energy, gaps[0].shape)
 
 
 def check_law(law: JointLaw, what: str, count: int = 400) -> None:

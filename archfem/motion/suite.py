@@ -75,9 +75,7 @@ class Suite:
                 f"{len(horizontals)} horizontals cannot share {len(verticals)} verticals evenly"
             )
         share = len(horizontals) // len(verticals)
-        pairs = tuple(
-            level.with_vertical(verticals[k // share]) for k, level in enumerate(horizontals)
-        )
+        pairs = tuple(x.with_vertical(verticals[k // share]) for k, x in enumerate(horizontals))
         return cls(name, pairs, scale=scale, reduction=reduction)
 
     @classmethod

@@ -676,11 +676,8 @@ class CollapseRisk(ResultDisplay):
         counts = {None: len(labels)}
         if len(set(labels)) > 1:
             counts |= {label: int(np.sum(labels == label)) for label in sorted(set(labels))}
-        rows = [
-            [label or "all", str(count), str(self.rate(label))]
-            for label, count in counts.items()
-            if count >= FIRST_ROUND
-        ]
+        enough = [label for label, count in counts.items() if count >= FIRST_ROUND]
+        rows = [[each or "all", str(counts[each]), str(self.rate(each))] for each in enough]
         return align_columns(["alternative", "samples", "falls"], rows)
 
     def __str__(self) -> str:

@@ -270,9 +270,7 @@ def _join_parts(
     further = {"time": (len(ALL_DEFINITIONS),), "failed": (len(ALL_DEFINITIONS), len(joints))}
     variables = {}
     for name, first in parts[0].items():
-        column = [
-            part[name].split("\n") if isinstance(first, str) else part[name] for part in parts
-        ]
+        column = [x[name].split("\n") if isinstance(first, str) else x[name] for x in parts]
         values = np.concatenate(column, dtype=bool if name == "failed" else None, casting="unsafe")
         shape = len(changes), len(motions), len(scales), *further.get(name, ())
         dims = ("change", "motion", "scale", "definition", "joint")[: len(shape)]

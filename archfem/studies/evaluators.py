@@ -207,11 +207,8 @@ def evaluate_limit(case: Case) -> Findings:
         other = case.limit.opposite if collapse.outcome is not Outcome.INFEASIBLE else None
         senses = [collapse] if other is None else [collapse, other.solve(case.structure)]
     doubts += doubt_fill(result_text.compare_with_site(case, *senses))
-    findings: Findings = {
-        "factor": float(collapse.factor),
-        "hinges": len(collapse.hinges),
-        "slides": len(collapse.sliding),
-    }
+    findings: Findings = {"factor": float(collapse.factor)}
+    findings |= {"hinges": len(collapse.hinges), "slides": len(collapse.sliding)}
     if collapse.outcome is Outcome.BRACKETED:
         findings["factor_at_most"] = float(collapse.upper)
     searched = [x.bounded or (x.solutions and x.solutions.may_be_less) for x in senses]
@@ -247,9 +244,8 @@ def evaluate_rating(case: Case) -> Findings:
     """Return the factor of a case in each state of its fill, and the place of the vehicle."""
     with result_text.record_doubts(case.structure) as doubts:
         found = rate_case(case.structure, case.rating, case.limit)
-    doubts += [
-        each for each in result_text.doubt_rating(found, case.limit) if isinstance(each, Doubt)
-    ]
+    stated = result_text.doubt_rating(found, case.limit)
+    doubts += [each for each in stated if isinstance(each, Doubt)]
     place = {"position": found.moving.position, "hinges": len(found.moving.worst.hinges)}
     return found.factors | place | _state_doubts(doubts)
 

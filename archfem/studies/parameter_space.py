@@ -314,10 +314,7 @@ def group_by_model(points: Iterable[tuple[int, Point]]) -> list[tuple[int, Point
 
 def _copy_tables(tables: Mapping[str, Any]) -> dict[str, Any]:
     """Copy tables within each other, but not the rows in them, which nothing changes."""
-    return {
-        key: _copy_tables(value) if isinstance(value, Mapping) else value
-        for key, value in tables.items()
-    }
+    return {k: _copy_tables(x) if isinstance(x, Mapping) else x for k, x in tables.items()}
 
 
 def _select_pair(settings: dict[str, Any], pair: str) -> None:

@@ -86,9 +86,7 @@ class Store:
                 "%d of the stored points in %s are damaged or were changed: computed again; %s",
                 *(len(damaged), self.folder, self._row_path(damaged[0])),
             )
-        return {
-            digest: row for digest, row in rows.items() if row and (row["ours"] or not row["error"])
-        }
+        return {d: row for d, row in rows.items() if row and (row["ours"] or not row["error"])}
 
     def digests(self) -> set[str]:
         """Return the digests of the stored points."""
@@ -307,9 +305,8 @@ def evaluate_with_progress(
             yield from ((k, kept[digest]) for k, digest in digests.items() if digest in kept)
         left = [each for each in points if digests.get(each[0]) not in kept]
         done, failed = len(points) - len(left), sum(bool(row["error"]) for row in kept.values())
-        progress = stack.enter_context(
-            closing(Progress(len(points), done, failed, store, name=name))
-        )
+        progress = Progress(len(points), done, failed, store, name=name)
+        stack.enter_context(closing(progress))
         try:
             for number, row in evaluate_points(left, Evaluator(find), workers):
                 if store is not None:

@@ -79,11 +79,8 @@ class Equation:
         if damping is None or damping.joints == "closed":
             matrix.data = np.zeros_like(matrix.data)
         else:
-            fixed = (
-                self.model.closed_tangent()
-                if damping.joints == "initial"
-                else self.model.block_stiffness
-            )
+            initial = damping.joints == "initial"
+            fixed = self.model.closed_tangent() if initial else self.model.block_stiffness
             matrix.data = damping.stiffness * fixed.data
         return matrix
 

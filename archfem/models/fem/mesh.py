@@ -206,9 +206,7 @@ def _cells_along(fixed: bool, settings: Discretisation) -> int:
 
 def _check_cell_count(edges: Edges, settings: Discretisation, max_cells: int = 1_000_000) -> None:
     """Refuse a mesh with too many cells for the memory, before it is generated."""
-    count = sum(
-        prod(map(float, _side_cells(edges, number, settings))) for number in edges.structured
-    )
+    count = sum(prod(map(float, _side_cells(edges, n, settings))) for n in edges.structured)
     for number in edges.unstructured:
         block, largest = edges.structure.blocks[number], _max_cell_size(edges, number, settings)
         count += 0.0 if block.fixed else block.area / largest / largest
