@@ -124,7 +124,7 @@ class CornerDisplacements:
         # displacement of the farthest corner of each block, of all steps and of the last (b,) [m]
         self.largest, self.residual = np.zeros((2, len(self.blocks)))
         # time of the largest displacement of a stone [s], and those of corners then (c, 2) [m]
-        self.peak = start.time, observer.corners(observer.read(start.q))
+        self.peak = start.time, self._start
 
     def add(self, times: Array, readings: Array) -> None:
         """Add the times of the next steps, and the readings of the observer at these (steps, r)."""

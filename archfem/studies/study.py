@@ -210,11 +210,7 @@ class Study:
             else:
                 stack.enter_context(store.lock())
                 shared = store.shared.resolve()
-            interruption = None
-            try:
-                rows = self._collect_rows(store, shared, workers, client)
-            except Interrupted as error:
-                rows, interruption = error.last, error
+            rows, interruption = self._collect_rows(store, shared, workers, client)
             table = build_table(self.axes, rows, self.evaluator.units, self._attributes)
             if store is not None:
                 store.write_table(table)
@@ -236,9 +232,12 @@ class Study:
 
     def _collect_rows(
         self, store: Store | None, shared: Path, workers: int | None, client: Any
-    ) -> list[Row]:
-        """Rows of all points, from the store if they are there; `shared` is for their parts."""
-        rows: dict[str, Row] = {}
+    ) -> tuple[list[Row], KeyboardInterrupt | None]:
+        """Return the rows of all points, from the store if they are there, and Ctrl-C if it came.
+
+        `shared` is for their parts.
+        """
+        rows, interruption = dict[str, Row](), None
         digests = [str(number) for number in range(len(self.points))]
         if store is not None:
             digests = [self.evaluator.digest(point) for point in self.points]
@@ -266,10 +265,10 @@ class Study:
                     progress.add(failed=bool(row["error"]), runs=runs)
         except KeyboardInterrupt as error:
             if not rows:
-                raise KeyboardInterrupt from error
-            left = make_row({}, NOT_COMPUTED)
-            raise Interrupted([rows.get(digest, left) for digest in digests]) from error
-        return [rows[digest] for digest in digests]
+                raise
+            interruption, left = error, make_row({}, NOT_COMPUTED)
+            rows = {digest: rows.get(digest, left) for digest in digests}
+        return [rows[digest] for digest in digests], interruption
 
     def _store(self, store: Store, number: int, digest: str, row: Row) -> None:
         """Write the row of a point, unless one of its files has changed during the study."""
