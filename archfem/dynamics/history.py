@@ -510,14 +510,11 @@ def _check_content(path: str | Path, dataset: xr.Dataset) -> None:
     shapes = {name: values.dims for name, values in dataset.variables.items()}
     shapes.setdefault("ground", DIMENSIONS["ground"])
     wrong = [name for name, dims in DIMENSIONS.items() if shapes.get(name) != dims]
-    wrong += [
-        str(name)
-        for name, values in dataset.variables.items()
-        if ("joint" in values.dims and values.dims not in DIMENSIONS.values())
-        or (
-            name not in TEXTS and {"time", "joint"} & {*values.dims} and values.dtype.kind in "OSUM"
-        )
-    ]
+    for name, values in dataset.variables.items():
+        dims = values.dims
+        is_strange = "joint" in dims and dims not in DIMENSIONS.values()
+        is_text = {"time", "joint"} & {*dims} and values.dtype.kind in "OSUM"
+        wrong += [str(name)] if is_strange or (is_text and name not in TEXTS) else []
     needed = ["cohesion_limit", *["slip"] * ("rotation" in shapes)]
     wrong += [name for name in needed if name not in shapes]
     required = [name for name in ATTRIBUTE_KINDS if "fall" in dataset.attrs and name[:5] == "fall_"]

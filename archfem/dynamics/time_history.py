@@ -371,13 +371,9 @@ def last_state(history: History) -> State:
     Raises:
         InvalidInput: the history does not contain it.
     """
-    dataset = history.dataset
-    q, velocity, acceleration, memory = (
-        dataset[f"last_{name}"].values if f"last_{name}" in dataset else None
-        for name in ("q", "velocity", "acceleration", "memory")
-    )
-    if q is None or velocity is None or acceleration is None:
+    dataset, names = history.dataset, ("q", "velocity", "acceleration", "memory")
+    kept = {x: dataset[f"last_{x}"].values for x in names if f"last_{x}" in dataset}
+    if not {*names[:3]} <= kept.keys():
         raise InvalidInput("this history does not hold the state in which its run ended")
     attrs = dataset.attrs
-    time = float(attrs["last_time"])
-    return State(time, q, velocity, acceleration, memory, attrs.get("structure"))
+    return State(float(attrs["last_time"]), **kept, structure=attrs.get("structure"))

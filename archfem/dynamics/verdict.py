@@ -332,15 +332,12 @@ def find_farthest(
     most, left = (dataset[f"{key}_displacement"].values for key in ("largest", "residual"))
     stones, bodies = list_own_stones(structure), find_bodies(structure)
     names = [structure.blocks[stones[each[stones].argmax()]].name for each in (most, left)]
-    moved = {name: structure.block_number(name) for name in bodies}
-    return tuple(names), [
-        (
-            float(most[number]),
-            f"'{name}', which stands on it, was displaced by up to {format_mm(most[number])}, "
-            f"{format_mm(left[number])} at the end",
-        )
-        for name, number in moved.items()
-    ]
+    moved = []
+    for name in bodies:
+        size, end = (float(each[structure.block_number(name)]) for each in (most, left))
+        words = f"'{name}', which stands on it, was displaced by up to {format_mm(size)}"
+        moved.append((size, f"{words}, {format_mm(end)} at the end"))
+    return tuple(names), moved
 
 
 def extremes_remark(dataset: xr.Dataset) -> list[str]:

@@ -168,10 +168,8 @@ class Ida(ResultDisplay):
 
     def _summary(self) -> str:
         """Return the peak accelerations at which limit states are reached."""
-        words = []
-        for limit in self.limits:
-            high = self.capacities(limit)[1]
-            words.append(f"{limit} at {high.min():.3g} to {high.max():.3g} m/s²")
+        tops = {limit: self.capacities(limit)[1] for limit in self.limits}
+        words = (f"{x} at {high.min():.3g} to {high.max():.3g} m/s²" for x, high in tops.items())
         found = self.table["error"].values if "error" in self.table else ()
         errors = [str(error) for error in found if error]
         without = f"; {len(errors)} without an answer, as {errors[0]}" if errors else ""

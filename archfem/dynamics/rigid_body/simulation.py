@@ -334,13 +334,12 @@ class _Run:
         """Return the present frame after checks of overlap and energy."""
         self._time = time
         self._check(time)
-        *parts, gained = self._energy[:5].tolist()
+        kinetic, potential, work, lost, gained = self._energy[:5].tolist()
         beyond = max(gained - self._parameters.energy_noise, 0.0)
         share = beyond / max(float(self._energy[6]), np.finfo(float).tiny)
-        kinetic, potential, work, lost = parts
-        energy = FallEnergy(kinetic, potential, work, lost, gained, share)
         residual, *counts = self._settling.tolist()
         settling = Settling(residual / self._weight_speed, *map(int, counts))
+        energy = FallEnergy(kinetic, potential, work, lost, gained, share)
         poses, velocities = self._q.copy(), self._v.copy()
         return FallFrame(time, poses, velocities, energy, self._overlap, settling, resting)
 
