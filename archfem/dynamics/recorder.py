@@ -16,7 +16,7 @@ from archfem.dynamics.history import SIGN_CONVENTION, Ending, History
 from archfem.dynamics.loose_fill import doubt_fallen_fill
 from archfem.dynamics.monitor import RunMonitor
 from archfem.dynamics.solvers.integrator import Stepper
-from archfem.dynamics.state import Batch, State
+from archfem.dynamics.state import Batch, State, Step
 from archfem.joints.criteria import Criteria
 from archfem.joints.resultants import joint_variables
 from archfem.models.model import Doubt, Model
@@ -49,14 +49,8 @@ class Record:
 def start_batch(stepper: Stepper, start: State, dt: float) -> Batch:
     """Return the start of a run as a batch of one step."""
     equation = stepper.equation
-    return Batch(
-        np.array([start.time]),
-        equation.with_memory(start).resultants(equation.contact(start))[None],
-        np.zeros(1, dtype=np.int64),
-        np.array([dt]),
-        equation.energy(start)[None],
-        lambda _: start,
-    )
+    resultants = equation.with_memory(start).resultants(equation.contact(start))
+    return Step(start, resultants, 0, dt, equation.energy(start)).batch
 
 
 class GrowingArray:
