@@ -16,11 +16,10 @@ step of a batch.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import cos, radians, sin
 
 import numpy as np
-from scipy import sparse
 from scipy.integrate import trapezoid
 
 from archfem._typing import Array
@@ -57,36 +56,6 @@ def refuse_fill_in_tension(start: Equilibrium) -> None:
             f"soil at most {SOIL_TENSION / kPa:.2g} kPa, so that no scale would count: cut the "
             'fill into pieces, jointed_fill (law = "jointed" in [structure.fill] of a case)'
         )
-
-
-@dataclass(frozen=True, eq=False)
-class EnergyMeter:
-    """Kinetic and potential energy, work and loss of the steps of a model."""
-
-    model: Model
-    weight: Array
-    damping: sparse.csr_matrix
-    damping_lag: float
-
-    def measure_step(
-        self, before: tuple[Array, Array], after: tuple[Array, Array], ground: Array
-    ) -> Array:
-        """Return kinetic and potential energy at the end of a step, its work and its loss (4,)."""
-        q, velocity = after
-        kinetic = 0.5 * float(velocity @ (self.model.mass @ velocity))
-        potential = self.model.energy(q) - float(self.weight @ q)
-        increment = q - before[0]
-        work = -float(increment @ (self.model.mass_influence @ ground))
-        forces = self._damping_forces(*before) + self._damping_forces(*after)
-        return np.array([kinetic, potential, work, 0.5 * float(increment @ forces)])
-
-    def _damping_forces(self, q: Array, velocity: Array) -> Array:
-        """Return the damping forces in a state (n,)."""
-        forces: Array = self.damping @ velocity
-        if self.damping_lag:
-            delayed = self.model.force(q + self.damping_lag * velocity)
-            forces += delayed - self.model.force(q)
-        return forces
 
 
 class EnergyBalance:

@@ -68,7 +68,7 @@ class Batch:
         iterations: Newton iterations of each step (steps,).
         smallest_step: shortest substep taken in each step (steps,) [s].
         energy: kinetic and potential energy, work and loss of each step, as by
-            `EnergyMeter.measure_step` (steps, 4) [J].
+            `Equation.step_energy` (steps, 4) [J].
         state: function from the number of a step to the state at its end.
         fallback: whether a compiled solver failed and SNES took these steps.
         q: coordinates at the ends (steps, n); None to take them from the states.
@@ -144,7 +144,7 @@ class Step:
     resultants: Array  # N, V, M of every joint (n_joints, 3) [N, N, N m]
     iterations: int  # of Newton's method
     smallest_step: float  # shortest substep taken [s]
-    energy: Array  # kinetic, potential, work and loss, as by `EnergyMeter.measure_step` (4,) [J]
+    energy: Array  # kinetic, potential, work and loss, as by `Equation.step_energy` (4,) [J]
 
     @property
     def batch(self) -> "Batch":

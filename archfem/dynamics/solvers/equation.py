@@ -20,7 +20,6 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from archfem._typing import Array
-from archfem.dynamics.monitor import EnergyMeter
 from archfem.dynamics.schemes import Conserving, Scheme, Viscous, check_friction_scheme
 from archfem.dynamics.solvers.newmark import StepNumbers, step_numbers
 from archfem.dynamics.state import State
@@ -115,11 +114,6 @@ class Equation:
         slides = bool(np.isfinite(structure.friction).any())
         return len(self.model.memory) if slides or structure.has_own_laws else 0
 
-    @cached_property
-    def energy_meter(self) -> EnergyMeter:
-        """Evaluates energies from state to state."""
-        return EnergyMeter(self.model, self.weight, self.viscous, self.lag)
-
     def numbers(self, dt: float) -> StepNumbers:
         """Return the coefficients of a time step.
 
@@ -207,6 +201,26 @@ class Equation:
         kinetic = 0.5 * float(state.velocity @ (self.model.mass @ state.velocity))
         potential = self.with_memory(state).energy(state.q) - float(self.weight @ state.q)
         return np.array([kinetic, potential, 0.0, 0.0])
+
+    def step_energy(self, before: State, after: State, ground: Array) -> Array:
+        """Return kinetic and potential energy after a step, its work and its loss (4,) [J].
+
+        Args:
+            before: state before the step.
+            after: state after it.
+            ground: mean acceleration of the ground in it (2,) [m/s²].
+        """
+        increment = after.q - before.q
+        work = -float(increment @ (self.model.mass_influence @ ground))
+        forces = self._damping_forces(before) + self._damping_forces(after)
+        return np.array([*self.energy(after)[:2], work, 0.5 * float(increment @ forces)])
+
+    def _damping_forces(self, state: State) -> Array:
+        """Return the damping forces in a state (n,)."""
+        forces: Array = self.viscous @ state.velocity
+        if self.lag:
+            forces += self.model.force(self.contact(state)) - self.model.force(state.q)
+        return forces
 
 
 def mean_accelerations(motion: Motion, times: Array) -> Array:

@@ -138,8 +138,7 @@ class SnesSolver:
         acceleration = numbers.acceleration[1] * moved + fading
         new = State(state.time + dt, solved.q, velocity, acceleration)
         ground = equation.motion.at(np.array([state.time, state.time + dt])).mean(axis=0)
-        ends = (state.q, state.velocity), (new.q, new.velocity)
-        energy = equation.energy_meter.measure_step(*ends, ground)
+        energy = equation.step_energy(state, new, ground)
         resultants = model.resultants(equation.contact(new))
         return Step(new, resultants, solved.iterations, dt, energy)
 
