@@ -209,22 +209,20 @@ def simulate_fall(
     # grains are many, and where each of them goes depends on the step anyhow
     dt = None if whole and loose.structure is structure else TRIED_STEPS[0]
     simulation = RigidBlockSimulation(loose.structure, dt=dt, rocking_ratio=rocking_ratio)
-    frames, failure, poses = list[FallFrame](), "", list[Array]()
+    found, failure = list[FallFrame](), ""
     try:
         for each in simulation.frames(loose.start, end, motion, spacing=0.02):
-            frame = loose.restore(each)
-            frames.append(frame)
-            poses.append(each.poses)
-            if not whole and find_lost(frame.poses).any():
+            found.append(each)
+            if not whole and find_lost(loose.restore(each).poses).any():
                 break
     except (DidNotConverge, KeyboardInterrupt) as error:
-        if not frames:
-            frames = [loose.restore(each) for each in getattr(error, "last", ())]
-            poses = [each.poses for each in getattr(error, "last", ())]
-        if not frames:  # interrupted before the first step
+        found = found or [*getattr(error, "last", ())]
+        if not found:  # interrupted before the first step
             raise
         failure = "interrupted" if isinstance(error, KeyboardInterrupt) else str(error)
-    dataset = _fall_dataset(frames, motion, released).merge(loose.describe_grains(poses))
+    frames = [loose.restore(each) for each in found]
+    grains = loose.describe_grains([each.poses for each in found])
+    dataset = _fall_dataset(frames, motion, released).merge(grains)
     return dataset.assign_attrs(fall_failure=failure), frames
 
 
