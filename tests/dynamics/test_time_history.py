@@ -6,13 +6,12 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-import xarray as xr
 from glued import glued
 
 import archfem as af
-from archfem.dynamics import Ending, History, Record, last_state
+from archfem.dynamics import Ending, Record, last_state
 from archfem.dynamics.separation import LooseningMonitor
-from archfem.dynamics.time_history import _find_end, _resolve_steps, _state_tolerance
+from archfem.dynamics.time_history import _doubt_shortest_steps, _find_end, _resolve_steps
 
 DAMPING = af.Rayleigh(0.05, (8.0, 16.0))
 GIVEN = {"damping": DAMPING, "dt": 0.005}
@@ -210,7 +209,7 @@ def test_the_first_event_ends_a_run_within_a_batch(event, parting, meeting, said
 
 @pytest.mark.parametrize(("share", "count"), [(0.0199, 0), (0.0201, 1)])
 def test_steps_that_missed_their_tolerance_are_doubted(share, count):
-    doubts = _state_tolerance(History(xr.Dataset()), 1e-3, share).doubts
+    doubts = _doubt_shortest_steps(1e-3, share)
     assert len(doubts) == count
     assert all("more than 0.001 in |e| in 2% of the run" in doubt.cause for doubt in doubts)
 
