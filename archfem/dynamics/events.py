@@ -364,7 +364,8 @@ class RecordCounter:
         duration, failures = self._criteria.duration, self._criteria.failures
         self._timers = {
             name: self._timers.get(name) or DurationCounter(duration)
-            for name in conditions & self._waiting.keys()
+            for name in self._waiting  # in the order of the structure
+            if name in conditions
         }
         for name, timer in self._timers.items():
             if timer.add_step(True, step):

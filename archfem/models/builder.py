@@ -90,7 +90,8 @@ def _use_quadrature_points(settings: Discretisation) -> Discretisation:
 def _check_plain_joints(structure: Structure) -> None:
     """Refuse joints whose law is not written as weak forms."""
     contacts = {joint.contact for joint in structure.joints}
-    if names := {x.name for x in contacts if x.dilatancy > 0.0 or x.tension > 0.0}:
+    names = {x.name for x in contacts if x.dilatancy > 0.0 or x.tension > 0.0}
+    if names:
         raise InvalidInput(
             f"contacts {sorted(names)} have dilatancy or tension, which fidelity='monolithic' does "
             "not write: use 'full', which is the same model"

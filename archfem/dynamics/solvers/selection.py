@@ -64,8 +64,9 @@ def select_solver(equation: Equation) -> StepSolver | None:
         if operator is not None and not operator.points.is_plain:
             logger.info("joints dilate, resist tension or have an own law: SNES solves every step")
         return None
-    # where joints stiffen every row is active
-    if equation.model.large_displacements or joints is None or joints.points.stiffens:
+    if equation.model.large_displacements or joints is None:
+        return newton
+    if joints.points.stiffens:  # every row is active
         return newton
     rows = len(gap_rows(joints).offset)
     # Chains of rigid stones have a half width of 5 to 11, and take 0.8 to 0.95 of the time of the
