@@ -7,7 +7,7 @@ import pytest
 
 import archfem as af
 from archfem.dynamics import CountedMechanism, EveryMechanism, MovingMechanism
-from archfem.dynamics.events import FailureScan, applicable_definitions
+from archfem.dynamics.events import FailureScan, RecordCounter, applicable_definitions
 
 WEIGHT = 1e4
 
@@ -229,3 +229,10 @@ def test_many_steps_at_once_are_seen_as_one_by_one(ring):
     assert together == [at(scan, step, 1) for step in steps] == [set(), {"1"}, {"2"}]
     for first, second in zip(query.calls, alone.calls, strict=True):
         assert first.identical(second)
+
+
+def test_joints_that_fail_over_a_record_in_one_step_are_named_in_order():
+    """Not in that of a set of texts, which changes from process to process."""
+    counter = RecordCounter(ring(), af.Criteria(duration=0.0, failures=30))
+    counter.add_step(frozenset(f"joint {number}" for number in range(8)), STEP)
+    assert counter.failed["arch"] == [joint.name for joint in ring().joints[:8]]
