@@ -536,7 +536,7 @@ def refine_bounds(
 
 
 def _check_bounded(structure: Structure, soil: Sequence[int], friction: str | None) -> None:
-    """Refuse what the bounds do not cover: no fill, bodies on it, friction without dilatancy."""
+    """Refuse structures without fill, bodies on it, and friction without dilatancy."""
     refuse_missing_fill({*soil} & {*find_yielding_blocks(structure)})
     if bodies := set(find_bodies(structure)) & {structure.blocks[number].name for number in soil}:
         raise InvalidInput(
