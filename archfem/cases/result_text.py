@@ -434,9 +434,9 @@ def doubt_rating(found: Rating, limit: LimitAnalysis) -> list[Remark]:
         words = "joints do not crush, as the case gives no strength of the stones: "
         remedy = "give strength in [materials] or [limit]"
         lines.append(Doubt(f"{words}{found.crushing_text}", remedy))
-    if found.needed:
-        remedy = "show by tests that these act, or judge by the least factor"
-        lines.append(Doubt(f"the bridge passes only with {found.needed}", remedy))
+    remedy = "show by tests that these act, or judge by the least factor"
+    if only := found.passes and found.needed:
+        lines.append(Doubt(f"the bridge passes only with {only}", remedy))
     if "from memory" in str(found):
         words = "values from memory were not compared with the text of their code"
         lines.append(f"{NOTE_MARK}{words}: look them up before you sign")

@@ -185,8 +185,8 @@ class Rating(ResultDisplay):
         """Whether it passes, and with which parts of a bridge alone."""
         if np.isnan(self.factor):
             return "does not stand under its own weight"
-        words = "passes" if self.passes else "fails"
-        return f"{words} only with {self.needed}" if self.needed else words
+        only = f" only with {self.needed}" * bool(self.passes and self.needed)
+        return f"passes{only}" if self.passes else "fails"
 
     @property
     def headline(self) -> str:
@@ -224,16 +224,14 @@ class Rating(ResultDisplay):
 
     @property
     def needed(self) -> str:
-        """Parts of fill and stones without which alone the bridge fails, in words; else ""."""
-        if not self.passes:
-            return ""
+        """Parts of fill and stones without which alone what passes would fail, in words, or ""."""
         if isinstance(self.fill, PlasticFill) and not self.by_pressure >= 1.0:
             return "the fill as a plastic body"
         cuts, states = list[tuple[str, ...]](), self._list_states()
         for parts in sorted(states, key=len):
             if not states[parts] >= 1.0 and not any({*cut} <= {*parts} for cut in cuts):
                 cuts.append(parts)
-        single = [part for part, *others in cuts if not others]
+        single = [cut[0] for cut in cuts if len(cut) == 1]
         several = [" or ".join(cut) for cut in cuts if len(cut) > 1]
         return ", and ".join(filter(None, [" and ".join(single), *several]))
 

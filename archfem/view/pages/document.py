@@ -72,8 +72,8 @@ class FigureBlock:
         """Return a matplotlib figure as a vector graphic."""
         disable_math(figure)
         buffer = BytesIO()
-        fixed = {"svg.fonttype": "path", "svg.hashsalt": "archfem"}
-        with matplotlib.rc_context({**fixed, "path.simplify_threshold": 0.5}):
+        fixed = {"svg.fonttype": "path", "svg.hashsalt": "archfem", "path.simplify_threshold": 0.5}
+        with matplotlib.rc_context(fixed):
             figure.savefig(
                 buffer, format="svg", transparent=True, metadata={"Date": None}, **_WITHOUT_MARGIN
             )
