@@ -452,6 +452,14 @@ def test_components_of_a_motion_are_named_where_there_are_several():
     ]
 
 
+def test_ground_that_drifts_on_is_marked_at_its_displacement():
+    """A sine of 1 m/s², whose velocity ends at zero after a period, and at 2 / ω after a half."""
+    for end, mark in ((2.0 * np.pi, ""), (np.pi, " (drifts: ends at 2 m/s)")):
+        times = np.arange(0.0, end, 1e-3)
+        row = tabulate_motions([af.Motion(np.sin(times), 1e-3)]).rows[0]
+        assert row[6].partition(" m")[2] == mark
+
+
 @pytest.mark.parametrize(
     ("value", "text"), [(0.1234, "0.123"), (99.9, "99.900"), (101.0, "> 100"), (np.nan, "open")]
 )
