@@ -27,6 +27,9 @@ REQUIRED_FACTORS = ("factor", "without_pressure", "full_pressure", "geometric")
 # Largest over least value beyond which dots of cases have a logarithmic axis [-]
 WIDE_RATIO = 50.0
 
+# Dashes of the lines over a key, one after the other
+DASHES = "-", "--", "-.", ":"
+
 
 class FragilityCurve(Protocol):
     """Fragility curve, as far as it is drawn."""
@@ -171,6 +174,8 @@ def _draw_named_cases(
                 axes.plot(dots[name], dots["place"], "o", ms=3.5, color=colour, **label)
             if frame[name].min() > 0.0 and frame[name].max() > WIDE_RATIO * frame[name].min():
                 axes.set_xscale("log")
+            else:
+                axes.locator_params(axis="x", nbins=4)  # numbers of five digits fit
         look = {"color": Colour.GREY, "lw": 0.9}
         if not pairs:
             axes.axvline(frame[name].iloc[0], ls="--", label=f"{labels[0]}, the first", **look)
@@ -227,11 +232,13 @@ def _draw_over_key(
         label = None if words is None or words in colours else text
         colour = colours.setdefault(words, Colour.LINES[len(colours)])
         known = group[np.isfinite(group["value"])].sort_values(key)
-        look = {"ms": 3.5, "lw": 1.2, "color": colour, "label": label}
-        axes.plot(known[key], known["value"], "o-" if joined else "o", **look)
+        look = {"ms": 3.5, "lw": 1.2, "color": colour, "label": label, "marker": "o"}
+        dashes = DASHES[[*colours].index(words) % len(DASHES)]  # equal lines show through
+        axes.plot(known[key], known["value"], ls=dashes if joined else "", **look)
         bounds = known[known["bounded"]]
         if len(bounds):
-            axes.plot(bounds[key], bounds["value"], "o", **look | {"mfc": "white", "label": None})
+            look |= {"mfc": "white", "label": None}
+            axes.plot(bounds[key], bounds["value"], ls="", **look)
     finite = frame["value"][np.isfinite(frame["value"])]
     if in_words and finite.min() >= 0.0:
         axes.set_ylim(0.0, 1.1 * finite.max())
