@@ -11,7 +11,7 @@ import archfem as af
 from archfem import _files
 from archfem._netcdf import write_dataset
 from archfem.cases.answers import Ratios, Row, Scales, Statement
-from archfem.cases.result_text import PushFactors
+from archfem.cases.push_factors import PushFactors
 from archfem.cases.run import HISTORY_FILE, carry_out, replace_run
 from archfem.dynamics import CollapseState, VerdictRange
 from archfem.studies.collapse_risk import CollapseRisk

@@ -13,7 +13,8 @@ from scipy.optimize import brentq
 from archfem._display import NOTE_MARK, ProgressReport
 from archfem.cases.case import Case
 from archfem.cases.motion_keys import find_matched_band
-from archfem.cases.result_text import PushFactors, Remark, ResultTable
+from archfem.cases.push_factors import PushFactors
+from archfem.cases.result_text import Remark, ResultTable
 from archfem.dynamics.motion_scaling import CollapseScale
 from archfem.dynamics.scale_search import MechanismScales
 from archfem.errors import DidNotConverge, InvalidInput

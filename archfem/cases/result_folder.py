@@ -14,13 +14,8 @@ from archfem._optional import can_film
 from archfem._validation import validate_arguments, validate_methods
 from archfem.cases.answers import NO_DEMAND, state_outcome
 from archfem.cases.case import Case
-from archfem.cases.result_text import (
-    PushFactors,
-    Remark,
-    compare_push,
-    describe_pushover,
-    note_collapse,
-)
+from archfem.cases.push_factors import PushFactors, compare_push
+from archfem.cases.result_text import Remark, describe_pushover, note_collapse
 from archfem.cases.run import (
     CASE_FILE,
     HISTORY_FILE,

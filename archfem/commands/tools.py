@@ -22,6 +22,7 @@ from archfem.cases import result_text, structure_text
 from archfem.cases.answers import doubt_fill
 from archfem.cases.case import Case, read_settings
 from archfem.cases.examples import copy_example, list_example_titles, read_example, write_new_case
+from archfem.cases.push_factors import PushFactors
 from archfem.cases.run import HISTORY_FILE, DeadLoadResult, dead_load_of_case
 from archfem.cases.structure_keys import find_drawing, list_unused_tables, read_survey
 from archfem.cases.toml_file import format_key, parse_tables
@@ -183,7 +184,7 @@ def example(options: argparse.Namespace) -> None:
 def show_both_senses(
     case: Case,
     first: Collapse,
-    show: Callable[[Collapse, str, result_text.PushFactors | None, Sequence[Doubt]], None],
+    show: Callable[[Collapse, str, PushFactors | None, Sequence[Doubt]], None],
     doubts: Sequence[Doubt] = (),
 ) -> list[Doubt]:
     """Show a result of limit analysis beside that of the other sense, each at its least end.

@@ -16,6 +16,7 @@ from archfem.cases.analysis_keys import rate_case
 from archfem.cases.answers import doubt_fill, find_margin
 from archfem.cases.case import Case
 from archfem.cases.provenance import hash_inputs, remove_presentation
+from archfem.cases.push_factors import compare_with_site, site_acceleration
 from archfem.cases.run import DeadLoadResult, log_prefix
 from archfem.dynamics.analysis import Analysis
 from archfem.dynamics.history import (
@@ -206,7 +207,7 @@ def evaluate_limit(case: Case) -> Findings:
         collapse = case.limit.solve(case.structure)
         other = case.limit.opposite if collapse.outcome is not Outcome.INFEASIBLE else None
         senses = [collapse] if other is None else [collapse, other.solve(case.structure)]
-    doubts += doubt_fill(result_text.compare_with_site(case, *senses))
+    doubts += doubt_fill(compare_with_site(case, *senses))
     findings: Findings = {"factor": float(collapse.factor)}
     findings |= {"hinges": len(collapse.hinges), "slides": len(collapse.sliding)}
     if collapse.outcome is Outcome.BRACKETED:
@@ -215,7 +216,7 @@ def evaluate_limit(case: Case) -> Findings:
     bounds = ["factor"] * bool(searched[0])
     if push := abs(collapse.push):
         factors = [x.factor if x.over_fill is None else x.range[0] for x in senses]
-        least, site = push * float(np.min(factors)), result_text.site_acceleration(case)
+        least, site = push * float(np.min(factors)), site_acceleration(case)
         leasts = {"least_push": least}
         leasts |= {"least_push_over_site": least / site} if site > 0.0 else {}
         over = FillRange.least_of([x.over_fill for x in senses if x.over_fill]).values

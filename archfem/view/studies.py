@@ -232,13 +232,12 @@ def _draw_over_key(
         label = None if words is None or words in colours else text
         colour = colours.setdefault(words, Colour.LINES[len(colours)])
         known = group[np.isfinite(group["value"])].sort_values(key)
-        look = {"ms": 3.5, "lw": 1.2, "color": colour, "label": label, "marker": "o"}
+        look = {"ms": 3.5, "lw": 1.2, "color": colour, "label": label}
         dashes = DASHES[[*colours].index(words) % len(DASHES)]  # equal lines show through
-        axes.plot(known[key], known["value"], ls=dashes if joined else "", **look)
+        axes.plot(known[key], known["value"], "o" + dashes * joined, **look)
         bounds = known[known["bounded"]]
         if len(bounds):
-            look |= {"mfc": "white", "label": None}
-            axes.plot(bounds[key], bounds["value"], ls="", **look)
+            axes.plot(bounds[key], bounds["value"], "o", **look | {"mfc": "white", "label": None})
     finite = frame["value"][np.isfinite(frame["value"])]
     if in_words and finite.min() >= 0.0:
         axes.set_ylim(0.0, 1.1 * finite.max())

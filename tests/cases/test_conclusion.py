@@ -15,13 +15,14 @@ from pages import head_of
 import archfem as af
 from archfem._files import read_sealed_json, write_sealed_json
 from archfem.cases import answers
+from archfem.cases.push_factors import PushFactors, site_acceleration
 from archfem.cases.report import conclusion, demands, doubts, margins, report_data, sections
 from archfem.cases.report.outcomes import sentence
 from archfem.cases.report.report import _collect_data
 from archfem.cases.report.report_data import ReportData, label_parts
 from archfem.cases.report.scales import find_first_failures
 from archfem.cases.report.study_findings import collect_findings
-from archfem.cases.result_text import UPPER_BOUNDS, PushFactors, site_acceleration
+from archfem.cases.result_text import UPPER_BOUNDS
 from archfem.cases.run import MOTION_VARIABLE
 from archfem.cases.toml_file import format_tables
 from archfem.commands import margin

@@ -20,6 +20,7 @@ import archfem as af
 from archfem._files import read_file_list, replace_results, write_sealed_json
 from archfem.cases import answers, result_text
 from archfem.cases.defaults import describe_defaults, list_defaults
+from archfem.cases.push_factors import PushFactors
 from archfem.cases.report import conclusion, report, report_data
 from archfem.cases.report.conclusion import build_conclusion, list_facts
 from archfem.cases.report.inputs import tabulate_inputs
@@ -137,7 +138,7 @@ def state_each(hazard):
     found.fragility = lambda: SimpleNamespace(median=6.0)
     vehicle = answers.Row("rating", "LM1", place, "1.25", {"passes": True, "least": 1.25})
     doubts = [Doubt("a made one", "mend it")]
-    factors = result_text.PushFactors(4.8, 4.8)
+    factors = PushFactors(4.8, 4.8)
     turns = "it turns, at 4.8 times the load", doubts, "the given load", factors
     return {
         ("limit", "limit"): answers.state_outcome("limit analysis", *turns),

@@ -14,6 +14,7 @@ from archfem.cases import result_text
 from archfem.cases.answers import RESULTS, Ratios, Row, Statement, read_numbers
 from archfem.cases.case import REPORT_KEYS
 from archfem.cases.defaults import list_default_keys, list_materials_and_contacts
+from archfem.cases.push_factors import PushFactors
 from archfem.cases.report import margins, outcomes
 from archfem.cases.report.demands import list_demands, name_spectrum, tabulate_demands
 from archfem.cases.report.doubts import (
@@ -33,7 +34,6 @@ from archfem.cases.report.outcomes import sentence
 from archfem.cases.report.report_data import SHOWN_RESULTS, ReportData
 from archfem.cases.report.scales import find_first_failures, say_fragile
 from archfem.cases.report.study_findings import say_what_changes
-from archfem.cases.result_text import PushFactors
 from archfem.cases.run import CASE_FILE
 from archfem.dynamics.collapse_state import COLLAPSE_STATES, FALLEN_STATES, RANGE_REMEDY
 from archfem.dynamics.rigid_body.rocking_body import describe_first_fall

@@ -5,9 +5,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from archfem.cases.answers import RESULTS
+from archfem.cases.push_factors import peak_of_spectrum, site_acceleration
 from archfem.cases.report.doubts import MAX_RATIO_OF_PEAKS, peak_of_ground, read_spectrum
 from archfem.cases.report.report_data import ReportData
-from archfem.cases.result_text import peak_of_spectrum, site_acceleration
 from archfem.masonry.structure import join_words
 from archfem.units import STANDARD_GRAVITY, Ends
 from archfem.view.pages.document import Grid
