@@ -137,6 +137,8 @@ def scale(options: argparse.Namespace) -> int:
         write_progress_line("scale", f"{len(made)} runs of the interrupted search are kept")
     with record_doubts(case.structure) as doubts:
         found = search(case.analysis, motion, made=made)
+        if found.interrupted and not found.kept_runs:  # no run says anything
+            raise KeyboardInterrupt
         doubts += doubt_pieces(case.structure)
         doubts += _compare_with_run(found, _find_run(case, motion, options))
     files: Files = {**answers.state_scale(found, motion, doubts)}

@@ -435,6 +435,17 @@ def test_a_search_and_a_run_of_which_one_alone_falls_are_in_doubt(
     assert code == 3 or not says
 
 
+def test_a_search_without_a_run_states_and_draws_nothing(searched, tmp_path, monkeypatch, capsys):
+    def shake(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(motion_scaling, "time_history", shake)
+    assert af.commands.main(searched[0]) == 130
+    assert searched[1] == ["weak"]
+    assert not [*(tmp_path / "out").rglob("scale*")]
+    assert "stands" not in capsys.readouterr().out
+
+
 @pytest.mark.slow
 def test_an_interrupted_search_of_a_pair_continues(searched, tmp_path, monkeypatch, capsys):
     """The second search ends at its third scale; that of the first, which is finished, is kept.
