@@ -317,6 +317,20 @@ def test_a_first_fall_has_scale_peak_and_motion_of_one_search(case):
     assert words == f"first falls at 0.903 g, 4.56 × 'third' {over}"  # 4.56 × 0.198 g
 
 
+def test_the_least_peak_of_a_fall_is_of_all_motions_scaled_or_not(case):
+    """'b' falls as it is, of 3 m/s²; 'c' was interrupted before its first run."""
+    data = data_of(case, a=verdict_of(), b=verdict_of("fallen"), c=verdict_of())
+    data.runs["b"].dataset.attrs["pga"] = 3.0
+    empty = scales("c", 0.0, unfinished=True)
+    vars(data)["statements"] = {"scale": state("scale", scales("a", 1.02, falls=1.06), empty)}
+    assert [*find_first_failures(data)] == [
+        "first falls at 0.212 g at most, 1.06 × 'a'; at 1.00 × 'b', of 0.306 g, too; 1 of 3 "
+        "motions was scaled"
+    ]
+    vars(data)["pairs"] = tuple("abc")
+    assert margins.rank_margins(data)[-1][2][-1] == "'c' was not scaled"
+
+
 def test_the_range_of_a_first_fall_has_no_motion_that_was_not_searched(case):
     """The third falls as given, and may at any less."""
     data = data_of(case, a=verdict_of(), b=verdict_of(), c=verdict_of("fallen"))

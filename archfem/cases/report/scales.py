@@ -28,8 +28,9 @@ _FAILURES = dict.fromkeys(FALLEN_STATES, "falls") | {x: x for x in ("dislocated"
 
 
 def list_scales(data: ReportData) -> list[Scales]:
-    """List what searches of scales have found, by motion."""
-    return read_numbers(Scales, data.statements.get("scale"))
+    """List what searches of scales have found, by motion; one without an answer has not run."""
+    searches = read_numbers(Scales, data.statements.get("scale"))
+    return [x for x in searches if x.held or x.states or not x.unfinished]
 
 
 def _list_unscaled(data: ReportData) -> dict[str, tuple[str, float]]:
@@ -41,7 +42,7 @@ def _list_unscaled(data: ReportData) -> dict[str, tuple[str, float]]:
 
 
 def find_first_failures(data: ReportData) -> Iterator[str]:
-    """Yield each first failure over all motions."""
+    """Yield each first failure over all motions: at the least peak, and at the least scale."""
     # without a scale that holds, a fill bears tension at all of them
     searches = [x for x in list_scales(data) if x.held or "tension" not in x.states]
     unscaled, least = _list_unscaled(data), np.inf
@@ -51,25 +52,29 @@ def find_first_failures(data: ReportData) -> Iterator[str]:
     unfinished = any(x.unfinished for x in searches)
     some += "; the search is unfinished: at less it may, too" * unfinished
     for state in ("falls", "dislocated", "mechanism"):
-        first = [(x.states[state], x.pga, x.motion) for x in searches if state in x.states]
-        first += [(1.0, peak, name) for name, (found, peak) in unscaled.items() if found == state]
+        made = [(x.states[state], x.pga, x.motion) for x in searches if state in x.states]
+        every = made + [(1.0, peak, name) for name, (x, peak) in unscaled.items() if x == state]
+        first = [(scale * pga, scale, name) for scale, pga, name in every]
         # a dislocation beyond a fall says nothing
         if not first or min(first)[0] >= least:
             continue
-        least, peak, name = min((scale, scale * pga, name) for scale, pga, name in first)
-        every = [(scale, scale * pga) for scale, pga, motion in first if motion not in unscaled]
-        steps = [(x.all_steps, x.pga) for x in searches if state == "falls"]
-        every += [(scale, scale * pga) for scale, pga in steps if scale]
+        least, at, name = min(first)
+        steps = [(x.all_steps, x.pga) for x in searches if state == "falls" and x.all_steps]
+        ends = [(scale, scale * pga) for scale, pga, *_ in [*made, *steps]]
         wide, over = "", " and ".join(["motions"] * (len(searches) > 1) + ["time steps"])
         if name not in unscaled:  # the least is of those that were searched
-            ends = Ends.of(x for x, _ in every), Ends.of(x for _, x in every)
-            wide = ", ".join(x for x in (f"{ends[0]:#.3g} ×", f"{ends[1]:.3g} g") if " to " in x)
+            scale_ends, peaks = map(Ends.of, zip(*ends, strict=True))
+            said = f"{scale_ends:#.3g} ×", f"{peaks:.3g} g"
+            wide = ", ".join(x for x in said if " to " in x)
         motion = f"'{name}'" if several or count > 1 else "the motion"
         beside = f" ({wide} over {over})" * bool(wide)
         does = _STATES[state][1].replace("first ", "" if unfinished else "first ")
         # one that was not searched may fail at less
         most = " at most" * (len(searches) < count)
-        yield f"{does} at {peak:.3g} g{most}, {least:#.3g} × {motion}{beside}{some}"
+        # of unlike peaks another motion may have a smaller scale
+        peak, scale, other = min(first, key=lambda x: x[1])
+        beside += f"; at {scale:#.3g} × '{other}', of {peak:.3g} g, too" * (scale < at)
+        yield f"{does} at {least:.3g} g{most}, {at:#.3g} × {motion}{beside}{some}"
         some = ""  # once
 
 
