@@ -262,6 +262,12 @@ def test_the_margin_of_scales_ends_where_it_is_dislocated(case):
         "of the scales that were run it first falls at 1.50 ×; it stands again at some scales "
         "from 1.60 to 2.00 ×"
     )
+    # each sentence has the motion that it is about
+    others = scales("b", 2.6, falls=2.7, again=[2.8]), scales("c", 1.6, falls=1.7)
+    assert say_margin(data, scale=state("scale", beyond, *others))[1] == (
+        "of the scales that were run under 'a' it first falls at 1.50 ×; under 'a' it stands again "
+        "at some scales from 1.60 to 2.00 ×; under 'b' it stands again at 2.80 ×"
+    )
     for least, fails in ((1.3, ""), (0.9, ", beyond which it fails")):
         begun = scales("a", 0.7, unfinished=True, moves=0.5, falls=least)
         assert say_margin(data, scale=state("scale", begun))[0] == (
@@ -324,8 +330,8 @@ def test_the_least_peak_of_a_fall_is_of_all_motions_scaled_or_not(case):
     empty = scales("c", 0.0, unfinished=True)
     vars(data)["statements"] = {"scale": state("scale", scales("a", 1.02, falls=1.06), empty)}
     assert [*find_first_failures(data)] == [
-        "first falls at 0.212 g at most, 1.06 × 'a'; at 1.00 × 'b', of 0.306 g, too; 1 of 3 "
-        "motions was scaled"
+        "first falls at 0.212 g at most, 1.06 × 'a'; the least scale is 1.00 × 'b', of 0.306 g; "
+        "1 of 3 motions was scaled"
     ]
     vars(data)["pairs"] = tuple("abc")
     assert margins.rank_margins(data)[-1][2][-1] == "'c' was not scaled"
@@ -500,7 +506,7 @@ def test_the_margin_of_a_stack_is_the_lesser_of_courses_and_of_one_body(case):
         assert say_margin(data_of(case), scale=state("scale", found[0], one))[:2] == [
             f"the least margin is below {at:#.3g} as one rigid body (1.40 in courses) on 'a', at a "
             f"PGA of {0.2 * at:.3g} g{fails}, of 2 motions",
-            "of the scales that were run it first falls at 1.35 × 'b'",
+            "of the scales that were run under 'b' it first falls at 1.35 ×",
         ]
     said = say_margin(data_of(case), scale=state("scale", *found))
     assert said[0] == "the least margin is 1.30 on 'b', at a PGA of 0.26 g, of 2 motions"

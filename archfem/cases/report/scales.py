@@ -73,7 +73,7 @@ def find_first_failures(data: ReportData) -> Iterator[str]:
         most = " at most" * (len(searches) < count)
         # of unlike peaks another motion may have a smaller scale
         peak, scale, other = min(first, key=lambda x: x[1])
-        beside += f"; at {scale:#.3g} × '{other}', of {peak:.3g} g, too" * (scale < at)
+        beside += f"; the least scale is {scale:#.3g} × '{other}', of {peak:.3g} g" * (scale < at)
         yield f"{does} at {least:.3g} g{most}, {at:#.3g} × {motion}{beside}{some}"
         some = ""  # once
 
@@ -117,12 +117,11 @@ def describe_scales(data: ReportData) -> Iterator[tuple[float, list[str]]]:
     words += f" on '{first.motion}', at a PGA of {_bound(first) * first.pga:.3g} g"
     words += ", beyond which it fails" * (met <= 1.0)
     words += f", of {len(made)} motions" if made[1:] else ", under one motion"
-    states = join_words([*_say_first_states(searches, first.motion)])
-    first_at = f"of the scales that were run it first {states}"
     falls = [x for x in searches if {"falls", "mechanism"} & x.states.keys()]
-    again = [f"it {say_again(x.again)}" for x in falls if x.again]  # a crossing is not claimed
-    first_at = "; ".join([first_at, *again[:1]])
-    texts = [words, first_at, *_say_as_one(searches)]
+    under = "under '{}' " * (len(searches) > 1)
+    # a crossing is not claimed
+    again = [f"{under.format(x.motion)}it {say_again(x.again)}" for x in falls if x.again]
+    texts = [words, "; ".join([_say_first_states(searches), *again]), *_say_as_one(searches)]
     # a search without a scale that holds may have the least of all
     if none := [f"'{each.motion}'" for each in searches if not each.held]:
         texts.append(f"no scale is known up to which it stands under {join_words(none)}")
@@ -137,19 +136,21 @@ def _was(count: int) -> str:
     return "were" if count > 1 else "was"
 
 
-def _say_first_states(searches: list[Scales], motion: str) -> Iterator[str]:
-    """Yield each state with its least scale of all motions, named if one is not as given."""
+def _say_first_states(searches: list[Scales]) -> str:
+    """Say each state with its least scale of all motions, which are named if there are several."""
     least = dict[str, Scales]()
     for state in _STATES:
         if found := [x for x in searches if state in x.states]:
             least[state] = min(found, key=lambda x: (x.states[state], x.pga))
-    others = any(each.motion != motion for each in least.values())
+    motions, texts = {each.motion for each in least.values()}, list[str]()
     for state, each in least.items():
         less = " or less" * (state == "moves" and each.moves_in_all)
-        of = f" '{each.motion}'" * others
-        yield f"{_STATES[state][0]} at {each.states[state]:#.3g} ×{of}{less}"
-    if not {"falls", "mechanism"} & least.keys():
-        yield "falls at none"
+        of = f" '{each.motion}'" * (len(motions) > 1)
+        texts.append(f"{_STATES[state][0]} at {each.states[state]:#.3g} ×{of}{less}")
+    texts += ["falls at none"] * (not {"falls", "mechanism"} & least.keys())
+    alone = motions if len(searches) > 1 and len(motions) == 1 else ()
+    under = "".join(f" under '{motion}'" for motion in alone)
+    return f"of the scales that were run{under} it first {join_words(texts)}"
 
 
 def _bound(search: Scales) -> float:
