@@ -362,11 +362,14 @@ def draw_pushover(
 
 
 def _displacement_shown(push: Pushover) -> float:
-    """Return 1.3 times the displacement at which a curve has become flat [m]."""
-    factor = push.curve["factor"].values
-    change = np.abs(factor - factor[0])
-    flat = int(np.argmax(change >= 0.98 * change[-1]))
-    return 1.3 * float(push.curve["displacement"][flat])
+    """Return 1.3 times the displacement beyond which a curve is flat, or slightly over its end [m].
+
+    A factor that decreases to the end is shown as a whole.
+    """
+    factor, displacement = (push.curve[key].values for key in ("factor", "displacement"))
+    change = 0.02 * np.abs(factor - factor[0]).max()
+    flat = np.flatnonzero(np.append(True, np.abs(factor - factor[-1])[:-1] > change))[-1]
+    return float(min(1.3 * displacement[flat], 1.04 * displacement.max()))
 
 
 def _mark_first_hinges(axes: Axes, push: Pushover, reach: float) -> dict[tuple[float, float], str]:

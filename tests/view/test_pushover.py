@@ -53,6 +53,26 @@ def test_several_curves_keep_their_discs_and_lose_the_words(push):
     assert len(discs) == len({*push.hinge_steps}) + len({*other.hinge_steps})
 
 
+@pytest.mark.parametrize("softens", [False, True])
+def test_a_curve_is_shown_up_to_its_plateau_and_as_a_whole_where_it_has_none(push, softens):
+    """From 1 mm on it keeps 98% of its factor, or loses it at a constant rate to 10 mm."""
+    displacement = np.array([0.0, 0.5, 1.0, *range(2, 11)])
+    factor = np.minimum(displacement, 1.0)
+    factor[3:] -= softens * 0.09 * np.arange(1, 10)
+    curve = push.curve.isel(step=slice(len(factor)))
+    curve = curve.assign(
+        factor=("step", factor, curve["factor"].attrs),
+        displacement=("step", 1e-3 * displacement, curve["displacement"].attrs),
+    )
+    hinges, steps = push.hinges[:2], (2, 10 if softens else 2)
+    pushed = replace(push, curve=curve, hinges=hinges, hinge_steps=steps)
+    axes = draw_pushover(pushed).axes[0]
+    left, right = axes.get_xlim()
+    assert (left, right) == (0.0, pytest.approx(10.4 if softens else 1.3))
+    discs = [line for line in axes.lines if line.get_marker() == "o" and len(line.get_xdata())]
+    assert len(discs) == len({*steps})
+
+
 def test_the_axis_of_a_settlement_names_its_quantity():
     push = af.pushover(MODEL, af.Settlement("left abutment", (-1.0, 0.0, 0.0)))
     assert "settlement" in draw_pushover({"spread": push}).axes[0].get_ylabel()
