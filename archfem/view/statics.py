@@ -362,14 +362,12 @@ def draw_pushover(
 
 
 def _displacement_shown(push: Pushover) -> float:
-    """Return 1.3 times the displacement beyond which a curve is flat, or slightly over its end [m].
-
-    A factor that decreases to the end is shown as a whole.
-    """
+    """Return 1.3 times the displacement at which a curve has become flat, or all if it softens [m]."""
     factor, displacement = (push.curve[key].values for key in ("factor", "displacement"))
-    change = 0.02 * np.abs(factor - factor[0]).max()
-    flat = np.flatnonzero(np.append(True, np.abs(factor - factor[-1])[:-1] > change))[-1]
-    return float(min(1.3 * displacement[flat], 1.04 * displacement.max()))
+    change = np.abs(factor - factor[0])
+    if change[-1] < 0.98 * change.max():
+        return 1.04 * float(displacement.max())
+    return 1.3 * float(displacement[np.argmax(change >= 0.98 * change[-1])])
 
 
 def _mark_first_hinges(axes: Axes, push: Pushover, reach: float) -> dict[tuple[float, float], str]:
