@@ -325,8 +325,12 @@ def _doubt_fall(structure: Structure, dataset: xr.Dataset) -> Iterator[Doubt]:
     """
     yield from doubt_soft_blocks(structure)
     if off := _list_slid_off(structure, dataset["fall_pose"].values):
-        words = "{} slid beyond the end of the drawn ground, and fell there"
-        yield Doubt(words, "draw the ground farther: it may not fall then", (join_names(off),))
+        words = "{} slid beyond the ends of all fixed blocks, and fell there"
+        remedy = (
+            'draw the ground farther, of a shape without ground by `shape = "blocks"`: it may not '
+            "fall then"
+        )
+        yield Doubt(words, remedy, (join_names(off),))
     share, early = (dataset.attrs[f"fall_{key}"] for key in ("unsettled", "unsettled_early"))
     unsettled = "impulses of loose blocks did not settle in"
     if early > MAX_UNSETTLED:

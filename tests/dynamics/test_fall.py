@@ -223,8 +223,10 @@ def test_stones_that_slide_off_the_drawn_ground_are_a_doubt(end, friction, outco
     analysis = af.Analysis(af.masonry.assembled(blocks, dry), fidelity="rigid")
     run = replace(analysis, displacements="large").run(af.Motion(push, 0.01).with_rest(4.0))
     assert run.verdict.outcome == outcome
-    said = [each.cause for each in run.doubts if "drawn ground" in each.cause]
-    assert said == ["0.0 slid beyond the end of the drawn ground, and fell there"] * doubted
+    said = [each.cause for each in run.doubts if "fixed blocks" in each.cause]
+    assert said == ["0.0 slid beyond the ends of all fixed blocks, and fell there"] * doubted
+    remedies = "".join(each.remedy for each in run.doubts if "fixed blocks" in each.cause)
+    assert ('of a shape without ground by `shape = "blocks"`' in remedies) == doubted
     if outcome == "dislocated":
         assert run.verdict.residual == pytest.approx(1.56, rel=0.01)
 
