@@ -362,7 +362,7 @@ def draw_pushover(
 
 
 def _displacement_shown(push: Pushover) -> float:
-    """Return 1.3 times the displacement at which a curve has become flat, or all if it softens [m]."""
+    """Return 1.3 times the displacement at which a curve is flat, or all where it softens [m]."""
     factor, displacement = (push.curve[key].values for key in ("factor", "displacement"))
     change = np.abs(factor - factor[0])
     if change[-1] < 0.98 * change.max():
