@@ -133,11 +133,12 @@ def describe_thickness(case: Case, ring: Ring) -> tuple[list[Row], list[str]]:
         f"{describe_crushing(limit.strength, case.structure)}",
     ]
     at_rest = f"at rest{say_loads_left_out(case)}"
-    rows = [Row(RESULTS["thickness"], at_rest, words, f"{factor:.4g}", {"most": factor})]
+    rows = [Row(RESULTS["thickness"], at_rest, words, f"{factor:.3g}", {"most": factor})]
     whole = geometric_factor(case.structure, limit.strength)
-    if len(ring.stones) < len(case.structure.free) and whole:
+    is_whole = len(ring.stones) == len(case.structure.free)
+    if whole and not is_whole:
         depth, result = f"{1.0 / whole:.3g} of what is built", "least depth of all joints"
-        rows.append(Row(result, at_rest, depth, f"{whole:.4g}", {"most": whole}))
+        rows.append(Row(result, at_rest, depth, f"{whole:.3g}", {"most": whole}))
     if limit.friction is not None:
         with suppress(InvalidInput):  # without sliding it may stand at any thickness
             rough = find(friction=None)
@@ -145,4 +146,6 @@ def describe_thickness(case: Case, ring: Ring) -> tuple[list[Row], list[str]]:
             moving = moving.partition(": ")[0]
             lines.append(f"if thinner, {moving}; without sliding {format_mm(rough)} are enough")
     margins = describe_margins_at_rest(case, case.structure)
+    # that of all joints is nearly that of a ring alone, and not said twice
+    margins = [x for x in margins if not (is_whole and x.startswith("geometric"))]
     return rows, [*lines, *(["the whole structure as drawn:", *margins] if margins else [])]

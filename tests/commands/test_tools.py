@@ -149,7 +149,7 @@ def test_the_least_thickness_of_a_ring_is_printed(tmp_path, capsys):
     said = capsys.readouterr().out
     assert "least thickness at rest: 107 mm of 200 mm" in said  # Milankovitch: 0.1075 R
     assert "geometric factor of safety of the ring: 1.86;" in said
-    assert "geometric factor of safety at rest: 1.86, as" in said  # of all joints, which are those
+    assert said.count("geometric factor") == 1  # that of all joints is of the same stones
     assert af.commands.main(["thickness", str(path), "--part", "dome"]) == 1
     assert "'dome' is no ring" in capsys.readouterr().err
 
@@ -202,7 +202,9 @@ def test_a_thickness_of_an_arch_on_piers_is_said_to_be_of_the_ring_alone(tmp_pat
     ring, every = json.loads((tmp_path / "thickness.json").read_text())["rows"]
     assert ring[2].endswith("of 500 mm, of the ring alone")
     assert every[0] == "least depth of all joints"
-    assert 1.0 / float(every[2].split()[0]) == pytest.approx(float(every[3]), rel=2e-3)
+    assert 1.0 / float(every[2].split()[0]) == pytest.approx(
+        float(every[3]), rel=5e-3
+    )  # of 3 digits
     assert 1.0 < float(every[3]) < 0.8 * float(ring[3])
     text = (tmp_path / "thickness.txt").read_text()
     assert f"geometric factor of safety at rest: {float(every[3]):.3g}, as" in text
