@@ -73,7 +73,7 @@ class CollapseState:
         loose_share: share of the Arias intensity of the ground that loose blocks were followed
             through, without elastic joints [-].
         mechanism: joints of rings and piers that had failed when blocks became loose, of a fall, in
-            words such as "by hinges (arch, joints 0 and 7) at 3.405 s, the last with joints".
+            words such as "by hinges (arch, joints 0 and 7) at 3.405 s, when blocks come loose".
     """
 
     kind: str

@@ -319,7 +319,7 @@ def describe_failed_joints(joints: xr.Dataset) -> str:
         for kind, flags in kinds.items()
         if flags.any()
     ]
-    at = f" at {float(joints['time']):.3f} s, the last with joints"
+    at = f" at {float(joints['time']):.3f} s, when blocks come loose"
     return f"by {join_words(words)}{at}" if words else ""
 
 

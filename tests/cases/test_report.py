@@ -1300,8 +1300,8 @@ def test_the_conclusion_states_outcomes_falls_and_the_range(kept, unplotted):
         verdicts["second"], outcome="fallen", doubts=(af.models.model.Doubt("it leaks", "mend it"),)
     )
     text = " ".join(piece.text for piece in build_conclusion(data).pieces if piece.kind == "words")
-    under = "under 1 of 2 motions of PGA 0.05 g"
-    answer = f"It does not survive (in doubt, as below): it falls {under}: second. It forms no mech"
+    under = "under 1 of 2 motions: second (PGA 0.05 g)"
+    answer = f"It does not survive (in doubt, as below): it falls {under}. It forms no mech"
     assert head_of(list_facts(data)).startswith(answer)
     # the remedy is not for the client
     assert "In doubt, time histories: 1 of 2 runs: it leaks." in text

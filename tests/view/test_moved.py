@@ -176,7 +176,7 @@ def test_the_joints_of_a_fall_are_those_of_its_picture(toppled):
         if any(np.allclose(end, mark) for end in joint.ends for mark in marks.hinges)
     ]
     assert len(drawn) == len(marks.hinges) > 0 == len(marks.slips) + len(marks.gaps)
-    by = f"by hinges ({join_joint_names(drawn)}) at {time:.3f} s, the last with joints"
+    by = f"by hinges ({join_joint_names(drawn)}) at {time:.3f} s, when blocks come loose"
     assert toppled.fall.mechanism == by
     assert f"\nit falls {by}\n" in str(toppled.verdict)
 

@@ -188,9 +188,9 @@ def say_across(data: ReportData) -> Iterator[tuple[float, str, str, str]]:
 def describe_push(data: ReportData, name: str, push: PushFactors) -> Iterator[str]:
     """Yield at which multiple of the site's acceleration a push begins to move a structure."""
     elastic = name == "pushover"
-    moves = _say_motion(data, push.least, site_acceleration(data.case))
     bounded = push.proved is not None  # the least found, without proof that none is less
     of = "with elastic joints" if elastic else "as rigid blocks"
+    moves = _say_motion(data, push.least, site_acceleration(data.case), f", its push {of},")
     over = OVER_FILL * (push.most > push.least)
     size = f"{Ends((push.least, push.most)):ratio} times {push.site}{over}"
     text = f"pushed sideways {of} it begins to move {'at most ' * push.bounded}at {size}"
@@ -223,10 +223,11 @@ def _describe_check(data: ReportData, check: Ratios) -> tuple[float, list[str]]:
     return check.decisive, texts
 
 
-def _say_motion(data: ReportData, factor: float, site: float) -> str:
+def _say_motion(data: ReportData, factor: float, site: float, push_of: str = "") -> str:
     """Say that a structure moves in a run no stronger than a multiple of the site's acceleration.
 
-    It is empty if it moves in none. Without a spectrum the runs are the demand.
+    It is empty if it moves in none. Without a spectrum the runs are the demand. Of a push the last
+    argument says which it is.
     """
     push = np.nan_to_num(factor * site, nan=np.inf)
     runs = [run for run in data.runs.values() if peak_of_ground(run) <= push]
@@ -234,5 +235,5 @@ def _say_motion(data: ReportData, factor: float, site: float) -> str:
     if not any(x.mechanisms.get("verified") or x.outcome in FALLEN_STATES for x in verdicts):
         return ""
     held = all(verdict.outcome in COLLAPSE_STATES[:2] for verdict in verdicts)
-    of = f" of up to {push:.2f} g" * (len(runs) < len(data.runs))
+    of = f" of up to {push:.2f} g{push_of}" * (len(runs) < len(data.runs))
     return f"in the runs{of} it moves{', and falls in none' * held}"

@@ -53,11 +53,11 @@ def describe_outcomes(data: ReportData) -> Iterator[str]:
         if not own:
             continue
         names = [*own]
-        of = f"of {describe_peaks(data.runs[name] for name in names)}"
-        under = f"{len(names)} of {total} motions {of}: {', '.join(names)}"
+        peaks = describe_peaks(data.runs[name] for name in names)
+        under = f"{len(names)} of {total} motions: {', '.join(names)} ({peaks})"
         if len(names) == total:
-            under = f"all {len(names)} motions {of}"
-            under = under if len(names) > 1 else f"the motion '{names[0]}' {of}"
+            under = f"all {len(names)} motions of {peaks}"
+            under = under if len(names) > 1 else f"the motion '{names[0]}' of {peaks}"
         fall = "; whether it falls was not computed" if outcome == "mechanism" else ""
         yield f"{verb} under {under}{fall}"
 
