@@ -145,7 +145,7 @@ def draw_suite(suite: Suite, target: DesignSpectrum | None = None) -> Figure:
     for axis, name in zip(axes, names, strict=True):
         values = suite.spectra(SPECTRUM_PERIODS, component=name)
         for index, (pair, row) in enumerate(zip(suite.pairs, values, strict=True)):
-            _draw_spectrum(axis, row, index, pair.name, width=0.7)
+            _draw_spectrum(axis, row, index, pair.name, width=1.0)
         mean = values.mean(axis=0) / STANDARD_GRAVITY
         axis.plot(SPECTRUM_PERIODS, mean, Colour.TEXT, lw=1.8, label="mean")
         if target is not None:

@@ -41,6 +41,8 @@ class Colour:
 
     # lines that share axes; apart in grey, and with all common kinds of colour blindness
     LINES = ("#083685", "#e69500", "#009068", "#a13179", "#90d2f2", "#151515")
+    # in place of those which a dark page, that inverts figures, shows dark
+    INVERTED = (LINES[1], "#c88000"), (LINES[4], "#64aed4")
 
     # scale of values, from low to high
     MAP = LinearSegmentedColormap.from_list(

@@ -22,10 +22,18 @@ from archfem._files import atomic_write, temporary_folder
 from archfem._optional import missing_package_message
 from archfem._validation import validate_methods
 from archfem.errors import InvalidInput, NotInstalled
-from archfem.view.style import disable_math
+from archfem.view.style import Colour, disable_math
 
 # Margins of figures, which have those of the page
 _WITHOUT_MARGIN: dict[str, Any] = {"bbox_inches": "tight", "pad_inches": 0.02}
+
+# Rules of a figure where the page is dark, and shows its colours inverted
+_IN_THE_DARK = "".join(
+    f'[style*="{key}: {old}"] {{ {key}: {new} !important }} '
+    for old, new in Colour.INVERTED
+    for key in ("stroke", "fill")
+)
+_IN_THE_DARK = f"@media screen and (prefers-color-scheme: dark) {{ {_IN_THE_DARK}}}"
 
 
 @dataclass(frozen=True)
@@ -81,6 +89,7 @@ class FigureBlock:
         width = float(figure.get_tightbbox().width) + 2.0 * _WITHOUT_MARGIN["pad_inches"]
         # upright rectangles are printed at least a pixel wide: letters such as l would be smudged
         content = buffer.getvalue().replace(b") scale(", b") skewX(0.1) scale(")
+        content = content.replace(b"</style>", _IN_THE_DARK.encode() + b"</style>", 1)
         return cls(_uri("image/svg+xml", content), caption, width, figure)
 
     def raster(self) -> bytes:

@@ -4,12 +4,15 @@ import re
 from base64 import b64decode
 from pathlib import Path
 
+import matplotlib
+import numpy as np
 import pytest
 from matplotlib.figure import Figure
 from pages import read_page
 
 from archfem.view.pages import document
 from archfem.view.pages.document import Document, FigureBlock, Grid, Section, TextBlock
+from archfem.view.style import Colour
 
 
 def test_words_of_users_are_escaped_and_numbers_typeset():
@@ -82,3 +85,33 @@ def test_a_list_of_terms_of_more_than_a_few_lines_breaks(letters, kept):
     rows = [("SHA", "0" * letters)] * 6
     page = Document("", "", [], [Section("", [Grid((), rows)])]).page
     assert page.count('class="terms whole"') == kept
+
+
+def test_lines_of_a_figure_are_seen_on_a_dark_page():
+    """Contrast by WCAG 2.1 of 3 for graphics, after the filters of CSS (Filter Effects 1, 8)."""
+    css = (Path(document.__file__).parent / "templates" / "page.css").read_text(encoding="utf-8")
+    dark = css.partition("prefers-color-scheme: dark")[2]
+    paper = re.search(r"--paper: (#\w+)", dark)[1]
+    share = float(
+        re.search(r"\.plate img \{ filter: invert\((.*?)\) hue-rotate\(180deg\)", dark)[1]
+    )
+    # rows of red, green and blue: 2 × weights of luminance on all, minus the identity
+    turn = 2.0 * np.array([[0.213, 0.715, 0.072]] * 3) - np.eye(3)
+
+    def luminance(rgb):
+        linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
+        return linear @ [0.2126, 0.7152, 0.0722] + 0.05
+
+    figure = Figure(figsize=(4.0, 3.0))
+    axes = figure.add_subplot()
+    for colour in Colour.LINES:
+        axes.plot([0.0, 1.0], color=colour)
+    drawn = b64decode(FigureBlock.of(figure, "").source.partition(",")[2]).decode()
+    rules = drawn.partition("(prefers-color-scheme: dark)")[2].partition("</style>")[0]
+    ground = luminance(np.array(matplotlib.colors.to_rgb(paper)))
+    for colour in Colour.LINES:
+        assert f"stroke: {colour}" in drawn
+        new = re.search(rf'"stroke: {colour}"\] {{ stroke: (#\w+)', rules)
+        rgb = np.array(matplotlib.colors.to_rgb(new[1] if new else colour))
+        shown = np.clip(turn @ (share - (2.0 * share - 1.0) * rgb), 0.0, 1.0)
+        assert luminance(shown) / ground >= 3.0
