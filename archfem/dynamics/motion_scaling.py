@@ -173,6 +173,9 @@ class CollapseScale:
             at = f"first at {last:#.3g} ×" if last < inf else "at no scale"
             ends = {dt: each[COLLAPSE_DEFINITION].upper for dt, each in self._finished.items()}
             met = f"{met}, by steps of {1e3 * max(ends, key=ends.__getitem__):g} ms {at}"
+        shorter = min(self.bracket(dt).upper for dt in self.searches)
+        if least < shorter < inf:  # by steps too long for sliding
+            met = f"{met}, by those that follow sliding at {shorter:#.3g} ×"
         if self.above:
             met = f"{met}, and {rocking_body.say_again(self.above)}"
         if self.dislocated < inf:
@@ -230,7 +233,7 @@ class CollapseScale:
                 words = f"a time step finds a fall at {low:#.3g} ×, and another none"
             doubts.append(Doubt(words))  # ranges of several motions are none of steps
         every = {
-            dt: replace(search, runs=(run,))
+            dt: replace(search, runs=(run, *self._stand_again(search)))
             for dt, search in self.longer.items()
             if (run := search[COLLAPSE_DEFINITION].run) and run.scale == low
         }
@@ -372,8 +375,17 @@ class CollapseScale:
 
     @property
     def above(self) -> tuple[float, ...]:
-        """Scales at which the structure stood although it fell at a smaller scale [-]."""
-        return tuple(sorted({s for dt in self.searches for s in self.bracket(dt).above}))
+        """Scales at which the structure stood although it fell at a smaller scale [-].
+
+        Those of longer steps are below the scale by which it fell with each of the shorter ones.
+        """
+        found = {x.scale for each in self.longer.values() for x in self._stand_again(each)}
+        return tuple(sorted(found.union(*(self.bracket(dt).above for dt in self.searches))))
+
+    def _stand_again(self, longer: MechanismScales) -> list[ScaledRun]:
+        """List the runs of a longer step that stand above a fall, below `upper`."""
+        above = [x for x in longer[COLLAPSE_DEFINITION].above if x < self.upper]
+        return [run for run in longer.runs if run.scale in above]
 
     @property
     def unanswered(self) -> tuple[float, ...]:

@@ -420,6 +420,8 @@ def test_the_smallest_fall_of_any_step_is_the_one_that_is_stated(monkeypatch):
     assert found.states["dislocated"] == moved.scale == pytest.approx(least["dislocated"], rel=5e-3)
     steps = [f"by steps of {1e3 * dt:g} ms first at {last:#.3g} ×" for dt in found.searches]
     assert any(f" ({first} × the motion), {step}" in str(found) for step in steps)
+    shorter = min(each["collapse"].upper for each in found.searches.values())
+    assert f", by those that follow sliding at {shorter:#.3g} ×;" in str(found)
     assert [*map(str, found.doubts)] == [
         f"its time steps find the first fall at {first} to {last:#.3g} × the motion",
         f"at {first} × by 5 ms: slip is wrong",
@@ -432,6 +434,20 @@ def test_the_smallest_fall_of_any_step_is_the_one_that_is_stated(monkeypatch):
     )
     assert (read.states, read.all_steps) == (found.states, last)
     assert found.held < moved.scale < found.lower < found.states["falls"]
+
+
+def test_windows_of_steps_too_long_for_sliding_are_said_below_the_fall_of_shorter_ones(monkeypatch):
+    """5 ms stand from 2.45 to 3.1, beyond the falls of 3 and 1.5 ms from 2.9 on."""
+    windows = {0.005: ((2.2, 2.45), (3.1, inf)), 0.003: ((2.9, inf),), 0.0015: ((2.9, inf),)}
+    found = searched_by_steps(monkeypatch, windows, {}, 0.004, is_given=False)
+    first, shorter = found.first_falls[0], min(found.bracket(dt).upper for dt in found.searches)
+    assert 2.2 < first < 2.45 < 2.9 < shorter
+    assert f", by those that follow sliding at {shorter:#.3g} ×, and stands again at" in str(found)
+    long = [run.scale for run in found.longer[0.005].runs if 2.45 < run.scale < 3.1]
+    assert found.above == tuple(scale for scale in long if scale < found.upper) != ()
+    (doubt,) = [str(x) for x in found.doubts if "not monotonic" in x.cause]
+    least = f"{found.above[0]:#.3g}"
+    assert doubt.startswith(f"by 5 ms: it is not monotonic: above a fall it survives {least} ")
 
 
 def test_the_second_step_begins_near_the_fall_of_the_first(monkeypatch):
