@@ -52,11 +52,14 @@ from archfem.statics.relaxation import (
     solve_local,
     solve_or_relax,
 )
-from archfem.units import MPa, format_mm, mm
+from archfem.units import GPa, MPa, format_mm, mm
 
 # Median depth of a ring's joints above which a wrong unit is likely [m]: of arches that span more
 # than 60 m the deepest are about that
 MAX_USUAL_DEPTH = 2.0
+
+# Displacement along a joint under dead load above which a structure is not as drawn [m]
+MAX_SLIP_AT_REST = 1.0 * mm
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -487,13 +490,7 @@ def dead_load_doubts(dead: Equilibrium, friction: float | None = None) -> tuple[
             "only because they never slide"
         )
         doubts.append(Doubt(reason, "give the contacts their friction"))
-    slip = abs(joints["slip"])
-    if (far := (slip > 1.0 * mm).values).any():
-        reason = (
-            f"under dead load joints slide by up to {float(slip.max()) / mm:.3g} mm "
-            f"({join_joint_names(names[far])}): it does not stand as it was drawn"
-        )
-        doubts.append(Doubt(reason, "check friction and the direction of these joints"))
+    doubts += _doubt_slip(structure, joints)
     smallest = min(joint.contact.coefficient for joint in structure.joints)
     if smallest < 0.1:
         reason = f"the least coefficient of friction is {smallest:g}"
@@ -505,6 +502,30 @@ def dead_load_doubts(dead: Equilibrium, friction: float | None = None) -> tuple[
         )
         doubts.append(Doubt(reason, "compare with stiffer joints, or with large displacements"))
     return tuple(doubts)
+
+
+def _doubt_slip(structure: Structure, joints: xr.Dataset) -> Iterator[Doubt]:
+    """Doubt a structure whose joints slide far at rest, or are soft enough to move as far."""
+    slip = abs(joints["slip"].values)
+    if not (far := slip > MAX_SLIP_AT_REST).any():
+        return
+    size = f"by up to {slip.max() / mm:.3g} mm ({join_joint_names(joints['name'].values[far])})"
+    ratio, limit = joints["friction"].values[far], joints["friction_limit"].values[far]
+    if (ratio > 0.99 * limit).any():  # where all of a face slides they are equal, but for round-off
+        reason = f"under dead load joints slide {size}: it does not stand as it was drawn"
+        yield Doubt(reason, "check friction and the direction of these joints")
+        return
+    contacts = [structure.joints[number].contact for number in joints["joint"].values[far]]
+    soft = np.array([contact.shear_stiffness for contact in contacts])
+    # the displacement is nearly in inverse proportion to k_s; rounded up to two digits
+    enough = float(f"{1.05 * (soft * slip[far]).max() / MAX_SLIP_AT_REST / GPa:.2g}")
+    yield Doubt(
+        f"under dead load shear displaces joints {size}: it does not stand as it was drawn; none "
+        f"slides, with |V| / N up to {ratio.max():.3g}: they are soft, k_s from "
+        f"{soft.min() / GPa:.3g} MPa/mm",
+        f"give a shear_stiffness of about {enough:g} MPa/mm or more; limit analysis and rigid "
+        "blocks need none",
+    )
 
 
 def structure_doubts(structure: Structure) -> list[Doubt]:

@@ -131,7 +131,8 @@ def test_an_equilibrium_in_a_line(stack):
 def resting(**given):
     """A ring with joints of some friction, under its weight."""
     dimensions = {"radius": 2.95, "thickness": 0.55, "embrace": 159.0, "voussoirs": 9} | given
-    contact = af.Contact(1.48e9, 0.30e9, dimensions.pop("friction", 0.6))
+    shear = dimensions.pop("shear_stiffness", 0.30e9)
+    contact = af.Contact(1.48e9, shear, dimensions.pop("friction", 0.6))
     ring = af.circular_arch(**dimensions, contact=contact)
     return af.dead_load(af.build(ring, fidelity="rigid"))
 
@@ -159,6 +160,24 @@ def test_large_slips_and_small_coefficients_are_doubts():
     slid, smooth = dead_load_doubts(resting(embrace=7.0, voussoirs=3, friction=1e-3))
     assert "joints slide by up to 1.18 mm" in slid.cause
     assert "the least coefficient of friction is 0.001" in smooth.cause
+
+
+def test_shear_that_displaces_soft_joints_is_no_sliding():
+    """A closed joint is displaced by V / (k_s A); with the k_s of the remedy by a millimetre."""
+    soft = resting(shear_stiffness=0.01e9)
+    (doubt,) = dead_load_doubts(soft)
+    worst = int(abs(soft.joints["slip"].values).argmax())
+    shear, depth = abs(soft.joints["V"].values[worst]), soft.model.structure.depths[worst]
+    area = depth * soft.model.structure.width
+    assert f"joints by up to {1e3 * shear / (0.01e9 * area):.3g} mm" in doubt.cause
+    assert float(soft.joints["friction"].max()) < 0.6
+    assert "none slides" in doubt.cause
+    assert "k_s from 0.01 MPa/mm" in doubt.cause
+    (given,) = re.findall(r"shear_stiffness of about ([\d.]+) MPa/mm", doubt.remedy)
+    enough = resting(shear_stiffness=1e9 * float(given))
+    assert dead_load_doubts(enough) == ()
+    # it is rounded up to two digits from 1.05 times the least
+    assert float(abs(enough.joints["slip"]).max()) > 0.85e-3
 
 
 @pytest.mark.parametrize(
