@@ -19,6 +19,7 @@ from archfem._validation import validate_methods
 from archfem.dynamics.collapse_state import COLLAPSE_STATES, FALLEN_STATES
 from archfem.masonry.structure import join_names
 from archfem.models.model import Doubt, read_doubts
+from archfem.statics.equilibrium import MAX_SLIP_AT_REST
 from archfem.units import format_mm
 
 # Kind of the file of all runs
@@ -55,7 +56,8 @@ class VerdictRange(ResultDisplay):
         dataset: over `run`: the value of each varied property; `outcome`, as of `Verdict`;
             `displacement` and `residual`, the largest of a corner and that at the end [m]; `time`
             of the first lost block [s]; `error`, the text of a run without an answer, or "";
-            `sampled`, whether the run is of the Latin hypercube.
+            `sampled`, whether the run is of the Latin hypercube; and where some runs are in doubt
+            by it `slip_at_rest`, the largest displacement along a joint under dead load [m].
             Its attribute `motion` is the name of the motion, empty where motions are varied;
             `k_n` and `k_s` are the mean stiffnesses of the joints as given [N/m³], and `doubts` has
             those of the structures as JSON.
@@ -96,6 +98,13 @@ class VerdictRange(ResultDisplay):
     def answered(self) -> NDArray[np.bool_]:
         """Whether a run has an answer (runs,)."""
         return self.dataset["error"].values == ""
+
+    @property
+    def in_doubt(self) -> NDArray[np.bool_]:
+        """Whether joints are displaced so far under dead load that a run is in doubt (runs,)."""
+        if "slip_at_rest" not in self.dataset:
+            return np.zeros_like(self.answered)
+        return np.asarray(self.dataset["slip_at_rest"].values > MAX_SLIP_AT_REST)
 
     @property
     def answers(self) -> xr.Dataset:
@@ -161,13 +170,38 @@ class VerdictRange(ResultDisplay):
     @property
     def doubts(self) -> tuple[Doubt, ...]:
         """Reasons why the outcomes may be wrong, each with its remedy."""
-        return read_doubts(self.dataset.attrs.get("doubts", "[]"))
+        return *self._doubt_rest(), *read_doubts(self.dataset.attrs.get("doubts", "[]"))
+
+    def _doubt_rest(self) -> Iterator[Doubt]:
+        """Yield the doubt of variations that do not stand as drawn under dead load."""
+        doubted, others = (self.answered & each for each in (self.in_doubt, ~self.in_doubt))
+        if not doubted.any():
+            return
+        kinds = self.falls, self.dislocated
+        counts = [np.count_nonzero(x & kind) for x in (doubted, others) for kind in kinds]
+        slips = self.dataset["slip_at_rest"].values[doubted]
+        remedy = "`archfem check` says which joints, and what to do"
+        if "k_s" in self.properties:
+            factors = self.dataset["k_s"].values
+            # slips are nearly in inverse proportion to k_s; rounded up to two digits
+            enough = 1.05 * float((factors[doubted] * slips).max()) / MAX_SLIP_AT_REST
+            if enough < factors.max():
+                ends = f"[{enough:.2g},{factors.max():.3g}]"
+                remedy = f"leave them out, `--set verdict.vary.k_s={ends}`"
+        yield Doubt(
+            "shear displaces joints by up to {:mm} under dead load in {} of {} variations, which "
+            "do not stand as drawn: of them {} fall and {} are dislocated, of the others {} and {}",
+            remedy,
+            (float(slips.max()), *map(int, (doubted.sum(), self.answered.sum(), *counts))),
+        )
 
     @property
     def count(self) -> str:
         """How often the structure falls, and is dislocated."""
         falls, parted = (each[self.answered].sum() for each in (self.falls, self.dislocated))
         also = f" and is dislocated in {parted}" if parted else ""
+        if doubted := int(((self.falls | self.dislocated) & self.in_doubt)[self.answered].sum()):
+            also += f" ({doubted} of these {falls + parted} in doubt under dead load)"
         return f"falls in {falls or 'none'} of {self.answered.sum()} variations{also}"
 
     @property
@@ -216,11 +250,12 @@ class VerdictRange(ResultDisplay):
     def single_changes(self) -> "list[SingleChange]":
         """The runs that change one property, and that as given, the worst first; maybe none."""
         rows = self.dataset.isel(run=np.flatnonzero(~self.dataset["sampled"].values))
-        changes = []
+        changes, doubted = [], self.in_doubt[~self.dataset["sampled"].values].tolist()
         for k in range(rows.sizes["run"]):
             run, given = rows.isel(run=k), rows.isel(run=0)
             changed = [name for name in self.properties if run[name] != given[name]]
             words = [_name_change(name, run[name].item()) for name in changed] or [UNVARIED]
+            words[0] += " (in doubt under dead load)" * (doubted[k] and not doubted[0])
             numbers = float(run["displacement"]), float(run["residual"])
             changes.append(SingleChange(words[0], str(run["outcome"].item()), *numbers))
         return sorted(changes, key=lambda each: (-each.rank, -self.measure(each)))

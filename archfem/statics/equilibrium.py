@@ -504,12 +504,18 @@ def dead_load_doubts(dead: Equilibrium, friction: float | None = None) -> tuple[
     return tuple(doubts)
 
 
+def slips_at_rest(joints: xr.Dataset) -> Array:
+    """Return how far shear displaces each assessed joint under dead load (n,) [m]."""
+    return abs(assessed_joints(joints)["slip"].values)
+
+
 def _doubt_slip(structure: Structure, joints: xr.Dataset) -> Iterator[Doubt]:
     """Doubt a structure whose joints slide far at rest, or are soft enough to move as far."""
-    slip = abs(joints["slip"].values)
+    slip = slips_at_rest(joints)
     if not (far := slip > MAX_SLIP_AT_REST).any():
         return
-    size = f"by up to {slip.max() / mm:.3g} mm ({join_joint_names(joints['name'].values[far])})"
+    names = join_joint_names(joints["name"].values[far].tolist())
+    size = f"by up to {slip.max() / mm:.3g} mm ({names})"
     ratio, limit = joints["friction"].values[far], joints["friction_limit"].values[far]
     if (ratio > 0.99 * limit).any():  # where all of a face slides they are equal, but for round-off
         reason = f"under dead load joints slide {size}: it does not stand as it was drawn"

@@ -46,6 +46,7 @@ from archfem.masonry.joint_closing import with_finish
 from archfem.masonry.structure import Structure, join_words
 from archfem.models.model import Doubt, write_doubts
 from archfem.motion.motion import Motion
+from archfem.statics.equilibrium import MAX_SLIP_AT_REST, slips_at_rest
 from archfem.statics.fill_checks import fill_doubts
 from archfem.studies.evaluators import PreparedRuns
 from archfem.studies.parameter_space import Point, WholePoint
@@ -299,10 +300,24 @@ def evaluate_variation(variation: Variation) -> dict[str, Any]:
     motion = motion.scaled(changes["scale"])
     if changes["sign"] == "reversed":
         motion = motion.reversed()
-    state = prepare_runs(replace(analysis, structure=structure), changes)(motion)
+    runs = prepare_runs(replace(analysis, structure=structure), changes)
+    state, rest = runs(motion), runs.rest if isinstance(runs, FallingRuns) else None
+    slip = 0.0 if rest is None else float(slips_at_rest(rest.joints).max())
     time = np.nan if state.time is None else state.time
     same = ("displacement", "residual", "admissible_step", "lacks_joints")
-    return {"outcome": state.kind, "time": time, **{name: getattr(state, name) for name in same}}
+    kept = {"outcome": state.kind, "time": time, "slip_at_rest": slip}
+    return kept | {name: getattr(state, name) for name in same}
+
+
+class FallingRuns(PreparedRuns):
+    """Runs of a structure with elastic joints, of which the states of collapse alone are kept."""
+
+    def __call__(self, motion: Motion) -> CollapseState:
+        """Return the state of collapse after a motion."""
+        history = self.run(motion)
+        if history.fall is None:
+            raise DidNotConverge(f"the run {history.outcome}", last=None)
+        return history.fall
 
 
 def prepare_runs(
@@ -317,15 +332,7 @@ def prepare_runs(
     three = changes["joint_rule"] == "three points"
     rule: Any = {"quadrature": "trapezoidal", "quadrature_points": 3} if three else {}
     rule = {"quadrature": "exact", "quadrature_points": None, **rule}
-    runs = change_properties(replace(analysis, dt=dt, **rule), changes)
-
-    def run(motion: Motion) -> CollapseState:
-        history = runs.run(motion)
-        if history.fall is None:
-            raise DidNotConverge(f"the run {history.outcome}", last=None)
-        return history.fall
-
-    return run
+    return FallingRuns(**vars(change_properties(replace(analysis, dt=dt, **rule), changes)))
 
 
 def change_properties(analysis: Analysis, changes: Mapping[str, Any]) -> PreparedRuns:
@@ -384,6 +391,9 @@ def _build_dataset(
         values = np.array([row["found"].get(name, np.nan) for row in rows])
         columns[name] = "run", values, {"units": unit}
     columns["error"] = "run", np.array([str(row["error"]) for row in rows])
+    slips = np.array([row["found"].get("slip_at_rest", 0.0) for row in rows])
+    if (slips > MAX_SLIP_AT_REST).any():  # else no run is in doubt by them
+        columns["slip_at_rest"] = "run", slips, {"units": "m"}
     return xr.Dataset(columns, attrs={"properties": list(ranges)})
 
 

@@ -546,7 +546,7 @@ def draw_verdict_range(verdicts: VerdictRange) -> Figure:
         The figure, with panels of the properties that explain most, the first most.
     """
     rows, max_panels = verdicts.answers, 6
-    falls, parted = (x[verdicts.answered] for x in (verdicts.falls, verdicts.dislocated))
+    falls = verdicts.falls[verdicts.answered]
     residual = 1e3 * rows["residual"].values
     top = 3.0 * float(residual[~falls].max(initial=1.0))
     heights = np.where(falls, 2.0 * top, np.maximum(residual, 1e-3 * top))
@@ -572,7 +572,7 @@ def draw_verdict_range(verdicts: VerdictRange) -> Figure:
         style.style_axes(axes, labels.get(name, name.replace("_", " ")), beside)
         if verdicts.is_mixed:
             style.set_title(axes, f"explains {share:.0%}")
-        _draw_property(axes, rows[name].values, heights, falls, parted)
+        _draw_property(axes, verdicts, rows[name].values, heights)
         if falls.any():
             axes.axhline(top, color=Colour.GREY, lw=0.9, ls="--")
         axes.set(yscale="log", ylim=(0.7e-3 * top, 4.0 * top))
@@ -582,8 +582,8 @@ def draw_verdict_range(verdicts: VerdictRange) -> Figure:
     return figure
 
 
-def _draw_property(axes: Axes, values: Array, heights: Array, falls: Flags, parted: Flags) -> None:
-    """Draw a dot for each run over a property, labels side by side."""
+def _draw_property(axes: Axes, verdicts: VerdictRange, values: Array, heights: Array) -> None:
+    """Draw a dot for each answered run over a property, labels side by side."""
     if values.dtype.kind == "f":
         places = values
     else:
@@ -594,15 +594,18 @@ def _draw_property(axes: Axes, values: Array, heights: Array, falls: Flags, part
         words = [str(label).replace(" and ", "\nand ") for label in labels]
         axes.set_xticks(range(len(labels)), words)
         axes.set_xlim(-0.5, len(labels) - 0.5)
-    groups = (
-        (~(falls | parted), "o", Colour.LINES[0], "stands"),
-        (parted, "D", Colour.LINES[1], "dislocated"),
-        (falls, "^", Colour.HINGE, "falls, above the dashed line"),
+    kinds = verdicts.falls, verdicts.dislocated, verdicts.in_doubt
+    falls, parted, doubted = (kind[verdicts.answered] for kind in kinds)
+    groups: tuple[tuple[Flags, str, Any, dict[str, Any]], ...] = (
+        (~(falls | parted), "stands", Colour.LINES[0], {"marker": "o"}),
+        (parted, "dislocated", Colour.LINES[1], {"marker": "D"}),
+        (falls, "falls, above the dashed line", Colour.HINGE, {"marker": "^"}),
+        (doubted, "in doubt under dead load", Colour.GREY, {"marker": "o", "ms": 8, "mfc": "none"}),
     )
-    for chosen, marker, colour, label in groups:
+    for chosen, label, colour, look in groups:
         if chosen.any():
-            look = {"ms": 4, "alpha": 0.8, "label": label}
-            axes.plot(places[chosen], heights[chosen], marker, color=colour, **look)
+            look = {"ls": "none", "ms": 4, "alpha": 0.8, "color": colour, **look}
+            axes.plot(places[chosen], heights[chosen], label=label, **look)
 
 
 def draw_scale(found: CollapseScale, limit: float) -> Figure:

@@ -1,5 +1,6 @@
 """Runs over uncertain properties: the varied properties, and the case of each run."""
 
+import re
 from dataclasses import replace
 from functools import partial
 from types import SimpleNamespace
@@ -111,6 +112,36 @@ def test_runs_without_joints_in_strong_motion_are_a_doubt(column, motion, calls,
         assert all("of 3 runs blocks were loose" in doubt.cause for doubt in doubts)
 
 
+def test_variations_that_do_not_stand_as_drawn_are_doubted(motion, calls, tmp_path):
+    """By shear of the dead load with that k_s, V / (k_s A); rigid contact has none."""
+    ring = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=9)
+    vary = {**HELD, "joint_rule": ("exact", "rigid"), "k_s": (0.02, 1.0)}
+    found = af.verdict_range(ring, motion, vary=vary, samples=4, seed=2)
+    rules, factors = (found.dataset[name].values for name in ("joint_rule", "k_s"))
+    slips = found.dataset["slip_at_rest"].values
+    for rule, factor, slip in zip(rules, factors, slips, strict=True):
+        given = ring.joints[0].contact
+        contact = replace(given, shear_stiffness=factor * given.shear_stiffness)
+        joints = tuple(replace(joint, contact=contact) for joint in ring.joints)
+        rest = af.dead_load(af.build(replace(ring, joints=joints), fidelity="rigid")).joints
+        sheared = abs(rest["V"].values) / (contact.shear_stiffness * ring.depths * ring.width)
+        # closed joints; displacements of the run may be large
+        expected = 0.0 if rule == "rigid" else sheared.max()
+        assert slip == pytest.approx(expected, rel=0.02)
+    assert found.in_doubt.tolist() == (slips > 1e-3).tolist()
+    number = int(found.in_doubt.sum())
+    assert 1 <= number < len(slips) - 2
+    (doubt,) = found.doubts
+    assert f"under dead load in {number} of 7 variations" in doubt.cause
+    # all that the remedy keeps stand as drawn
+    low, high = map(float, re.findall(r"verdict\.vary\.k_s=\[([\d.]+),([\d.]+)\]", doubt.remedy)[0])
+    assert factors[found.in_doubt].max() < low
+    assert high == 1.0
+    kept = af.verdict_range(ring, motion, vary={**vary, "k_s": (low, high)}, samples=4, seed=2)
+    assert kept.doubts == ()
+    assert "slip_at_rest" not in kept.dataset
+
+
 def test_contacts_motion_and_step_reach_the_run(column, motion, calls):
     found = evaluate(column, motion)
     (same, moved, dt, *_) = calls.pop()
@@ -121,6 +152,7 @@ def test_contacts_motion_and_step_reach_the_run(column, motion, calls):
         "time": pytest.approx(np.nan, nan_ok=True),
         "admissible_step": np.inf,
         "lacks_joints": False,
+        "slip_at_rest": pytest.approx(0.0, abs=1e-12),  # beds are level
     }
     assert (same, dt) == (column, 0.005)
     assert np.array_equal(moved.horizontal, motion.horizontal)
