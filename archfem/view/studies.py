@@ -586,6 +586,7 @@ def _draw_property(axes: Axes, verdicts: VerdictRange, values: Array, heights: A
     """Draw a dot for each answered run over a property, labels side by side."""
     if values.dtype.kind == "f":
         places = values
+        axes.set_xscale("log" if values.max() > 10.0 * values.min() > 0.0 else "linear")
     else:
         labels, number = np.unique(values, return_inverse=True)
         # runs of one label are spread out, so that equal results remain visible

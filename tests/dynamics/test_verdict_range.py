@@ -513,3 +513,12 @@ def test_each_property_has_a_panel():
     # without what the sentence says of sampled runs
     assert title.startswith(f"{found.headline}; shares are of ")
     assert found.sentence.startswith(f"{found.headline}; 1 of the 3 that vary all (")
+
+
+def test_factors_over_more_than_a_decade_have_a_logarithmic_axis():
+    ends = {"k_s": (0.0035, 4.36), "k_n": (0.44, 4.36), "friction": (-0.1, 0.1)}
+    columns = {name: np.linspace(*each, 4) for name, each in ends.items()}
+    figure = made_up([True, False, False, True], **columns).plot()
+    scales = {axes.get_xlabel().split(",")[0]: axes.get_xscale() for axes in figure.axes}
+    expected = {"shear stiffness": "log", "normal stiffness": "linear", "friction": "linear"}
+    assert scales == expected
