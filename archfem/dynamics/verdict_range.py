@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from math import inf
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -268,6 +269,24 @@ class VerdictRange(ResultDisplay):
         """
         return change.residual if self.is_dislocation_worst else change.displacement
 
+    @cached_property
+    def step_ratio(self) -> float:
+        """Ratio of displacements up to which other time steps alone may change them [-]."""
+        made = [x for x in self.single_changes if x.rank in (0, 1)]
+        sizes = [self.measure(x) for x in made if x.name in (UNVARIED, HALF_STEP)]
+        least, most = min(sizes, default=1.0), max(sizes, default=1.0)
+        return max(MAX_RATIO_OF_DISPLACEMENTS, most / least if least > 0.0 else inf)
+
+    def is_beyond_steps(self, change: "SingleChange", given: "SingleChange") -> bool:
+        """Return whether a change displaces the structure farther than time steps alone may.
+
+        Args:
+            change: run of `single_changes`; half the step itself counts.
+            given: the unvaried run.
+        """
+        # half the step is as far, but for round-off
+        return self.measure(change) > (1.0 - 1e-9) * self.step_ratio * self.measure(given)
+
     @property
     def what_changes(self) -> list[str]:
         """Clauses on the single changes that decide a fall, and on those that displace most."""
@@ -296,12 +315,13 @@ class VerdictRange(ResultDisplay):
     def _compare_displacements(self, given: "SingleChange", held: "list[SingleChange]") -> str:
         """Say how far the unvaried structure is displaced, and with which changes farthest."""
         moved = sorted(held, key=lambda each: -self.measure(each))[:2]
-        far = MAX_RATIO_OF_DISPLACEMENTS * self.measure(given)
-        larger = [each for each in moved if self.measure(each) > far] or moved[:1]
+        larger = [each for each in moved if self.is_beyond_steps(each, given)]
+        alike = ": other time steps alone may change it as much" * bool(moved and not larger)
+        larger = larger or moved[:1]
         listed = [f"{format_mm(self.measure(each))} with {each.name}" for each in larger]
         verb = "remains" if self.is_dislocation_worst else "is"
         own = f"unvaried it {verb} displaced by {format_mm(self.measure(given))}"
-        return ", by ".join([own, *listed])
+        return ", by ".join([own, *listed]) + alike
 
     @property
     def unanswered(self) -> str:

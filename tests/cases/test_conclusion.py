@@ -1025,6 +1025,29 @@ def test_a_displacement_has_the_range_of_its_time_steps_and_single_changes_are_s
     ]
 
 
+@pytest.mark.parametrize(
+    ("far", "outcome"), [(0.029, "stands"), (0.031, "stands"), (0.02, "dislocated")]
+)
+def test_what_displaces_it_most_does_so_by_more_than_time_steps(far, outcome):
+    """Unvaried it moves by 20 mm, with half the step by 21 mm; steps may change it 1.5 times."""
+    found = range_of(0.02, 0.021, far, motion="a")
+    found.dataset["sampled"][:] = False
+    found.dataset["dt"][1] = "half"
+    found.dataset["sign"] = "run", np.array(["as given", "as given", "reversed"])
+    found.dataset["outcome"] = "run", np.array(["stands", "stands", outcome])
+    found.dataset.attrs["properties"] = ["dt", "sign"]
+    said = conclusion._say_what_decides([found])
+    most = "of what was varied, motion reversed displaces it most: "
+    assert (
+        said
+        == {
+            (0.029, "stands"): "no property that was varied decides",
+            (0.031, "stands"): f"{most}31 mm in place of 20 mm",
+            (0.02, "dislocated"): f"{most}0 mm in place of 0 mm at the end",
+        }[far, outcome]
+    )
+
+
 def test_single_changes_are_tabulated_the_worst_first(case):
     """A fall has no displacement but that to the ground."""
     found = range_of(0.02, 0.12, 9.0)
@@ -1039,7 +1062,10 @@ def test_single_changes_are_tabulated_the_worst_first(case):
         ("half the time step", "stands", "120 mm"),
         ("unvaried", "stands", "20 mm"),
     ]
-    assert table.caption == "Single changes under 'a'; the worst first"
+    assert table.caption == (
+        "Single changes under 'a'; the worst first; other time steps alone may change "
+        "displacements 6 times"
+    )
     found.dataset["outcome"] = "run", np.array(["stands", "stands", "dislocated"])
     found.dataset["residual"] = "run", np.array([0.01, 0.03, 0.06])
     (table,) = sections._tabulate_single_changes(data_of(case), found, "")

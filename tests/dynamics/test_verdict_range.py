@@ -265,6 +265,23 @@ def test_single_changes_say_what_would_change_the_answer(falls, parted, clauses)
         ]
 
 
+@pytest.mark.parametrize(
+    ("half", "ratio", "said"),
+    [
+        (1.02, 1.5, "by 14 mm with damping / 2: other time steps alone may change it as much"),
+        (1.5 * 1.02, 1.53, "by 15.3 mm with half the time step"),
+        (0.5, 2.0, "by 14 mm with damping / 2: other time steps alone may change it as much"),
+    ],
+)
+def test_changes_within_the_error_of_the_steps_are_not_ranked(half, ratio, said):
+    """As far as half the step, or 1.5 times as far: unvaried it is displaced by 10 mm."""
+    columns = {"damping_ratio": [1.0, 0.5, 1.0], "dt": ["as given", "as given", "half"]}
+    sizes = [0.01, 0.014, 0.01 * half]
+    found = made_up([False] * 3, [False] * 3, residual=sizes, **columns)
+    assert found.step_ratio == pytest.approx(ratio)
+    assert found.what_changes[-1] == f"unvaried it is displaced by 10 mm, {said}"
+
+
 def test_single_changes_that_end_a_dislocation_are_said_and_chance_counts_the_samples():
     """Unvaried it is dislocated; of 12 samples, which alone are tested, one is."""
     rules = ["exact", "exact", "rigid", "three points"] + ["exact", "rigid"] * 6

@@ -385,9 +385,9 @@ def _say_what_decides(ranges: Sequence[VerdictRange]) -> str:
         return f"of what was varied, {join_words([*dict.fromkeys(names)])} decides"
     for found in ranges:
         changes = [each for each in found.single_changes if each.outcome in COLLAPSE_STATES[:2]]
-        given = [each for each in changes if each.name == UNVARIED]
-        if given and changes[0] is not given[0]:
-            most, own = (format_mm(found.measure(each)) for each in (changes[0], given[0]))
+        given = next((each for each in changes if each.name == UNVARIED), None)
+        if given and (changes[0].rank > given.rank or found.is_beyond_steps(changes[0], given)):
+            most, own = (format_mm(found.measure(each)) for each in (changes[0], given))
             ends = f"{most} in place of {own}" + " at the end" * found.is_dislocation_worst
             return f"of what was varied, {changes[0].name} displaces it most: {ends}"
     return "no property that was varied decides" if ranges else "no property was varied"

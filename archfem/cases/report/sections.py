@@ -498,6 +498,7 @@ def _tabulate_single_changes(data: ReportData, found: VerdictRange, pair: str) -
     if found.is_dislocation_worst:
         limit = DISLOCATION * shallowest_part(data.case.structure)[0]
         caption += f", by the displacement at the end; beyond {format_mm(limit)} it is dislocated"
+    steps = f"; other time steps alone may change displacements {found.step_ratio:.2g} times"
     head = ("single change", "outcome", "largest displacement", "at the end")
     rows = [
         # of a fall it is the way to the ground
@@ -505,7 +506,7 @@ def _tabulate_single_changes(data: ReportData, found: VerdictRange, pair: str) -
         for each in found.single_changes
         for ends in [map(format_mm, (each.displacement, each.residual))]
     ]
-    return [Grid(head, rows, f"{caption}; the worst first")]
+    return [Grid(head, rows, f"{caption}; the worst first{steps}")]
 
 
 def build_method_section(data: ReportData) -> Section:
