@@ -310,17 +310,16 @@ def describe_margins_at_rest(case: Case, structure: Structure) -> list[str]:
     notes = [f"{NOTE_MARK}a coefficient of friction is {most:g}, and {_OF_DRY}"] * (most > 1.0)
     if held := describe_held_ends(structure):
         notes.append(f"{NOTE_MARK}{held} and do not yield, {_OF_HELD}")
+    left_out, limit = say_loads_left_out(case), case.limit
+    if depth := describe_geometric_factor(structure, limit.strength, limit.fill):
+        notes.insert(0, f"{depth}{left_out}")
     if not (sentence := describe_friction(structure)):
         return notes
-    least, left_out = least_friction(structure) or 0.0, say_loads_left_out(case)
+    least = least_friction(structure) or 0.0
     in_pieces = any(block.grain for block in structure.blocks)
     of_fill = ", that of the fill too" * in_pieces
     open_ones = {each.name for each in contacts if "friction" in list_default_keys(case, each)}
-    lines = [
-        f"as rigid blocks {sentence}{of_fill}{left_out}",
-        f"{describe_geometric_factor(structure, case.limit.strength)}{left_out}",
-        *notes,
-    ]
+    lines = [f"as rigid blocks {sentence}{of_fill}{left_out}", *notes]
     if open_ones and least > DRY_FRICTION[0] and not in_pieces:
         names = join_names([f'contacts."{name}"' for name in sorted(open_ones)])
         words = f"friction decides whether it stands: {_OF_DRY}"

@@ -13,12 +13,18 @@ from archfem.cases.case import Case
 from archfem.cases.defaults import describe_margins_at_rest, say_loads_left_out
 from archfem.errors import InvalidInput
 from archfem.limit.collapse import describe_crushing
-from archfem.limit.instability import explain_instability, geometric_factor
+from archfem.limit.instability import explain_instability, find_factors_at_rest
 from archfem.limit.thickness import minimum_thickness
-from archfem.masonry.ring_thickness import Ring
+from archfem.masonry.ring_thickness import find_ring
 from archfem.masonry.standing import find_bodies
 from archfem.masonry.structure import Structure, describe_spans, join_names, list_first
-from archfem.units import format_mm, kN, mm
+from archfem.units import Ends, format_mm, kN, mm
+
+_DEPTH = "least depth of all joints"
+_BARE = (
+    "a least thickness of the ring is of a ring without fill, which is another structure: "
+    "--set remove=\"['structure.backfill']\""
+)
 
 
 def describe_supports(structure: Structure, max_names: int = 4) -> str:
@@ -116,11 +122,24 @@ def _describe_bearing(structure: Structure) -> str:
     return f"\nleast bearing of a lintel: {format_mm(bearing)}, of '{name}'{short}{more}"
 
 
-def describe_thickness(case: Case, ring: Ring) -> tuple[list[Row], list[str]]:
+def describe_thickness(case: Case, part: str | None) -> tuple[list[Row], list[str]]:
     """Find a ring's least thickness, and of more than a ring the least depth of all joints.
 
-    They are returned as rows, with factors of safety, and in lines.
+    They are returned as rows, with factors of safety, and in lines. Below a fill of known strength
+    it is the least depth alone: the ring by itself is another structure.
     """
+    at_rest = f"at rest{say_loads_left_out(case)}"
+    margins = describe_margins_at_rest(case, case.structure)
+    try:
+        ring = find_ring(case.structure, part)
+    except InvalidInput:
+        limit = case.limit
+        states = find_factors_at_rest(case.structure, limit.strength, limit.fill)
+        if part is not None or limit.fill is None or not states.get(""):
+            raise
+        ends, depth = Ends.of(states.values()), f"{1.0 / states['']:.3g} of what is built"
+        of = f"{_DEPTH} with the fill"
+        return [Row(of, at_rest, depth, f"{ends:ratio}", {"most": ends[0]})], [*margins, _BARE]
     limit, build = case.limit, ring.with_thickness
     find = partial(minimum_thickness, build, strength=limit.strength, tolerance=1e-5)
     least = find(friction=limit.friction)
@@ -132,20 +151,18 @@ def describe_thickness(case: Case, ring: Ring) -> tuple[list[Row], list[str]]:
         f"geometric factor of safety of the ring: {factor:.3g}; "
         f"{describe_crushing(limit.strength, case.structure)}",
     ]
-    at_rest = f"at rest{say_loads_left_out(case)}"
     rows = [Row(RESULTS["thickness"], at_rest, words, f"{factor:.3g}", {"most": factor})]
-    whole = geometric_factor(case.structure, limit.strength)
+    whole = find_factors_at_rest(case.structure, limit.strength, None).get("")
     is_whole = len(ring.stones) == len(case.structure.free)
     if whole and not is_whole:
-        depth, result = f"{1.0 / whole:.3g} of what is built", "least depth of all joints"
-        rows.append(Row(result, at_rest, depth, f"{whole:.3g}", {"most": whole}))
+        depth = f"{1.0 / whole:.3g} of what is built"
+        rows.append(Row(_DEPTH, at_rest, depth, f"{whole:.3g}", {"most": whole}))
     if limit.friction is not None:
         with suppress(InvalidInput):  # without sliding it may stand at any thickness
             rough = find(friction=None)
             moving = explain_instability(build(0.99 * least)) or "joints crush"
             moving = moving.partition(": ")[0]
             lines.append(f"if thinner, {moving}; without sliding {format_mm(rough)} are enough")
-    margins = describe_margins_at_rest(case, case.structure)
     # that of all joints is nearly that of a ring alone, and not said twice
     margins = [x for x in margins if not (is_whole and x.startswith("geometric"))]
     return rows, [*lines, *(["the whole structure as drawn:", *margins] if margins else [])]

@@ -38,8 +38,8 @@ from archfem.dynamics.history import Ending, History
 from archfem.dynamics.walls_across import check_across
 from archfem.errors import ArchfemError, DidNotConverge, Interrupted, InvalidInput, keep_warnings
 from archfem.limit.collapse import Collapse, describe_fill
+from archfem.limit.instability import describe_geometric_factor
 from archfem.limit.rating import Rating
-from archfem.masonry.ring_thickness import find_ring
 from archfem.masonry.structure import join_words
 from archfem.models.model import Doubt, group_doubts, merge_doubts
 from archfem.motion.motion import Motion
@@ -196,6 +196,9 @@ def limit(options: argparse.Namespace) -> int:
     case = Case.read(options.case, options.changes)
 
     def show(found: Collapse, text: str, *others: Any) -> None:
+        given = case.structure, case.limit.strength, case.limit.fill
+        at_rest = describe_geometric_factor(*given) if case.limit.fill else ""
+        text = "\n".join(filter(None, [text, at_rest]))
         files = partial(results.limit_files, case, found, text, *others)
         write_results("limit", case, options.out, f"{case.title}\n{text}", files)
 
@@ -207,9 +210,8 @@ def limit(options: argparse.Namespace) -> int:
 def thickness(options: argparse.Namespace) -> int:
     """Find the least thickness of a ring at rest, scaled about its middle line."""
     case = Case.read(options.case, options.changes)
-    ring = find_ring(case.structure, options.part)
     with result_text.record_doubts(case.structure) as doubts:
-        rows, lines = structure_text.describe_thickness(case, ring)
+        rows, lines = structure_text.describe_thickness(case, options.part)
     text = "\n".join([*lines, *result_text.mark_remarks(doubts)])
     remarks: list[result_text.Remark] = [*doubts, *(x for x in lines if x.startswith(NOTE_MARK))]
     sentences = [f"{row.result}: {row.outcome}" for row in rows]

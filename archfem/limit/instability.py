@@ -16,6 +16,9 @@ from scipy import sparse
 from archfem._typing import Array
 from archfem._validation import check_type
 from archfem.errors import DidNotConverge, InvalidInput
+from archfem.limit.backfill import attach_fill
+from archfem.limit.fill_range import vary_pressure
+from archfem.limit.fill_strength import Fill, PlasticFill, as_pressure
 from archfem.limit.linear_programme import Programme, RigidBlocks
 from archfem.limit.self_weight import (
     check_options,
@@ -99,8 +102,17 @@ def explain_instability(structure: Structure) -> str | None:
 # Coefficient of friction below which a least one is not sought, as no stone has it
 _LITTLE_FRICTION = 0.05
 
-# Share of the depth of joints below which a least one is not sought: a factor of safety of 20
-_LITTLE_DEPTH = 0.05
+# Share of the depth of joints below which a least one is not sought: a factor of safety of 20, or
+# of 100 with a fill, whose weight holds the thrust line near the middle
+_LITTLE_DEPTH, _LITTLE_DEPTH_WITH_FILL = 0.05, 0.01
+
+# States of a fill in which a factor at rest is stated beside that of the fill as given
+_FILL_STATES = {
+    "without_pressure": "without its pressure",
+    "full_pressure": "with all of its passive pressure",
+    "without_backing": "without the backing",
+    "without_either": "without backing and pressure",
+}
 
 
 @lru_cache(maxsize=8)
@@ -113,8 +125,9 @@ def least_friction(structure: Structure) -> float | None:
     return _find_least(structure, "cap", _LITTLE_FRICTION, most)
 
 
-@lru_cache(maxsize=8)
-def geometric_factor(structure: Structure, strength: float | None = np.inf) -> float | None:
+def geometric_factor(
+    structure: Structure, strength: float | None = np.inf, *, fill: Fill | None = None
+) -> float | None:
     """Find Heyman's geometric factor of safety of a structure at rest: of all joints at once.
 
     The joints become less deep about their middles, at the same weight, until a thrust line
@@ -122,12 +135,16 @@ def geometric_factor(structure: Structure, strength: float | None = np.inf) -> f
     thickness. Piers take part, which `minimum_thickness` of their ring leaves out.
 
     Args:
-        structure: structure with its friction and cohesion; fill does not press.
+        structure: structure with its friction and cohesion.
         strength: as for `collapse_factor`, where the joints crush [Pa]; they do not by default.
+        fill: as for `collapse_factor`. It weighs, and presses on the faces as built.
 
     Returns:
-        Depth of the joints over the least one [-], 20 where it is that or more; None where the
-        structure does not stand, or joints with bonds or bodies that yield have no such factor.
+        Depth of the joints over the least one [-], 20 where it is that or more, or 100 with a fill;
+        None where the structure does not stand, or joints with bonds have no such factor.
+
+    Raises:
+        InvalidInput: bodies too soft to be rigid are without the strength of a fill.
 
     References:
         Heyman, Int. J. Mech. Sci. 11 (1969) 363-385.
@@ -139,17 +156,46 @@ def geometric_factor(structure: Structure, strength: float | None = np.inf) -> f
     """
     check_type(structure, Structure, "structure", "give one, e.g. circular_arch(…)")
     strength = check_options(structure, "coulomb", strength)
-    least = _find_least(structure, "depth", _LITTLE_DEPTH, 1.0, strength)
+    attach_fill(structure, fill)  # refuses a fill without its strength
+    return _find_geometric_factor(structure, strength, fill)
+
+
+@lru_cache(maxsize=32)
+def _find_geometric_factor(
+    structure: Structure, strength: float | None, fill: Fill | None
+) -> float | None:
+    """Return `geometric_factor`; None also where it is refused."""
+    low = _LITTLE_DEPTH if fill is None else _LITTLE_DEPTH_WITH_FILL
+    least = _find_least(structure, "depth", low, 1.0, strength, fill)
     return None if least is None else 1.0 / least
 
 
+def find_factors_at_rest(
+    structure: Structure, strength: float | None, fill: Fill | PlasticFill | None
+) -> dict[str, float]:
+    """Return geometric factors in the states of a fill, by their words; as given first, by "" [-].
+
+    One is 0 where the structure does not stand; there is none where it stands in no state.
+    """
+    given = as_pressure(fill)
+    states = {"": given} | ({} if given is None else vary_pressure(given))
+    found = {key: _find_geometric_factor(structure, strength, x) for key, x in states.items()}
+    known = {_FILL_STATES.get(key, key): factor or 0.0 for key, factor in found.items()}
+    return known if any(known.values()) else {}
+
+
 def _find_least(
-    structure: Structure, name: str, low: float, high: float, strength: float | None = np.inf
+    structure: Structure,
+    name: str,
+    low: float,
+    high: float,
+    strength: float | None = np.inf,
+    fill: Fill | None = None,
 ) -> float | None:
     """Return the least value of a property with which it stands, from `low` on."""
     try:
         refuse_bonds(structure)
-        _, dead = self_weight_programme(structure, "coulomb", strength, None)
+        _, dead = self_weight_programme(structure, "coulomb", strength, fill)
         if _stands(dead, **{name: low}):
             return low
         find = _least_friction if name == "cap" else _least_value
@@ -166,24 +212,33 @@ def describe_friction(structure: Structure) -> str:
     return f"{_say_friction(least)}{less}"
 
 
-def describe_geometric_factor(structure: Structure, strength: float | None) -> str:
-    """Describe the geometric factor of safety at rest, of a structure that stands."""
-    factor = geometric_factor(structure, strength) or 1.0
-    more = " or more" if factor >= 1.0 / _LITTLE_DEPTH else ""
-    fill = ", those of the fill too," * any(block.grain for block in structure.blocks)
-    return (
-        f"geometric factor of safety at rest: {factor:.3g}{more}, as it stands with all joints"
-        f"{fill} {1.0 / factor:.3g} times as deep under the same weight"
-    )
+def describe_geometric_factor(
+    structure: Structure, strength: float | None, fill: Fill | PlasticFill | None = None
+) -> str:
+    """Describe the geometric factor of safety at rest, with its range over a fill; "" for none."""
+    factors = find_factors_at_rest(structure, strength, fill)
+    if not factors:
+        return ""
+    most = 1.0 / (_LITTLE_DEPTH if fill is None else _LITTLE_DEPTH_WITH_FILL)
+    said = {k: f"{x:.3g}{' or more' * (x >= most)}" if x else "none" for k, x in factors.items()}
+    factor, first = factors[""], said.pop("")
+    pieces = ", those of the fill too," * any(block.grain for block in structure.blocks)
+    if factor:
+        depth = f"all joints{pieces} {1.0 / factor:.3g} times as deep"
+        first += f", as it stands with {depth} under the same weight"
+    others = f"; {', '.join(f'{x} {key}' for key, x in said.items())}" * bool(said)
+    of = " with the fill" * (fill is not None)
+    return f"geometric factor of safety at rest{of}: {first}{others}"
 
 
 def list_margins_at_rest(
-    structure: Structure, strength: float | None
+    structure: Structure, strength: float | None, fill: Fill | PlasticFill | None = None
 ) -> Iterator[tuple[float, str]]:
     """Yield the factors of safety at rest of stones that are known, and what they are of."""
     if any(block.grain for block in structure.blocks):
         return
-    if (depth := geometric_factor(structure, strength)) and depth < 1.0 / _LITTLE_DEPTH:
+    factors = find_factors_at_rest(structure, strength, fill)
+    if 0.0 < (depth := min(factors.values(), default=0.0)) < 1.0 / _LITTLE_DEPTH:
         yield depth, "the depth of its joints"
     if (least := least_friction(structure)) and least > _LITTLE_FRICTION:
         yield float(structure.friction.max()) / least, "the friction of its joints"

@@ -110,8 +110,9 @@ def find_ring(structure: Structure, part: str | None = None) -> Ring:
             raise InvalidInput(
                 f"'{structure.blocks[k].name}' has {len(numbers)} joints ({names}): a ring whose "
                 "thickness changes is one layer of stones, none missing, that carry nothing else; "
-                "leave out what is on them: of a bridge by remove = ['structure.backfill'], of a "
-                "drawing by ignore = true of its layers"
+                "leave out what is on them, for the bare ring: of a bridge by remove = "
+                "['structure.backfill'], of a drawing by ignore = true of its layers; or give the "
+                "strength of a fill in [limit], for the depth of all joints with it"
             )
     if len(stones) < 3:
         raise InvalidInput(

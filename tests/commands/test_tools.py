@@ -7,6 +7,7 @@ from importlib import metadata
 import imageio.v2 as imageio
 import numpy as np
 import pytest
+from backfilled import arch_bridge
 from drawn import draw_portal
 
 import archfem as af
@@ -208,6 +209,35 @@ def test_a_thickness_of_an_arch_on_piers_is_said_to_be_of_the_ring_alone(tmp_pat
     assert 1.0 < float(every[3]) < 0.8 * float(ring[3])
     text = (tmp_path / "thickness.txt").read_text()
     assert f"geometric factor of safety at rest: {float(every[3]):.3g}, as" in text
+
+
+def test_a_bridge_with_fill_has_the_least_depth_of_all_joints(tmp_path, capsys):
+    """Beside that without and with all pressure; the bare ring is said to be another structure."""
+    bridge, path = arch_bridge(thickness=0.3, voussoirs=9), tmp_path / "bridge.toml"
+    af.Analysis(bridge, fidelity="rigid").write(path)
+    assert af.commands.main(["thickness", str(path)]) == 1
+    assert "or give the strength of a fill in [limit]" in capsys.readouterr().err
+    strength = ["--set", 'limit.fill={ friction_angle = "35 degree" }']
+    out = tmp_path / "out"
+    assert af.commands.main(["thickness", str(path), *strength, "--out", str(out)]) == 0
+    fills = [
+        af.limit.Fill(friction_angle=35.0, **given)
+        for given in ({}, {"mobilisation": 0.0, "active": 0.0}, {"mobilisation": 1.0})
+    ]
+    own, none, full = (af.limit.geometric_factor(bridge, fill=fill) for fill in fills)
+    words = f"geometric factor of safety at rest with the fill: {own:.3g}, as it stands with all"
+    said = capsys.readouterr().out
+    assert words in said
+    assert f"; {none:.3g} without its pressure, {full:.3g} with all of its passive pressure" in said
+    assert "of a ring without fill, which is another structure" in said
+    (row,) = json.loads((out / "thickness.json").read_text())["rows"]
+    assert row[0] == "least depth of all joints with the fill"
+    ends = min(own, none, full), max(own, none, full)
+    assert [float(x) for x in row[3].split(" to ")] == pytest.approx(ends, rel=5e-3)  # 3 digits
+    push = [*strength, "--set", "limit.horizontal=1.0"]
+    assert af.commands.main(["limit", str(path), *push]) in (0, 3)
+    assert words in capsys.readouterr().out
+    assert af.commands.main(["thickness", str(path), *strength, "--part", "arch"]) == 1
 
 
 @pytest.mark.parametrize(

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from backfilled import SOIL, retaining_wall
 
 import archfem as af
 from archfem.limit import linear_programme
@@ -340,3 +341,50 @@ def test_where_a_search_for_equilibrium_stalls_the_least_residual_decides(monkey
     stone = on_a_bed(square, tilt=np.arctan(0.25))
     monkeypatch.setattr(linear_programme, "STALLED_AFTER", 1e-9)
     assert least_friction(stone) == pytest.approx(0.25, rel=6e-3)  # of the bisection
+
+
+@pytest.mark.parametrize("active", [1.0, 0.5])
+def test_the_geometric_factor_of_a_wall_that_holds_a_fill(active):
+    """Rankine's thrust a K_a γ H²/2 at a third of the height, over the weight of the wall."""
+    wall, fill = (
+        retaining_wall(),
+        af.limit.Fill(friction_angle=30.0, mobilisation=0.0, active=active),
+    )
+    stone = next(block for block in wall.blocks if not block.fixed and block.material is STONE)
+    breadth, height = np.ptp(stone.points, axis=0)
+    thrust = active / 3.0 * SOIL.unit_weight * height**2 / 2.0
+    offset = thrust * height / 3.0 / (STONE.unit_weight * breadth * height)
+    found = af.limit.geometric_factor(wall, fill=fill)
+    assert found == pytest.approx(0.5 * breadth / offset, rel=2e-3)  # of the bisection
+    none = replace(fill, active=0.0)
+    assert af.limit.geometric_factor(wall, fill=none) == pytest.approx(100.0)  # and more
+    assert "100 or more" in describe_geometric_factor(wall, np.inf, none)
+    with pytest.raises(af.errors.InvalidInput, match=r"fill=af\.limit\.Fill"):
+        af.limit.geometric_factor(wall)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("pressure", "factor"),
+    [
+        ({"mobilisation": 0.0, "active": 0.0}, 15.65),
+        ({"mobilisation": 0.0}, 31.05),
+        ({}, 34.98),
+        ({"mobilisation": 1.0}, 50.99),
+    ],
+)
+def test_the_geometric_factor_of_a_bridge_with_fill(pressure, factor):
+    """That of a linear programme of its own: columns, eight pressures a stone, joints narrowed."""
+    walls = [
+        af.shapes.Sidewall(length=6.0, height=0.5, above=0.3, state="fixed", name=f"{side} wall")
+        for side in ("left", "right")
+    ]
+    bridge = af.bridge(
+        arches=[af.shapes.Arch(span=7.2, rise=2.1, thickness=0.55, voussoirs=29)],
+        sidewalls=walls,
+        backfill=af.shapes.Backfill(cover=0.353, material=replace(SOIL, unit_weight=18e3)),
+        material=replace(STONE, unit_weight=23e3),
+    )
+    fill = af.limit.Fill(friction_angle=35.0, **pressure)
+    # bisections to a thousandth, and the digits of the reference
+    assert af.limit.geometric_factor(bridge, fill=fill) == pytest.approx(factor, rel=2e-3)

@@ -136,7 +136,8 @@ def rank_margins(data: ReportData) -> list[tuple[float, bool, list[str]]]:
     across the plane, unchecked, the least is said to be in the plane.
     """
     margins = sorted(list_margins(data), key=lambda each: each[0])
-    at_rest = list_margins_at_rest(data.case.structure, data.case.limit.strength)
+    limit = data.case.limit
+    at_rest = list_margins_at_rest(data.case.structure, limit.strength, limit.fill)
     least = min((each[0] for each in margins), default=np.inf)
     for factor, of in sorted(at_rest)[:1]:
         if factor < least:  # alone it has no rank
