@@ -235,10 +235,12 @@ def state_ratings(
             own = varied is not None and varied.head[0] == f"{found.label} with"
             if varied and own and each.passes and "CS 454" not in code:  # on one axle, no multiple
                 flips = _say_flips(each.factor / found.factor, varied)
-            if not np.isnan(each.factor):
-                at += "".join(f"; {x}" for x in (each.say_range(), flips) if x)
+            lost = [] if np.isnan(each.factor) else each.list_losses()
+            words_of = [f"{x:.4g} {of}" if x else f"it does not stand {of}" for x, of in lost]
+            at += "".join(f"; {x}" for x in (*words_of, flips) if x)
+            state = {"state": ", ".join(of for _, of in lost)} if lost else {}
             factor = "-" if np.isnan(each.factor) else format_ratio(each.factor, 4)
-            numbers = {"passes": bool(each.passes), "least": each.least}
+            numbers = {"passes": bool(each.passes), "least": each.least, **state}
             rows.append((each.factor, Row("rating", demand, f"{words}{at}", factor, numbers)))
     sentences = [repr(first)]
     if not np.isnan(first.factor):

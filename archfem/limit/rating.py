@@ -100,7 +100,7 @@ class Rating(ResultDisplay):
         without_backing: least factor without the backing of a `Fill`; NaN without one, and where
             the bridge then does not stand.
         without_either: least factor without backing and without pressure; NaN likewise.
-        crushing: least factors with stones of `ASSUMED_STRENGTH`, where joints do not crush:
+        crushing: least factors with stones of `ASSUMED_STRENGTH`, where no strength was given:
             "factor", of a plastic fill as weight and pressure, and those of other states by their
             names above; else none.
         by_pressure: least factor with a plastic fill as weight and pressure (`Fill`) of its
@@ -246,6 +246,25 @@ class Rating(ResultDisplay):
     def least(self) -> float:
         """Least factor over what is assumed, 0 where the bridge does not stand [-]."""
         return float(np.nan_to_num(self._ends, posinf=np.inf).min())
+
+    def list_losses(self) -> list[tuple[float, str]]:
+        """Return the least factor as what is assumed falls away, part by part, and the parts.
+
+        It is 0 where the bridge then does not stand [-].
+        """
+        states, parts, losses = self._list_states(), tuple[str, ...](), list[tuple[float, str]]()
+        if isinstance(self.fill, PlasticFill):
+            losses.append((self.by_pressure, "with the fill as weight and pressure"))
+        also = "also " * (self.fill is not None)
+        for part, words in (
+            (_PRESSURE, "without the pressure of the fill"),
+            (_BACKING, "without the backing"),
+            (_HARD_STONES, f"if stones {also}crush at {ASSUMED_STRENGTH / MPa:g} MPa"),
+        ):
+            if (*parts, part) in states:
+                parts = *parts, part
+                losses.append((states[parts], words))
+        return [(float(np.nan_to_num(x, posinf=np.inf)), words) for x, words in losses]
 
     def say_range(self) -> str:
         """Return the least and the greatest factor over all that is assumed, in words."""
@@ -545,7 +564,8 @@ def rate(  # noqa: PLR0913  (factors of the check, and the strength of the bridg
             Where less of it or a larger width is given, `by_rule` is the factor without.
         friction: as for `collapse_factor`; the geometric factor takes "coulomb" for
             "nonassociated".
-        strength: as for `collapse_factor`, divided by its partial factor [Pa].
+        strength: as for `collapse_factor`, divided by its partial factor [Pa]. Without one the
+            result is also that of 5 MPa; with an infinite one it is not.
         fill: as for `collapse_factor`.
         parapets: weight of both parapets along the bridge, where they stand on it [N/m]. It spreads
             evenly over the width, and through the fill, but raises no pressure of the fill.
@@ -562,6 +582,7 @@ def rate(  # noqa: PLR0913  (factors of the check, and the strength of the bridg
         Heyman, The Masonry Arch, Ellis Horwood (1982).
     """
     structure, driven = structure_of(structure), find_vehicle(vehicle)
+    crushes = strength is None or np.isfinite(strength)  # infinite says that it does not
     live, impact, missing = driven.choose_factors(live, impact)
     check_factor(dead, "dead, factor on the weights")
     rule = driven.spread_over(structure)
@@ -594,7 +615,8 @@ def rate(  # noqa: PLR0913  (factors of the check, and the strength of the bridg
     unknown = np.nan, np.nan
     geometric, deepest = unknown if is_plastic else find_geometric_factor(weighted, moving, options)
     more: dict[str, Any] = {"strength": strength, "deepest": deepest, "fill": fill}
-    for key, each, by, states in _further_searches(driven, rows, live, area_load, options):
+    others = _other_states(options, crushes)
+    for key, each, by, states in _further_searches(driven, rows, live, area_load, options, others):
         # of the whole width, as the structure is modelled
         loads = [np.column_stack([structure.width / width * row, axles[:, 1]]) for row in each]
         known = None if key or is_plastic else moving
@@ -652,10 +674,15 @@ def _places_along(structure: Structure, vehicle: Array, steps: int = 100) -> Seq
 
 
 def _further_searches(
-    driven: Vehicle, rows: Sequence[Array], live: float, area_load: float, options: dict[str, Any]
+    driven: Vehicle,
+    rows: Sequence[Array],
+    live: float,
+    area_load: float,
+    options: dict[str, Any],
+    states: dict[str, dict[str, Any]],
 ) -> Iterator[tuple[str, Sequence[Array], float, dict[str, dict[str, Any]]]]:
     """Yield name, rows of weights, partial factor and states of further least factors."""
-    if states := _other_states(options):
+    if states:
         yield "", rows, live, states
     is_multiple = len(driven.axles) == 1 and not area_load
     if driven.grade == "given" and not (is_multiple or isinstance(options["fill"], PlasticFill)):
@@ -664,14 +691,17 @@ def _further_searches(
         yield "by_cs454", other, code.factors[0], {"factor": options} | states
 
 
-def _other_states(options: dict[str, Any]) -> dict[str, dict[str, Any]]:
-    """Return the options with other pressures of a fill, without backing, all with crushing too."""
+def _other_states(options: dict[str, Any], crushes: bool) -> dict[str, dict[str, Any]]:
+    """Return the options with other pressures of a fill, without backing, all with crushing too.
+
+    Stones of which it was said that they do not crush do not.
+    """
     fill = as_pressure(options["fill"])
     fills = vary_pressure(fill) if fill is not None else {}
     states = {name: options | {"fill": other} for name, other in fills.items()}
     if fill is not options["fill"]:
         states["by_pressure"] = options | {"fill": fill}
-    if np.isinf(options["strength"]):
+    if np.isinf(options["strength"]) and crushes:
         soft = options | {"strength": ASSUMED_STRENGTH}
         crushed = {"factor": fill, **fills}
         states |= {f"{_CRUSHING}{x}": soft | {"fill": other} for x, other in crushed.items()}

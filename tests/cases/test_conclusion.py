@@ -40,6 +40,7 @@ from archfem.models.model import Doubt, read_doubts, write_doubts
 from archfem.statics.assessment_checks import UPPER_BOUND, AssessmentCheck
 from archfem.studies import variations
 from archfem.studies.fragility import Rate
+from archfem.units import format_ratio
 
 SPECTRUM = {"spectrum": {"code": "EC8", "ag": 0.2, "ground": "A"}}
 
@@ -1219,7 +1220,7 @@ def test_a_study_that_finds_less_is_named_beside_the_result(
     ],
 )
 def test_a_rating_is_stated_by_the_norm_of_the_report_alone(case, norm, first):
-    """Its least factor over what is assumed, here 0.9 of that as given, is also the margin."""
+    """Its least factor over what is assumed, here 0.9 of that as given, is the margin."""
     codes = {"by CS 454": "0.8", "by Eurocodes on a fair road": "1.4", "by Eurocodes": "1.6"}
     rows = [
         answers.Row("rating", f"lorry {by}", "passes", x, {"passes": True, "least": 0.9 * float(x)})
@@ -1232,7 +1233,7 @@ def test_a_rating_is_stated_by_the_norm_of_the_report_alone(case, norm, first):
     verdict = head_of(conclusion.list_facts(data))
     needed = ", 1 is required" * bool(norm)
     least = 0.9 * float(codes[first])
-    assert verdict == f"Rating for lorry {first}: factor {least:.4g}{needed}, passes."
+    assert verdict == f"Rating for lorry {first}: factor {codes[first]}{needed}, passes."
     assert conclusion._rank_verdict(data)[1] == {"the vehicle": pytest.approx(least)}
     pieces = conclusion.build_conclusion(data).pieces
     assert pieces[0].text.startswith(f"Lorry {first[:12]}")
@@ -1245,44 +1246,46 @@ def test_a_rating_is_stated_by_the_norm_of_the_report_alone(case, norm, first):
 @pytest.mark.parametrize(
     ("norm", "of_norm", "margin"),
     [
-        ("NTC 2018", "by Eurocodes on a fair road (1.35 × 1.4, from memory): factor 1.587", 1.587),
-        ("CS 454", "by CS 454 (1.9, and 1.8 on the worst axle, from memory): factor 1.003", 1.003),
+        ("NTC 2018", "by Eurocodes on a fair road (1.35 × 1.4, from memory): factor 1.858", 1.587),
+        ("CS 454", "by CS 454 (1.9, and 1.8 on the worst axle, from memory): factor 1.176", 1.003),
         ("", "", 1.003),
     ],
 )
 def test_the_factor_without_a_code_and_its_place_stand_beside_that_of_the_norm(
     case, norm, of_norm, margin
 ):
-    """Factors over the fill of a lorry on a bridge of 7.2 m, least first, as `archfem rate` has."""
+    """Factors of a lorry on a bridge, as given and with less of fill and stones, least first."""
     place = ", without partial factors, with 2 axles of 3 at x = 11.39 and 12.69 m, 5.23 and 6.53 m"
     place += " from the left clear springing (the other at 15.89 m)"
     found = [
-        (" by CS 454 (1.9, and 1.8 on the worst axle, from memory)", "", "1.176", 1.003, 1.552),
-        (" by Eurocodes on a fair road (1.35 × 1.4, from memory)", "", "1.858", 1.587, 2.452),
-        ("", place, "3.512", 3.0, 4.635),
+        (" by CS 454 (1.9, and 1.8 on the worst axle, from memory)", "", "1.176", 1.003, 1.052),
+        (" by Eurocodes on a fair road (1.35 × 1.4, from memory)", "", "1.858", 1.587, 1.652),
+        ("", place, "3.512", 3.0, 3.135),
     ]
-    over = "the factor is {:.4g} to {:.4g} over what is assumed of the fill"
+    over = "{:.4g} without the pressure of the fill; {:.4g} if stones also crush at 5 MPa"
     rows = [
         answers.Row(
             "rating",
             f"lorry{by}",
-            f"passes{at}; {over.format(least, most)}",
+            f"passes{at}; {over.format(middle, least)}",
             factor,
-            {"passes": True, "least": least},
+            {"passes": True, "least": least, "state": "with neither"},
         )
-        for by, at, factor, least, most in found
+        for by, at, factor, least, middle in found
     ]
     settings = {key: value for key, value in case.settings.items() if key != "motion"}
     data = ReportData(af.Case.of(settings | ({"report": {"norm": norm}} if norm else {})), {})
     vars(data)["statements"] = {"rating": answers.Statement([], rows)}
-    (most,) = (each[-1] for each in found if each[3] == margin)
-    first = f"Rating for lorry {of_norm}, 1 is required, passes. "
-    first += f"The factor is {margin:.4g} to {most:.4g} over what is assumed of the fill. "
-    bare = "Rating for lorry: factor 3, passes, without partial factors. "
-    bare += "The factor is 3 to 4.635 over what is assumed of the fill. "
-    bare += "Worst with 2 axles of 3 at x = 11.39 and 12.69 m."
+    (by, middle), *_ = ((each[0], each[-1]) for each in found if each[3] == margin)
+    first = f"Rating for lorry {of_norm} as given, 1 is required, passes; "
+    first += f"{over.format(middle, margin)}. "
+    bare = "Rating for lorry: factor 3.512 as given, passes, without partial factors; "
+    bare += f"{over.format(3.135, 3.0)}. Worst with 2 axles of 3 at x = 11.39 and 12.69 m."
     assert head_of(conclusion.list_facts(data)) == first * bool(norm) + bare
     assert conclusion._rank_verdict(data)[1] == {"the vehicle": margin}
+    margins = dict(conclusion.list_joint_facts({"A": data, "B": data}))["margin"]
+    of = f"{format_ratio(margin)} times the vehicle, lorry{by}, with neither"
+    assert margins == f"The least margins are of A {of}; of B {of}."
 
 
 @pytest.mark.parametrize(
@@ -1317,7 +1320,7 @@ def test_a_stricter_code_that_passes_only_on_some_fills_stands_beside_that_of_th
     data = ReportData(af.Case.of(settings | {"report": {"norm": "EN 1991-2"}}), {})
     vars(data)["statements"] = {"rating": answers.Statement([], rows)}
     assert head_of(conclusion.list_facts(data)) == (
-        "Rating for lorry by Eurocodes: factor 1.1, 1 is required, passes. It passes only with the "
+        "Rating for lorry by Eurocodes: factor 1.5, 1 is required, passes. It passes only with the "
         "pressure of the fill for lorry by CS 454 (else 0.7)."
     )
 
@@ -1362,10 +1365,11 @@ def test_without_a_norm_a_rating_without_a_code_comes_first(case):
         tables = [x for x in conclusion.build_conclusion(data).pieces if hasattr(x, "rows")]
         assert tables[0].rows[0][1] == "lorry"
     # in one of the states that are assumed the bridge does not stand
-    rows = [rows[1]._replace(numbers={"passes": True, "least": 0.0})]
+    falls = "it does not stand without the backing"
+    rows = [rows[1]._replace(outcome=f"passes; {falls}", numbers={"passes": True, "least": 0.0})]
     vars(data)["statements"] = {"rating": answers.Statement([], rows)}
     verdict = dict(conclusion.list_facts(data))["verdict"]
-    assert verdict == "Rating for lorry: factor none, in words lorry."
+    assert verdict == f"Rating for lorry: factor 4.1 as given, passes; {falls}."
 
 
 @pytest.mark.parametrize(("ag", "overturns"), [(0.1, False), (0.2, True)])

@@ -654,7 +654,7 @@ def test_a_narrow_worst_place_is_found(monkeypatch):
     fill = af.limit.Fill(friction_angle=36.1, backing=0.224, mobilisation=0.0, active=0.0)
     lorry = Vehicle("lorry", (69e3, 111.6e3), (1.38,), grade="read")
     monkeypatch.setattr(rating, "_places_along", partial(places_along, steps=60))
-    monkeypatch.setattr(rating, "_other_states", lambda given: {"without_pressure": given})
+    monkeypatch.setattr(rating, "_other_states", lambda given, _: {"without_pressure": given})
     found = af.rate(bridge, lorry, fill=fill, width=3.0)
     assert found.without_pressure == pytest.approx(found.factor, rel=EXACT)
 
@@ -877,8 +877,14 @@ def test_factors_of_codes_are_stated_with_outcome_and_range(monkeypatch):
     # the worst first, each with its range over fill and stones
     stated = [("lorry", given, f"{given.short_outcome}, {given.place}")]
     stated += [(f"lorry {name}", x, x.short_outcome) for name, x in codes]
-    stated = [(name, x, f"{words}; {x.say_range()}") for name, x, words in stated]
-    assert f"{ends}{given.by_cs454['full_pressure']:.4g} over" in str(rows)
+    losses = [[f"{factor:.4g} {of}" for factor, of in x.list_losses()] for _, x, _ in stated]
+    stated = [
+        (name, x, "; ".join([y, *of])) for (name, x, y), of in zip(stated, losses, strict=True)
+    ]
+    least = f"; {given.by_cs454['crushing']['without_either']:.4g} if stones also crush at 5 MPa"
+    assert least in str(rows)
+    state = "without the pressure of the fill, without the backing, if stones also crush at 5 MPa"
+    assert {row.numbers["state"] for row in rows} == {state}
     assert [row.numbers["least"] for row in rows] == sorted(x.least for _, x, _ in stated)
     assert [row[:4] for row in rows] == [
         ("rating", name, words, f"{x.factor:.4g}")
@@ -969,6 +975,8 @@ def test_abutments_that_cannot_move_are_noted(monkeypatch):
         walls = [replace(wall, name=side) for wall, side in zip(walls, "ab", strict=True)]
         bridge = af.bridge(arches=[arch], sidewalls=walls if state else [], width=3.0)
         found = af.rate(bridge, Vehicle("axle", (50e3,)), strength=np.inf)
+        assert not found.crushing  # it was said that stones do not crush
+        assert found.least == found.factor
         note = 'abutments are taken as immovable: state = "free" tests them'
         assert (note in str(doubt_rating(found, limit))) == (state != "free")
 

@@ -171,6 +171,9 @@ def _say_factor(data: ReportData, factor: float, kind: str) -> str:
         if check.displaced is not None and check.decisive == factor:
             by = f"{format_ratio(check.displaced)} by displacements ({check.name})"
             until = f" until it begins to move, {by}"
+    rated = data.statements["rating"].rows if kind == KINDS[1] else []
+    for row in (x for x in rated if x.numbers["least"] == factor):
+        until = "".join(f", {x}" for x in (row.demand, row.numbers.get("state")) if x)
     return f"{'at most ' * (factor in bounds)}{format_ratio(factor)} times {kind}{until}"
 
 
@@ -273,7 +276,7 @@ def _say_pushes(data: ReportData, name: str, stated: Statement) -> Iterator[str]
 def _say_ratings(data: ReportData, stated: Statement) -> Iterator[str]:
     """Yield the least rating by the norm of the report, that without a code, and unlike ones.
 
-    Each is the least over what is assumed. Without a norm that without a code comes first.
+    Each is as given and with less of what is assumed. Without a norm that without a code is first.
     """
     own = [row for row in stated.rows if _is_of_norm(data, row.demand)]
     shown = [*(own or stated.rows)[:1]]
@@ -282,12 +285,10 @@ def _say_ratings(data: ReportData, stated: Statement) -> Iterator[str]:
     shown += [row for row in stated.rows if row.demand in of and row not in shown]
     for row in shown:
         needed = ", 1 is required" * (bool(data.case.report.get("norm")) and row in own)
-        outcome, _, over = row.outcome.partition("; ")
+        outcome, semicolon, over = row.outcome.partition("; ")
         outcome, _, place = outcome.partition(", with ")
-        least = row.numbers["least"]
-        factor = format_ratio(least, 4) if least else "none"
-        yield f"rating for {row.demand}: factor {factor}{needed}, {outcome}"
-        yield from [over] * bool(over)
+        words = f"{row.factor}{' as given' * bool(over)}{needed}, {outcome}{semicolon}{over}"
+        yield f"rating for {row.demand}: factor {words}"
         # of its places the result has those from springings, and of other axles
         yield from [f"worst with {re.split('(?<= m), ', place)[0]}"] * bool(place)
     left = [row for row in stated.rows if row not in shown]
