@@ -3,8 +3,8 @@
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import replace
-from functools import cache
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -20,13 +20,18 @@ from archfem.dynamics.scale_search import MechanismScales
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.limit.fill_range import FillRange
 from archfem.limit.rating import Rating
-from archfem.masonry.loads import name_side
+from archfem.masonry.loads import AttachedLoad, name_side
 from archfem.masonry.out_of_plane import describe_transverse_push, find_transverse_push
 from archfem.masonry.structure import Structure, join_words
 from archfem.models.model import Doubt, read_doubts, write_doubts
 from archfem.motion.hazard import DESIGN_PERIOD, MEASURES
 from archfem.motion.motion import Motion
-from archfem.statics.assessment_checks import AssessmentCheck, describe_difference, doubt_assumed
+from archfem.statics.assessment_checks import (
+    NOT_SHOWN,
+    AssessmentCheck,
+    describe_difference,
+    doubt_assumed,
+)
 from archfem.statics.first_mechanism import describe_tied_length
 from archfem.statics.mechanism_assessment import KinematicAssessment
 from archfem.units import STANDARD_GRAVITY, Ends, format_ratio, kN
@@ -76,7 +81,7 @@ class Ratios(NamedTuple):
     check: str
     directions: Sequence[str]
     least: float  # with the weights of blocks apart, where it is not the decisive one
-    most: float  # the largest of the decisive ones over a fill; without one `least`
+    most: float  # largest of the decisive ones over a fill, or `least`; infinite of a lower bound
     needed: str = ""  # assumptions on the fill under which alone it passes
     linear: bool = False  # whether accelerations are checked, rather than displacements
     moved: float | None = None  # by displacements, of what passes at rest
@@ -97,9 +102,22 @@ class Ratios(NamedTuple):
         return min(x for x in (self.least, self.bodies, self.floor) if x is not None)
 
     @property
-    def ends(self) -> Ends:
-        """The least ratio, and the largest over what is assumed of a fill [-]."""
-        return Ends((self.decisive, self.decisive if self.most == self.least else self.most))
+    def unshown(self) -> bool:
+        """Whether it neither passes nor fails, as the ratio is a lower bound and less than 1."""
+        return self.most == np.inf and self.decisive < 1.0
+
+    @property
+    def fails(self) -> bool:
+        """Whether it fails by the least ratio."""
+        return self.decisive < 1.0 and not self.unshown
+
+    @property
+    def range(self) -> str:
+        """The least ratio, and the largest over what is assumed of a fill, as text."""
+        if self.unshown:
+            return f"at least {format_ratio(self.decisive)}"
+        ends = self.decisive, self.decisive if self.most == self.least else self.most
+        return f"{Ends(ends):ratio}"
 
     @property
     def by_split(self) -> bool:
@@ -119,7 +137,7 @@ class Ratios(NamedTuple):
 
     def __str__(self) -> str:
         """Return all ratios in words."""
-        return f"{self.ends:ratio}{self.beside}"
+        return f"{self.range}{self.beside}"
 
 
 class Scales(NamedTuple):
@@ -312,9 +330,11 @@ def list_ratios(found: KinematicAssessment) -> list[tuple[AssessmentCheck, Ratio
         split = check.decisive if split and floor is None else split
         bodies = split if (split or np.inf) < 0.999 * check.ratio else None
         least = check.decisive if bodies is floor is None else check.ratio
-        ends = least, over.ends[1] if over else least
+        most = np.inf if check.unshown else over.ends[1] if over else least
         needed, linear = over.needed if over else "", check.unit != "m"
-        ratios = Ratios(check.name, (), *ends, needed, linear, moved, bodies, check.bounded, floor)
+        bounded = check.bounded and not check.unshown
+        numbers = needed, linear, moved, bodies, bounded, floor
+        ratios = Ratios(check.name, (), least, most, *numbers)
         listed.append((check, ratios))
     return listed
 
@@ -330,8 +350,17 @@ def compare_checks(checks: Sequence[Ratios]) -> str:
     last = [x for x in checks if not (x.linear and moved.issuperset(x.directions))]
     if not last:
         return ""
-    if (least := min(last, key=lambda x: x.decisive)).bounded:  # which shows no passing
-        linear = min((x.decisive for x in checks if x.linear), default=0.0)
+    least = min(last, key=lambda x: x.decisive)
+    linear = min((x.decisive for x in checks if x.linear), default=0.0)
+    if least.unshown:
+        if failing := [x.decisive for x in last if x.fails]:
+            return f"another mechanism or sense does not pass ({format_ratio(min(failing))})"
+        verb = "passes" if linear >= 1.0 else "fails"
+        return (
+            f"{verb} the linear check ({format_ratio(linear)}), and {NOT_SHOWN} by displacements "
+            f"({least.range}), as the path ends before alpha vanishes"
+        )
+    if least.bounded:  # which shows no passing
         return (
             f"passes the linear check ({format_ratio(linear)}), and is not shown to pass by "
             f"displacements, as their ratio, {format_ratio(least.decisive)}, is an upper bound"
@@ -393,54 +422,127 @@ def doubt_ties(case: Case) -> list[Remark]:
     ]
 
 
-def note_ties(case: Case) -> list[str]:
-    """Return notes on the force of ties with which a sense just passes every check."""
-    settings, notes = case.assessment, list[str]()
-    loads = settings.options.get("loads", ())
-    ties = [load for load in loads if load.passive]
+class _Tied(NamedTuple):
+    """What is found with a multiple of the forces of ties, ratios up to the largest of interest."""
 
-    @cache  # ends of the search are tried before it
-    def solve(scale: float, sense: float) -> tuple[float, str, bool]:
-        """Return least ratio, mechanism and any upper bound with multiples of the ties' forces."""
-        progress.show(f"pushed to the {name_side(sense)}, {scale:.3g} times their forces", 1)
-        tied = [replace(x, force=(scale * x.force[0], scale * x.force[1])) for x in ties if scale]
-        options = {**settings.options, "loads": [x for x in loads if not x.passive] + tied}
-        own = replace(settings, directions=(sense,), options=options)
-        found = own.solve(case.structure, case.demand).values()
-        least = min(found, key=lambda each: find_margin([each]))
-        bounded = any(check.bounded for each in found for check in each.checks)
-        return min(MOST_TIED, find_margin([least])), least.mechanism_name, bounded
+    margin: float  # least ratio of all checks [-]
+    linear: float  # of the linear ones [-]
+    mechanism: str
+    ratios: Ratios  # of the check that decides
+    bounded: bool  # whether one is an upper bound
 
-    def describe(sense: float) -> str:
-        """Describe the force from which on all tried ones pass; empty where ties do nothing."""
-        if solve(0.0, sense)[0] >= 1.0:
-            return ""
-        ratio, mechanism, _ = solve(MOST_TIED, sense)
-        if ratio <= 1.0:
-            if not any(tie.anchor or sense * tie.force[0] < 0.0 for tie in ties):
-                return f"no tie holds it: if floors and walls do, give direction = {-sense:g}"
-            most = f"not even {MOST_TIED:g} times the forces of the ties suffice: {mechanism}"
-            return f"{most} has a ratio of {format_ratio(ratio)}"
+
+@dataclass(frozen=True, eq=False)
+class _TieSearch:
+    """Assessments in one sense with multiples of the forces of ties."""
+
+    case: Case
+    sense: float
+    progress: ProgressReport
+    tried: dict[float, _Tied] = field(default_factory=dict)
+
+    @cached_property
+    def ties(self) -> list[AttachedLoad]:
+        """Ties of the case."""
+        return [x for x in self.case.assessment.options["loads"] if x.passive]
+
+    def solve(self, scale: float) -> _Tied:
+        """Return what is found with a multiple of the forces, which is assessed once."""
+        if scale in self.tried:
+            return self.tried[scale]
+        self.progress.show(f"pushed to the {name_side(self.sense)}, {scale:.3g} times", 1)
+        settings = self.case.assessment
+        loads = [x for x in settings.options["loads"] if not x.passive]
+        if scale:
+            loads += [replace(x, force=(scale * x.force[0], scale * x.force[1])) for x in self.ties]
+        options = {**settings.options, "loads": loads}
+        own = replace(settings, directions=(self.sense,), options=options)
+        found = own.solve(self.case.structure, self.case.demand).values()
+        listed = [(x, each.mechanism_name) for each in found for _, x in list_ratios(each)]
+        ratios, name = min(listed, key=lambda each: (not each[0].fails, each[0].decisive))
+        margin = min(MOST_TIED, *(x.decisive for x, _ in listed))
+        linear = min(MOST_TIED, *(x.decisive for x, _ in listed if x.linear))
+        bounded = any(x.bounded for x, _ in listed)
+        return self.tried.setdefault(scale, _Tied(margin, linear, name, ratios, bounded))
+
+    def find_multiple(self, name: str) -> float:
+        """Return from which multiple on a ratio is 1 at all that are tried; infinite if at none."""
+
+        def exceed(scale: float) -> float:
+            return float(getattr(self.solve(scale), name)) - 1.0
+
+        if exceed(MOST_TIED) <= 0.0:
+            return np.inf
         # from above, as another mechanism with less force may pass again
-        scales = MOST_TIED * 2.0 ** (-0.5 * np.arange(1, 11))
-        low = next((scale for scale in scales if solve(scale, sense)[0] < 1.0), 0.0)
-        high = 2.0**0.5 * low or float(scales[-1])
-        scale = brentq(lambda each: solve(each, sense)[0] - 1.0, low, high, xtol=1e-3)
-        of = f"{scale:.3g} times the forces of the ties"
-        if len(ties) == 1:
-            of = f"{scale * np.hypot(*ties[0].force) / kN:.3g} kN of the tie at {ties[0].block}"
-        bounded = ", one by an upper bound alone" * solve(scale, sense)[2]
-        length = describe_tied_length(case.structure)
-        return f"from {of} on, {length}, all forces tried pass its checks{bounded}"
+        scales = [*(MOST_TIED * 2.0 ** (-0.5 * np.arange(1, 11))), 0.0]
+        low = next((scale for scale in scales if exceed(scale) < 0.0), None)
+        if low is None:
+            return 0.0
+        high = 2.0**0.5 * low or float(scales[-2])
+        return float(brentq(exceed, low, high, xtol=1e-3))
 
+    def say_forces(self, scale: float) -> str:
+        """Say a multiple of the forces; of one tie its force."""
+        if len(self.ties) > 1:
+            return f"{scale:.3g} times the forces of the ties"
+        (tie,) = self.ties
+        return f"{scale * np.hypot(*tie.force) / kN:.3g} kN of the tie at {tie.block}"
+
+    def describe(self) -> str:
+        """Describe the force from which on all tried ones pass; empty where ties do nothing."""
+        if self.solve(0.0).margin >= 1.0:
+            return ""
+        most, scale = self.solve(MOST_TIED), self.find_multiple("margin")
+        if scale < np.inf:
+            length = describe_tied_length(self.case.structure)
+            bounded = ", one by an upper bound alone" * self.solve(scale).bounded
+            text = f"from {self.say_forces(scale)} on, {length}, all forces tried pass its checks"
+            text += bounded
+        elif not any(tie.anchor or self.sense * tie.force[0] < 0.0 for tie in self.ties):
+            return f"no tie holds it: if floors and walls do, give direction = {-self.sense:g}"
+        else:
+            times = f"{MOST_TIED:g} times the forces of the ties"
+            text = f"not even {times} suffice: {most.mechanism}"
+            if most.ratios.unshown:
+                text = f"with {times} it {NOT_SHOWN} by displacements: {most.mechanism}"
+            text += f" has a ratio of {most.ratios.range}"
+        linear = self.find_multiple("linear")
+        if linear >= 0.99 * scale:
+            return text
+        alone = f"from {self.say_forces(linear)} on" if linear else "without ties"
+        return f"{text}; the linear check alone is passed {alone}"
+
+    def doubt_lower(self) -> list[Remark]:
+        """Return the doubt of a mechanism that has a lower ratio with stronger ties."""
+        stronger = {x: found.margin for x, found in self.tried.items() if x > 1.0}
+        # of about equal ratios that with the least force
+        scale = min(x for x, margin in stronger.items() if margin < 1.01 * min(stronger.values()))
+        own, least = self.solve(1.0), self.tried[scale]
+        if own.margin < 1.01 * least.margin:
+            return []
+        words = (
+            "{} has a ratio of {} with {:.3g} times the forces of the ties, less than the least, "
+            "{:.3g}, of those given: ties only resist it, so that with these its ratio is no higher"
+        )
+        values = least.mechanism, least.ratios.range, scale, own.margin
+        return [Doubt(words, "take the lower ratio", values)]
+
+
+def note_ties(case: Case) -> list[Remark]:
+    """Return notes on the force of ties with which a sense just passes, and doubts about it."""
+    settings, notes = case.assessment, list[Remark]()
+    ties = any(load.passive for load in settings.options.get("loads", ()))
     for sense in settings.directions if ties else ():
         # without its ties it may not stand
         with suppress(InvalidInput), ProgressReport("forces of ties", None) as progress:
+            search, doubts = _TieSearch(case, sense, progress), list[Remark]()
             try:
-                text = describe(sense)
+                if text := search.describe():
+                    doubts = search.doubt_lower()
             except DidNotConverge as error:
                 text = f"the force of ties with which all checks pass was not found: {error}"
             notes += [f"{NOTE_MARK}pushed to the {name_side(sense)}, {text}"] * bool(text)
+            notes += doubts
     return notes
 
 

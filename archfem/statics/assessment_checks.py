@@ -32,7 +32,10 @@ from archfem.units import STANDARD_GRAVITY, format_ratio
 # Outcome of a check that passes with the weights of single blocks alone
 BY_SPLIT = "passes or fails by the split of weights"
 
-# What the doubt of such a check begins with
+# Outcome of a check whose path ends early, and whose ratio is less than 1
+NOT_SHOWN = "is not shown to pass"
+
+# What the doubt of a check by the split of weights begins with
 OF_SPLIT = "passes with weights at the centroids of blocks"
 
 # Outcome of a check that passes with the e* of the mechanism found, and fails with e* = 1
@@ -191,6 +194,8 @@ class AssessmentCheck:
         bounded: whether the ratio is an upper bound, by which a check fails and does not pass.
         floor: least ratio of all mechanisms of this α₀, that of e* = 1; None where it is the first.
         amplified: amplification and a_Z of a floor spectrum, in brackets; "" of others.
+        at_least: whether the ratio is a lower bound, by which a check passes and does not fail: the
+            path ends before α vanishes, and its end counts as d₀*.
     """
 
     name: str
@@ -205,6 +210,12 @@ class AssessmentCheck:
     bounded: bool = False
     floor: float | None = None
     amplified: str = ""
+    at_least: bool = False
+
+    @property
+    def unshown(self) -> bool:
+        """Whether it neither passes nor fails, as its ratio is a lower bound and less than 1."""
+        return self.at_least and self.decisive < 1.0
 
     @property
     def passes(self) -> bool:
@@ -216,9 +227,11 @@ class AssessmentCheck:
 
     @property
     def outcome(self) -> str:
-        """Whether it "passes" or "fails", or that fill, split of weights or mechanism decide."""
+        """Whether it "passes" or "fails", or that fill, split or mechanism decide, or none does."""
         if self.over_fill is not None and self.over_fill.needed:
             return self.over_fill.outcome
+        if self.unshown:
+            return NOT_SHOWN
         found = "passes" if self.ratio >= 1.0 else "fails"
         for least, doubtful in ((self.bodies, BY_SPLIT), (self.floor, BY_MECHANISM)):
             if found == "passes" and least is not None and least < 1.0:
@@ -242,11 +255,12 @@ class AssessmentCheck:
     @property
     def ratios(self) -> str:
         """The ratio as text, or its decisive range over a fill, or from e* = 1 on."""
+        at_least = "at least " * self.unshown
         floor = "e* = 1, whatever moves at this alpha_0"
         if self.over_fill is not None:
             of = floor if self.floor is not None else "one weight a body" * bool(self.bodies)
-            return self.over_fill.format_ends(digits=3) + f" ({of})" * bool(of)
-        own = format_ratio(self.ratio)
+            return at_least + self.over_fill.format_ends(digits=3) + f" ({of})" * bool(of)
+        own = at_least + format_ratio(self.ratio)
         return own if self.floor is None else f"{format_ratio(self.floor)} ({floor}) to {own}"
 
     @property
@@ -449,8 +463,14 @@ def add_fill_ranges(found: Any, others: Mapping[FillAssumption, Any]) -> Any:
     found = replace(found, doubts=(*found.doubts, *unsure))
     values = [*ranges.values()][-1].values
     least = others[min(values, key=values.__getitem__)] or found
+    # a lower bound of one is none of all
+    cut = all(getattr(other and other.displacement, "at_least", False) for other in others.values())
     changed = [
-        {k: replace(getattr(each, k), over_fill=ranges[k]) for k in ranges if getattr(each, k)}
+        {
+            k: replace(check, over_fill=ranges[k], at_least=check.at_least and cut)
+            for k in ranges
+            if (check := getattr(each, k))
+        }
         for each in (found, least)
     ]
     return replace(found, **changed[0], least=replace(least, **changed[1]))

@@ -115,7 +115,8 @@ class KinematicAssessment(ResultDisplay):
         control: name of the block whose centroid is the control point.
         path: finite motion of the mechanism; None where nothing moves.
         notes: assumptions of the result, and omissions on the safe side.
-        doubts: why a ratio may be too high, by how much is not known, each with a remedy.
+        doubts: why a ratio may be too high, or too low to pass, by how much is not known, each with
+            a remedy.
         least: that under the assumption on a fill that has the least ratio; None without a fill.
         of_bodies: the same with one weight for each body that moves as one, at its centroid, which
             raises e* and lowers both ratios; None of an assessment with such weights.
@@ -220,7 +221,9 @@ class KinematicAssessment(ResultDisplay):
         vanishes = f"d_0* {self.d_0_star:.4g} m, " if np.isfinite(self.d_0_star) else ""
         last, linear = self.checks[-1], self.linear.decisive
         apart = last.ratio if self.displacement else linear
-        outcome = describe_difference(last.decisive, apart, linear) or last.outcome
+        outcome = last.outcome
+        if not last.unshown:
+            outcome = describe_difference(last.decisive, apart, linear) or outcome
         return (
             f"KinematicAssessment of '{self.structure.name}': alpha_0 {self.alpha_0:.4g}, a_0* "
             f"{self.a_0_star:.4g} m/s², {vanishes}{'; '.join([outcome, *self._lower])}"
@@ -665,8 +668,7 @@ class _Oscillator:
             late = f"beyond d* = {held:.3g} m", "there the curve"
             place, what = late if self.holds else ("from rest", "the whole curve, and each ratio,")
             words = f"{place} joints open or slide that the mechanism keeps closed: {what} is {{}}"
-            remedy = "a time history with large displacements can test it"
-            found.append(Doubt(words, remedy, (UPPER_BOUND,)))
+            found.append(Doubt(words, self.remedy, (UPPER_BOUND,)))
         return found + doubt_stretches(self.stretches) + doubt_loads(self.placed, self.given.loads)
 
     @cached_property
@@ -722,11 +724,31 @@ class _Oscillator:
                 moved = replace(found.displacement, bodies=whole.displacement.ratio)
                 found = replace(found, displacement=moved)
         split = [doubt for check in found.checks for doubt in check.doubt_split()]
-        return replace(found, doubts=(*found.doubts, *split))
+        return replace(found, doubts=(*found.doubts, *split, *self._doubt_end(found)))
+
+    def _doubt_end(self, found: KinematicAssessment) -> list[Doubt]:
+        """Return the doubt of a ratio below 1 by the end of a path at which α does not vanish."""
+        if not (found.displacement and found.displacement.unshown):
+            return []
+        words = (
+            "the ratio by {} is a lower bound, as the end of the path, d* = {:.4g} m, counts as "
+        )
+        words += "d_0*: neither that it passes nor that it fails is shown"
+        end = float(self.curve["d"][-1])
+        return [Doubt(words, self.remedy, (found.displacement.name, end))]
+
+    @property
+    def remedy(self) -> str:
+        """What tests a ratio of displacements; no run, where there are ties."""
+        if self.placed.ties:
+            return "runs leave out ties, and the linear check alone is left"
+        return "a time history with large displacements can test it"
 
     def _check_displacement(self) -> AssessmentCheck:
         """Check the displacement of the capacity curve against the spectrum."""
         given, curve = self.given, (self.curve["d"].values, self.curve["a"].values)
         check = given.rules.check(self.spectrum, given.confidence_factor, *curve)
         higher = not check.at_rest and bool(self.opens or doubt_stretches(self.stretches))
-        return replace(check, bounded=self.bounded or higher)
+        assert self.path is not None
+        at_least = self.path.end is not PathEnd.FALLS
+        return replace(check, bounded=self.bounded or higher, at_least=at_least)

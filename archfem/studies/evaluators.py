@@ -236,7 +236,8 @@ def evaluate_assessment(case: Case) -> Findings:
         found = case.assessment.solve(case.structure, case.demand).values()
     doubts += [doubt for each in found for doubt in each.doubts]
     least = {"least_margin": find_margin(found), "alpha_0": min(float(x.alpha_0) for x in found)}
-    bounds = ["least_margin"] * any(check.bounded for each in found for check in each.checks)
+    checks = [check for each in found for check in each.checks]
+    bounds = ["least_margin"] * any(x.bounded and not x.unshown for x in checks)
     bounds += ["alpha_0"] * any(each.linear.bounded for each in found)
     return least | _name_bounds(bounds) | _state_doubts(doubts)
 

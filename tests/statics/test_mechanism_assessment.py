@@ -14,6 +14,8 @@ from scipy.optimize import brentq
 
 import archfem as af
 from archfem.cases.answers import (
+    Statement,
+    compare_checks,
     describe_margin,
     doubt_ties,
     find_margin,
@@ -21,6 +23,7 @@ from archfem.cases.answers import (
     note_ties,
     state_assessments,
 )
+from archfem.cases.report import margins
 from archfem.cases.report.conclusion import list_facts
 from archfem.cases.report.report_data import ReportData
 from archfem.cases.result_text import note_ties_left_out
@@ -30,6 +33,7 @@ from archfem.statics import LIMIT_STATES, AssessmentCheck, LimitState, mechanism
 from archfem.statics.assessment_checks import (
     BY_MECHANISM,
     BY_SPLIT,
+    NOT_SHOWN,
     UPPER_BOUND,
     describe_difference,
     spectral_acceleration,
@@ -340,6 +344,10 @@ def test_no_force_of_a_tie_suffices_where_what_is_above_it_fails():
         overturn(2.0, 1.0, 20e3),
     )
     says = f"not even 4 times the forces of the ties suffice: {name} has a ratio of {ratio:.3g}"
+    # all of it at e* = 1: q α g / FC = PGA, and α 160 2 = 160 0.25 + 2 t
+    pga = 0.25 * (1.4 - 0.4 * 2.4 * 0.25) * 9.80665 / 9.81
+    needed = 160.0 * (1.35 * pga / 2.0 - 0.125)
+    says += f"; the linear check alone is passed from {needed:.3g} kN of the tie at block 1 on"
     assert note_ties(case) == [f"note: pushed to the right, {says}"]
     found = case.assessment.solve(case.structure, None)
     assert list(found) == ["right", f"right, {name}"]
@@ -561,6 +569,108 @@ def test_a_tie_holds_its_point_along_the_motion():
     assert turns[-1] > 0.1
     assert found.path.factors[-1] < 2e-3
     assert assess_tied(4.0, 5e3).alpha_0 == pytest.approx((10.0 + 5.0 * 4.0) / 80.0, rel=1e-4)
+
+
+def fold_below(turn, high=0.5, low=3.0):
+    """Centroids (2, 2) [m], as a lower block turns and the upper one's top left corner is held."""
+    turned = np.array([[cos(turn), sin(turn)], [-sin(turn), cos(turn)]])
+    knee = turned @ (-0.5, low) + (0.25, 0.0)
+    back = brentq(lambda t: knee[0] + 0.25 - high * sin(t), -0.1, 0.5 * pi)
+    upper = np.array([[cos(back), -sin(back)], [sin(back), cos(back)]])
+    return np.array(
+        [turned @ (-0.25, low / 2) + (0.25, 0.0), knee + upper @ (0.25, high / 2)]
+    ), knee
+
+
+def factor_below(turn, weights=(3.0, 0.5), step=1e-5):
+    """α of the fold by virtual work, of which the tie has none."""
+    ahead, behind = (np.array(weights) @ fold_below(x)[0] for x in (turn + step, turn - step))
+    dx, dy = ahead - behind
+    return dy / dx
+
+
+def slack_below(turn):
+    """Moment of the upper block about its knee without the tie, 0 where the tie slackens."""
+    (_, upper), knee = fold_below(turn)
+    right, up = upper - knee
+    return right + factor_below(turn) * up
+
+
+@pytest.fixture(scope="module")
+def held_top():
+    """Case of a block of 0.5 × 3 m with one of 0.5 m on it, and a tie of 3 kN at its top."""
+    spectrum = {"code": "NTC-2018", "ag": 0.3, "f0": 2.4, "tc_star": 0.32, "site": "B"}
+    tie = {"block": "block 2", "point": [-0.25, 3.5], "force": [-3e3, 0.0], "passive": True}
+    column = {"shape": "column", "breadth": 0.5, "heights": [3.0, 0.5]}
+    assessment = {"spectrum": spectrum, "direction": 1, "loads": [tie]}
+    return af.Case.of({"structure": column, "assessment": assessment})
+
+
+def test_a_path_that_ends_early_has_a_lower_bound(held_top, verified):
+    """Its end, where the tie slackens, counts as d₀*; the weights move by 1.5 m/s both: d* = d_C.
+
+    A stronger tie turns no pass into a fail.
+    """
+    settings = held_top.assessment
+    tie = settings.options["loads"][0]
+    own = replace(settings, options={**settings.options, "loads": [replace(tie, force=(-6e3, 0))]})
+    (found,) = own.solve(held_top.structure, None).values()
+    end = brentq(slack_below, 0.01, 0.15)
+    assert found.path.end is PathEnd.RELEASED
+    assert found.path.factors[-1] == pytest.approx(factor_below(end), rel=0.02) != 0.0
+    control = int(found.control == "block 2")
+    place = [fold_below(x)[0][control, 0] - fold_below(0.0)[0][control, 0] for x in (0.0, end)]
+    capacity = 0.4 * place[1]
+    turn = brentq(
+        lambda x: fold_below(x)[0][control, 0] - fold_below(0.0)[0][control, 0] - capacity, 0.0, end
+    )
+    period = 1.68 * pi * sqrt(capacity / (G * factor_below(turn) / 1.35))
+    spectrum = replace(SPECTRUM, ag=0.3, damping=0.08)
+    demand = float(spectrum.horizontal(period)) * 9.80665 * (period / 2 / pi) ** 2
+    check, linear = found.displacement, found.linear.ratio
+    assert (found.e_star, check.ratio) == pytest.approx((1.0, capacity / demand), rel=5e-3)
+    verified("path that ends early: ratio", capacity / demand, "virtual work", check.ratio)
+    assert check.at_least
+    assert (check.outcome, found.passes, check.ratio < 1.0) == (NOT_SHOWN, False, True)
+    ratio = f"{check.ratio:.3g}"
+    assert f"{NOT_SHOWN}, the spectrum may be at least {ratio} times as strong" in str(found)
+    (doubt,) = (x for x in found.doubts if "a lower bound" in str(x))
+    assert str(doubt).endswith("runs leave out ties, and the linear check alone is left")
+    says = f"passes the linear check ({linear:.3g}), and {NOT_SHOWN} by displacements (at least "
+    says += f"{ratio}), as the path ends before alpha vanishes"
+    headline = f"least margin at least {ratio}, by NTC-2018 SLV: {says}"
+    assert describe_margin([found]) == headline
+    stated = state_assessments({"right": found}, [])
+    data = ReportData(held_top, {})
+    vars(data)["statements"] = {"assessment": Statement.read(stated.as_file("x")["x.json"])}
+    assert f"it {says}" in dict(list_facts(data))["verdict"]
+    (margin,) = margins.describe_margin(data)
+    assert margin.startswith(f"the least margin is at least {ratio}, on the NTC-2018 spectrum")
+    assert margin.endswith("by NTC-2018 SLV, right, a lower bound")
+    # a mechanism that fails, fails
+    ratios = [x for _, x in list_ratios(found)]
+    other = ratios[1]._replace(least=0.9, most=0.9)
+    assert compare_checks([*ratios, other]) == "another mechanism or sense does not pass (0.9)"
+    failing = [ratios[0]._replace(least=0.8, most=0.8), ratios[1]]
+    assert compare_checks(failing).startswith(f"fails the linear check (0.8), and {NOT_SHOWN}")
+
+
+def test_a_mechanism_of_stronger_ties_puts_the_ratio_of_given_ones_in_doubt(held_top):
+    """The note contradicts no headline; the linear check needs α W h / 2 = W b / 2 + t h."""
+    (found,) = held_top.assessment.solve(held_top.structure, None).values()
+    own, weight = find_margin([found]), 35.0
+    assert own > 1.0
+    alpha = 1.35 / 2.0 * 0.3 * (1.4 - 0.4 * 2.4 * 0.3) * 9.80665 / 9.81  # e* = 1
+    needed = (alpha * weight * 1.75 - weight * 0.25) / 3.5
+    note, doubt = map(str, note_ties(held_top))
+    ratio = "a ratio of at least 0.886"  # that of the test above
+    assert note == (
+        f"note: pushed to the right, with 4 times the forces of the ties it {NOT_SHOWN} by "
+        f"displacements: two-hinge mechanism has {ratio}; the linear check alone is passed from "
+        f"{needed:.3g} kN of the tie at block 2 on"
+    )
+    assert doubt.startswith(f"two-hinge mechanism has {ratio} with 1.41 times the forces of the ti")
+    assert f"less than the least, {own:.3g}, of those given" in doubt
 
 
 def test_the_end_of_a_path_by_a_tie_is_read_from_no_text(monkeypatch):

@@ -171,10 +171,12 @@ def _say_factor(data: ReportData, factor: float, kind: str) -> str:
         if check.displaced is not None and check.decisive == factor:
             by = f"{format_ratio(check.displaced)} by displacements ({check.name})"
             until = f" until it begins to move, {by}"
-    rated = data.statements["rating"].rows if kind == KINDS[1] else []
+    rated = data.statements["rating"].rows if kind == KINDS[2] else []
     for row in (x for x in rated if x.numbers["least"] == factor):
         until = "".join(f", {x}" for x in (row.demand, row.numbers.get("state")) if x)
-    return f"{'at most ' * (factor in bounds)}{format_ratio(factor)} times {kind}{until}"
+    at_least = any(check.unshown and check.decisive == factor for check in checks)
+    bound = "at least " if at_least else "at most " * (factor in bounds)
+    return f"{bound}{format_ratio(factor)} times {kind}{until}"
 
 
 def _rank_verdict(data: ReportData) -> tuple[int, dict[str, float]]:
@@ -207,7 +209,7 @@ def _rank_verdict(data: ReportData) -> tuple[int, dict[str, float]]:
 def _say_plainly(data: ReportData, doubtful: Sequence[str]) -> Iterator[tuple[str, str]]:
     """Yield the answer for a client, in the lines of the head."""
     checks = list_checks(data)
-    failed = [check for check in checks if check.needed or check.least < 1.0]
+    failed = [x for x in checks if x.needed or (x.least < 1.0 and not x.unshown)]
     found = dict.fromkeys(margins.judge_check(data, check)[0] for check in failed or checks)
     # of two senses one may say more than the other
     longest = [x for x in found if sum(y.startswith(x) for y in found) == 1]

@@ -70,10 +70,13 @@ def judge_check(data: ReportData, check: Ratios) -> tuple[str, str]:
     if check.needed:
         words = f"; it is passed only with {check.needed}"
         return f"it does not withstand under some assumptions on the fill {of}", words
-    if check.least < 1.0:
-        return f"it does not withstand {of}", ", which it fails"
     differs = compare_checks(read_numbers(Ratios, data.statements.get("assessment")))
     differs = f"on {of} it {differs}" * bool(differs)
+    if check.unshown:
+        words = differs or f"it is not shown to withstand {of}, by {check.range}"
+        return f"{words}. {_say_test(data)}", ", a lower bound"
+    if check.least < 1.0:
+        return f"it does not withstand {of}", ", which it fails"
     if check.by_split:
         words = ", which it fails with one weight a body"
         return differs or f"it withstands or not, by the split of weights, {of}", words
@@ -210,16 +213,16 @@ def describe_push(data: ReportData, name: str, push: PushFactors) -> Iterator[st
 
 def _describe_check(data: ReportData, check: Ratios) -> tuple[float, list[str]]:
     """Return the ratio of a check of an assessment, and its sentences."""
-    over = OVER_FILL * (check.most not in (check.least, check.decisive))
+    over = OVER_FILL * (check.most not in (check.least, check.decisive, np.inf))
     by = f"on {name_spectrum(data)}, by {check.name}"
     moves = _say_motion(data, check.least, peak_of_spectrum(data.case))
     if check.moved is not None and moves:  # what moves at less than the push that begins it is
         begins = f"the check passes for what is at rest, and {moves}"  # judged by how far
         return check.moved, [f"{check.moved:.3g} by displacements, {by}", begins]
     _, fails = judge_check(data, check)
-    texts = [f"{check.ends:ratio}{check.beside}, {by}{fails}{over}"]
+    texts = [f"{check.range}{check.beside}, {by}{fails}{over}"]
     if check.moved is not None:
-        texts.append(f"{check.ends:ratio} times the spectrum begins to move it")
+        texts.append(f"{check.range} times the spectrum begins to move it")
         texts.append(f"if it moved, it could be displaced by {check.moved:.3g} times the demand")
     return check.decisive, texts
 
