@@ -212,7 +212,7 @@ def state_outcome(
 
 
 def state_scale(
-    found: CollapseScale | MechanismScales, motion: Motion, doubts: Sequence[Doubt]
+    found: CollapseScale | MechanismScales, motion: Motion, remarks: Sequence[Remark]
 ) -> dict[str, str]:
     """Return the files with what is stated of a search of scales, and with its runs."""
     result, pga, words = RESULTS["scale"], motion.pga / STANDARD_GRAVITY, found.sentence
@@ -234,7 +234,7 @@ def state_scale(
     factor += " so far" * (found.interrupted and held > 0.0)
     factor += " by all time steps" * (0.0 < held < found.held)
     row = Row(result, f"'{motion.name}', PGA {pga:.2f} g", words, factor, scales._asdict())
-    stated = Statement([f"{result}: {words}"], [row], found.doubts).with_remarks(doubts)
+    stated = Statement([f"{result}: {words}"], [row], found.doubts).with_remarks(remarks)
     return {**stated.as_file("scale"), **files}
 
 

@@ -13,7 +13,7 @@ from archfem._display import DOUBT_MARK, write_progress_line
 from archfem._files import create_result_folder, intact_file_list, path_inside, read_listed
 from archfem.cases import answers
 from archfem.cases.case import Case
-from archfem.cases.result_text import mark_remarks, record_doubts
+from archfem.cases.result_text import mark_remarks, note_loads_left_out, record_doubts
 from archfem.cases.run import HISTORY_FILE, load_finished_run
 from archfem.commands.cli import ExitCode
 from archfem.commands.run import Command, keep_attempt, name_group, write_results
@@ -83,6 +83,7 @@ def verdict(options: argparse.Namespace) -> int:
     _, falls = check_across(case.structure, {motion.name: motion})
     head, line, text = str(computed).partition("\n")
     text = f"{head}{falls}{_say_steps(case, motion, options)}{line}{text}"
+    text = "\n".join([text, *note_loads_left_out(case)])
     own: Files = {"verdict_range.nc": computed.save, "verdict_range.txt": text}
 
     def draw() -> Files:
@@ -141,9 +142,10 @@ def scale(options: argparse.Namespace) -> int:
             raise KeyboardInterrupt
         doubts += doubt_pieces(case.structure)
         doubts += _compare_with_run(found, _find_run(case, motion, options))
-    files: Files = {**answers.state_scale(found, motion, doubts)}
+    notes = note_loads_left_out(case)
+    files: Files = {**answers.state_scale(found, motion, [*doubts, *notes])}
     doubts += found.doubts
-    lines = [f"{motion.name}: {found}", *mark_remarks(doubts), "", found.table()]
+    lines = [f"{motion.name}: {found}", *mark_remarks(doubts), *notes, "", found.table()]
     if isinstance(found, CollapseScale):
         from archfem.view.studies import draw_scale
 

@@ -18,6 +18,8 @@ from pages import read_page
 
 import archfem as af
 from archfem.cases import run as run_module
+from archfem.cases.report.doubts import HISTORIES, list_notes
+from archfem.cases.report.report_data import ReportData
 from archfem.cases.result_text import ResultTable, record_doubts
 from archfem.cases.run import carry_out, run_time_history
 from archfem.commands import margin
@@ -222,6 +224,54 @@ def test_a_range_in_doubt_has_the_exit_code_of_doubts(small, unplotted, monkeypa
     assert "fill is rigid; cut it" in (out / "first" / "verdict_range.txt").read_text(
         encoding="utf-8"
     )
+
+
+LEFT_OUT = """
+[assessment]
+spectrum = { code = "EC8", ag = 0.1, ground = "A" }
+[[assessment.loads]]
+block = "block 2"
+point = [0.0, 2.0]
+weight = "12 kN"
+force = ["1 kN", "0 kN"]
+[[assessment.loads]]
+block = "block 2"
+point = [0.0, 2.0]
+force = ["-5 kN", "0 kN"]
+passive = true
+"""
+
+
+@pytest.mark.slow
+def test_loads_of_the_assessment_that_a_motion_leaves_out_are_noted(small, unplotted, monkeypatch):
+    """In the results of runs, ranges and scales, and in the conclusion of their report."""
+
+    class Range:
+        doubts, save, plot = (), None, None
+
+        def __str__(self):
+            return "falls in none of 1 variations"
+
+    written = {}
+
+    def keep(command, case, out, text, files, pair=None):
+        written[command] = text
+
+    monkeypatch.setattr(variations, "verdict_range", lambda *given, **options: Range())
+    monkeypatch.setattr(margin, "write_results", keep)
+    small.write_text(small.read_text(encoding="utf-8") + LEFT_OUT, encoding="utf-8")
+    out = small.parent / "out"
+    note = "without the 12 kN of weights, constant forces and ties of [assessment], which limits"
+    run(small)
+    for pair in ("first", "second"):
+        assert note in (out / pair / "summary.txt").read_text(encoding="utf-8")
+    for command in ("verdict", "scale"):
+        af.commands.main([command, str(small), "--pair", "first", "--out", str(out)])
+        assert note in written[command]
+    found = af.cases.open_results(out)
+    said = list_notes(ReportData(found.case, found.runs))[HISTORIES][-1]
+    assert said.startswith(note)
+    assert said.endswith("or as bodies, [structure.standing]")
 
 
 @pytest.mark.slow

@@ -26,7 +26,7 @@ from archfem.cases.answers import (
 from archfem.cases.report import margins
 from archfem.cases.report.conclusion import list_facts
 from archfem.cases.report.report_data import ReportData
-from archfem.cases.result_text import note_ties_left_out
+from archfem.cases.result_text import note_loads_left_out
 from archfem.cases.toml_file import read_object
 from archfem.limit.finite_mechanism import PathEnd, PathFollower
 from archfem.statics import LIMIT_STATES, AssessmentCheck, LimitState, mechanism_assessment
@@ -476,10 +476,20 @@ def test_a_check_that_alone_fails_is_in_every_headline_with_the_force_of_a_tie()
     other = f"; pushed to the right {ratios[0]:.3g} by the same check"
     assert margin.endswith(f", pushed to the left: {says}{other}")
     needed = 160.0 * (1.35 * pga / 2.0 - 0.125)
-    assert note_ties_left_out(case) == [
+    assert note_loads_left_out(case) == [
         "note: without the ties of [assessment], which limits and runs leave out"
     ]
-    assert note_ties_left_out(af.Case.of({"structure": column})) == []
+    assert note_loads_left_out(af.Case.of({"structure": column})) == []
+    load = {"block": "block 1", "point": [0.5, 4.0]}
+    floors = [load | {"weight": "3 kN"}, load | {"weight": "4 kN", "force": ["1 kN", "0 kN"]}]
+    assessment = {"spectrum": spectrum, "loads": [tie, *floors]}
+    loaded = af.Case.of({"structure": column, "assessment": assessment})
+    (said,) = note_loads_left_out(loaded)
+    assert said.startswith("note: without the 7 kN of weights, constant forces and ties of [assess")
+    assert said.endswith(
+        "as [structure.floors] of a wall, which columns across it have too, or as "
+        "bodies, [structure.standing]"
+    )
     assert note_ties(case) == [
         f"note: pushed to the right, from {needed:.3g} kN of the tie at block 1 on, in all for 1 m "
         "of width, without a factor on the tie, all forces tried pass its checks, one by an upper "

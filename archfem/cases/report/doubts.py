@@ -5,12 +5,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from archfem._display import NOTE_MARK
 from archfem._files import read_sealed_json
 from archfem.cases.answers import MATCHED, RESULTS, Ratios, read_numbers
 from archfem.cases.report.motion_rules import check_motions, note_checks
 from archfem.cases.report.report_data import ReportData
 from archfem.cases.report.study_findings import list_studied
-from archfem.cases.result_text import OF_GIVEN_FILL
+from archfem.cases.result_text import OF_GIVEN_FILL, note_loads_left_out
 from archfem.dynamics.collapse_state import COLLAPSE_STATES, FALLEN_STATES, RANGE_REMEDY
 from archfem.dynamics.history import History
 from archfem.dynamics.verdict_range import MAX_RATIO_OF_DISPLACEMENTS, VerdictRange, property_text
@@ -131,6 +132,7 @@ def object_to_motions(data: ReportData) -> str:
     rules = [x.met or x.required.startswith("no rule") for x in check_motions(data)] or [False]
     outcomes = {x.verdict.outcome for x in data.runs.values()}
     reasons = {
+        "they leave out the loads of [assessment]": bool(note_loads_left_out(data.case)),
         "their displacements are small": data.case.analysis.displacements != "large",
         "outcomes are unknown": not outcomes <= {*COLLAPSE_STATES},
         f"{join_words(data.missing)} were not run": bool(data.missing),
@@ -186,8 +188,9 @@ def list_notes(data: ReportData) -> dict[str, list[str]]:
         # has what is not checked across
         if (own := [x for x in each.notes if not x.startswith((OF_GIVEN_FILL, UNCHECKED_ACROSS))])
     }
-    notes |= {HISTORIES: missed} if (missed := note_checks(data)) else {}
-    return notes
+    left_out = [x.removeprefix(NOTE_MARK) for x in note_loads_left_out(data.case)]
+    missed = [*note_checks(data), *left_out * bool(data.runs)]
+    return notes | ({HISTORIES: missed} if missed else {})
 
 
 def list_ranges(data: ReportData, found: VerdictRange) -> list[tuple[str, str, str]]:

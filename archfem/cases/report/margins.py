@@ -13,6 +13,7 @@ from archfem.cases.report.outcomes import find_worst, sentence
 from archfem.cases.report.report_data import ReportData
 from archfem.cases.report.scales import describe_scales
 from archfem.cases.report.study_findings import OVER_SITE, find_least
+from archfem.cases.result_text import note_loads_left_out
 from archfem.dynamics.collapse_state import COLLAPSE_STATES, FALLEN_STATES
 from archfem.dynamics.rigid_body.rocking_body import describe_first_fall, say_scale
 from archfem.limit.instability import list_margins_at_rest
@@ -92,6 +93,8 @@ def judge_check(data: ReportData, check: Ratios) -> tuple[str, str]:
 
 def _say_test(data: ReportData) -> str:
     """Say whether the runs decide what a ratio that is an upper bound does not."""
+    if not data.runs and note_loads_left_out(data.case):
+        return "No run can test it, for runs leave out the loads of [assessment]"
     if not data.runs:
         return "Time histories with large displacements under motions of this spectrum can test it"
     if objection := object_to_motions(data):
