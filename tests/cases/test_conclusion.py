@@ -718,6 +718,9 @@ def test_a_part_of_the_motions_that_are_needed_decides_no_survival(
     assert (f"; not run: {left}" in stated) is bool(left)
 
 
+TIE = [{"block": "block 1", "point": [0.0, 1.0], "force": [-1e3, 0.0], "passive": True}]
+
+
 @pytest.mark.parametrize(
     ("change", "outcome", "says"),
     [
@@ -729,18 +732,20 @@ def test_a_part_of_the_motions_that_are_needed_decides_no_survival(
         ({"matched": False}, "stands", "the runs do not decide, for they are not matched to it, "),
         ({"displacements": "small"}, "stands", "the runs do not decide, for their displacements "),
         ({"ag": 0.25}, "stands", "the runs do not decide, for their target is another spectrum"),
+        ({"loads": TIE}, "stands", "the runs do not decide, for they leave out the loads of [asse"),
     ],
 )
 def test_a_matched_suite_is_the_test_of_an_upper_bound_on_its_spectrum(change, outcome, says):
     """Unless it is weaker than the spectrum, of another, or in small displacements."""
     given = dict(change)
+    loads = given.pop("loads", [])
     spectrum = {"code": "EC8", "ag": given.pop("ag", 0.2), "ground": "A"}
     pairs = {name: {"synthetic": {"seed": k, "duration": 1.0}} for k, name in enumerate("abc")}
     tables = {
         "structure": {"shape": "column", "breadth": 0.5, "heights": [1.0, 1.0]},
         "model": {"fidelity": "rigid", "displacements": given.pop("displacements", "large")},
         "suite": {"matched": True, "target": SPECTRUM["spectrum"], "pairs": pairs} | given,
-        "assessment": {"spectrum": spectrum},
+        "assessment": {"spectrum": spectrum, "loads": loads},
     }
     runs = {"a": verdict_of(outcome), "b": verdict_of(), "c": verdict_of()}
     data = data_of(af.Case.of(tables), **runs)
@@ -770,6 +775,8 @@ def test_a_matched_suite_is_the_test_of_an_upper_bound_on_its_spectrum(change, o
         assert f"its ratio, {floor:.3g}, is an upper bound. {says}" in verdict
     vars(data)["runs"] = {}
     tests = "an upper bound. Time histories with large displacements under motions of this spec"
+    if loads:
+        tests = "an upper bound. No run can test it, for runs leave out the loads of [assessment]"
     assert tests in head_of(conclusion.list_facts(data))
     # the sense whose ratio is no bound says nothing more
     left = ratios._replace(directions=["left"], bounded=False)
