@@ -189,8 +189,8 @@ class AssessmentCheck:
             checked.
         source: clause of the code.
         over_fill: decisive ratios over all assumptions on a fill; None without one.
-        bodies: ratio with one weight for each body that moves as one, at its centroid; None where
-            each body has one anyhow.
+        bodies: ratio with one weight for each body that moves as one, at its centroid, and one for
+            each load; None where each body has one anyhow.
         bounded: whether the ratio is an upper bound, by which a check fails and does not pass.
         floor: least ratio of all mechanisms of this α₀, that of e* = 1; None where it is the first.
         amplified: amplification and a_Z of a floor spectrum, in brackets; "" of others.

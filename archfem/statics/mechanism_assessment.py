@@ -118,8 +118,9 @@ class KinematicAssessment(ResultDisplay):
         doubts: why a ratio may be too high, or too low to pass, by how much is not known, each with
             a remedy.
         least: that under the assumption on a fill that has the least ratio; None without a fill.
-        of_bodies: the same with one weight for each body that moves as one, at its centroid, which
-            raises e* and lowers both ratios; None of an assessment with such weights.
+        of_bodies: the same with one weight for each body that moves as one, at its centroid, and
+            one for each load, which raises e* and lowers both ratios; None of an assessment with
+            such weights.
         above: that of what is above a bed of a stack, if it has a lower ratio than the mechanism of
             least α₀, as above a tie; it must pass too.
     """
@@ -536,7 +537,7 @@ class _Oscillator:
     path: MechanismPath | None
     holds: int  # last place at which the joints that do not move hold
     fill: bool  # whether some of the loads are the weight of a fill
-    by_body: bool = False  # whether each body that moves as one has one weight
+    by_body: bool = False  # whether each body that moves as one has one weight, beside the loads
     searched: Doubt | None = None  # about a factor that was searched without dilatancy
     ties: str = ""  # forces of the ties, in words
 
@@ -546,11 +547,13 @@ class _Oscillator:
         assert self.path is not None
         speed, _, turn = self.path.velocity.T
         weights, speeds, bodies = [], [], []
-        for k, place, weight in self.placed.masses:
+        # a fill belongs to the body below it; M* sums the weights of bodies and of loads apart
+        loads = len(self.placed.masses) - sum(bool(load.weight) for load in self.given.loads)
+        for number, (k, place, weight) in enumerate(self.placed.masses):
             if (body := self.path.mechanisms[0].body[k]) >= 0:
                 weights.append(weight)
                 speeds.append(speed[k] - turn[k] * (place[1] - self.placed.centroids[k, 1]))
-                bodies.append(body)
+                bodies.append(body if number < loads else -number)
         moved = self.placed.direction * np.array(speeds)
         if not self.by_body:
             return np.array(weights), moved

@@ -1410,6 +1410,23 @@ def test_courses_that_move_as_one_raise_both_ratios(verified):
     assert "weights are at the centroids" not in str(whole)
 
 
+def test_a_load_is_a_weight_beside_that_of_its_body(verified):
+    """Circolare 7/2019, C8.7.1.2.1: M* sums weights of bodies and of what they carry apart."""
+    column, loads = af.column(breadth=0.5, heights=[0.9] * 2), [("block 1", 0.9), ("block 2", 1.8)]
+    weights, heights = np.array([18.0, 5.0, 9.0]), np.array([0.9, 0.9, 1.8])
+    floors = [
+        af.masonry.AttachedLoad(name, (0.0, y), weight=1e3 * weight)
+        for (name, y), weight in zip(loads, weights[1:], strict=True)
+    ]
+    tie = af.masonry.AttachedLoad("block 1", (0.0, 0.9), force=(-1.0e3, 0.0), passive=True)
+    found = af.kinematic_assessment(column, SPECTRUM, loads=[tie, *floors])
+    factor = (0.25 * weights.sum() + 0.9) / (weights @ heights)
+    share, acceleration = oscillator(weights, heights, factor)
+    expected = {"alpha_0": factor, "e_star": share, "a_0_star": acceleration}
+    check_values(found.of_bodies, expected, verified, "one body with two floors", 1e-6)
+    assert share < 0.95
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("scale", "count"),
