@@ -293,6 +293,23 @@ def say_loads_left_out(case: Case) -> str:
     return f", without the loads of {named}" if named else ""
 
 
+def note_loads_left_out(case: Case) -> list[str]:
+    """Return a note that results have no loads of the assessment, if the case has any."""
+    loads = case.assessment.options.get("loads", ())
+    weight = sum(load.weight for load in loads)
+    forces = any(any(load.force) and not load.passive for load in loads)
+    ties = any(load.passive for load in loads)
+    kinds = [f"{weight / kN:.4g} kN of weights"] * (weight > 0.0)
+    kinds += ["constant forces"] * forces + ["ties"] * ties
+    words = f"without the {join_words(kinds)} of [assessment], which limits and runs leave out"
+    if weight:
+        words += (
+            ": give weights that are shaken as [structure.floors] of a wall, which columns across "
+            "it have too, or as bodies, [structure.standing]"
+        )
+    return [f"{NOTE_MARK}{words}"] * bool(kinds)
+
+
 def note_limit(case: Case) -> Iterator[str]:
     """Yield notes on what [limit] gives, and dead load and runs do not count, or other tables."""
     if has_backing(case.limit.fill):

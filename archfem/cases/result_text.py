@@ -297,7 +297,7 @@ def describe_dead_load(result: DeadLoadResult, *, explain: bool = False) -> str:
         *defaults.describe_margins_at_rest(result.case, structure),
         *note_masses(structure, parapets=result.case.parapets),
     ]
-    lines += [*defaults.note_limit(result.case), *note_loads_left_out(result.case)]
+    lines += [*defaults.note_limit(result.case), *defaults.note_loads_left_out(result.case)]
     across = describe_transverse_push(structure)
     if result.case.has_motion and structure.heads.any():
         across = across.replace(UNCHECKED_ACROSS, CHECKED_ACROSS)
@@ -475,26 +475,9 @@ def describe_limit(
         others.append(f"in the other sense: {opposite.sentence} ({rank})")
     others += filter(None, [defaults.describe_fill_defaults(case)])
     others += [f"it begins to move at {site} times {site.site}"] if site else []
-    others += note_loads_left_out(case)
+    others += defaults.note_loads_left_out(case)
     text = describe_collapse(case.structure, found, case.limit, case.parapets)
     return found, "\n".join([text, *others]), site
-
-
-def note_loads_left_out(case: Case) -> list[str]:
-    """Return a note that results have no loads of the assessment, if the case has any."""
-    loads = case.assessment.options.get("loads", ())
-    weight = sum(load.weight for load in loads)
-    forces = any(any(load.force) and not load.passive for load in loads)
-    ties = any(load.passive for load in loads)
-    kinds = [f"{weight / kN:.4g} kN of weights"] * (weight > 0.0)
-    kinds += ["constant forces"] * forces + ["ties"] * ties
-    words = f"without the {join_words(kinds)} of [assessment], which limits and runs leave out"
-    if weight:
-        words += (
-            ": give weights that are shaken as [structure.floors] of a wall, which columns across "
-            "it have too, or as bodies, [structure.standing]"
-        )
-    return [f"{NOTE_MARK}{words}"] * bool(kinds)
 
 
 def _order_senses(found: Collapse) -> tuple[float, ...]:

@@ -13,7 +13,8 @@ from archfem._display import DOUBT_MARK, write_progress_line
 from archfem._files import create_result_folder, intact_file_list, path_inside, read_listed
 from archfem.cases import answers
 from archfem.cases.case import Case
-from archfem.cases.result_text import mark_remarks, note_loads_left_out, record_doubts
+from archfem.cases.defaults import note_loads_left_out
+from archfem.cases.result_text import mark_remarks, record_doubts
 from archfem.cases.run import HISTORY_FILE, load_finished_run
 from archfem.commands.cli import ExitCode
 from archfem.commands.run import Command, keep_attempt, name_group, write_results

@@ -232,7 +232,9 @@ def assess(options: argparse.Namespace) -> int:
             bound = f"{error.last.sentence}; " if isinstance(error, Interrupted) else ""
             write_progress_line("assessment", f"{bound}nothing is kept")
             raise
-    ties = [f"{NOTE_MARK}the force of ties with which all checks pass was not searched to its end"]
+    ties: list[result_text.Remark] = [
+        f"{NOTE_MARK}the force of ties with which all checks pass was not searched to its end"
+    ]
     try:  # a search of many assessments, which may be cut short
         with keep_warnings():  # which are those of the assessment
             ties = [] if options.parts else answers.note_ties(case)
@@ -552,7 +554,7 @@ def _print_run(run: Run, at_rest: DeadLoadResult) -> None:
             f"{float(history.time[-1]):.2f} s{took}; {history.outcome}"
         )
         print(f"wrote {run.path}")
-    said = [defaults.describe_defaults(run.case), *result_text.note_loads_left_out(run.case)]
+    said = [defaults.describe_defaults(run.case), *defaults.note_loads_left_out(run.case)]
     listed = "\n".join(filter(None, said))
     given = run.case.structure, history, at_rest.dead.joints
     across, falls = check_across(run.case.structure, {motion.name: motion})

@@ -252,6 +252,14 @@ class AssessmentCheck:
         remedy = "bonded or tall courses move as one body: take this ratio"
         return [Doubt(words, remedy, (self.name, self.bodies))]
 
+    def doubt_end(self, remedy: str) -> list[Doubt]:
+        """Return the doubt of a check that is neither passed nor failed by the end of a path."""
+        words = (
+            "the ratio by {} is a lower bound, as its capacity, {:.4g} m, is a share of d* at the "
+        )
+        words += "end of the path, as d_0*: neither that it passes nor that it fails is shown"
+        return [Doubt(words, remedy, (self.name, self.capacity))] * self.unshown
+
     @property
     def ratios(self) -> str:
         """The ratio as text, or its decisive range over a fill, or from e* = 1 on."""

@@ -221,10 +221,8 @@ class KinematicAssessment(ResultDisplay):
         """Describe the result in one line."""
         vanishes = f"d_0* {self.d_0_star:.4g} m, " if np.isfinite(self.d_0_star) else ""
         last, linear = self.checks[-1], self.linear.decisive
-        apart = last.ratio if self.displacement else linear
-        outcome = last.outcome
-        if not last.unshown:
-            outcome = describe_difference(last.decisive, apart, linear) or outcome
+        apart = last.ratio * (not last.unshown) if self.displacement else linear
+        outcome = describe_difference(last.decisive, apart, linear) or last.outcome
         return (
             f"KinematicAssessment of '{self.structure.name}': alpha_0 {self.alpha_0:.4g}, a_0* "
             f"{self.a_0_star:.4g} m/s², {vanishes}{'; '.join([outcome, *self._lower])}"
@@ -726,32 +724,19 @@ class _Oscillator:
             if found.displacement is not None and whole.displacement is not None:
                 moved = replace(found.displacement, bodies=whole.displacement.ratio)
                 found = replace(found, displacement=moved)
-        split = [doubt for check in found.checks for doubt in check.doubt_split()]
-        return replace(found, doubts=(*found.doubts, *split, *self._doubt_end(found)))
-
-    def _doubt_end(self, found: KinematicAssessment) -> list[Doubt]:
-        """Return the doubt of a ratio below 1 by the end of a path at which α does not vanish."""
-        if not (found.displacement and found.displacement.unshown):
-            return []
-        words = (
-            "the ratio by {} is a lower bound, as the end of the path, d* = {:.4g} m, counts as "
-        )
-        words += "d_0*: neither that it passes nor that it fails is shown"
-        end = float(self.curve["d"][-1])
-        return [Doubt(words, self.remedy, (found.displacement.name, end))]
+        doubts = [y for x in found.checks for y in (*x.doubt_split(), *x.doubt_end(self.remedy))]
+        return replace(found, doubts=(*found.doubts, *doubts))
 
     @property
     def remedy(self) -> str:
         """What tests a ratio of displacements; no run, where there are ties."""
-        if self.placed.ties:
-            return "runs leave out ties, and the linear check alone is left"
-        return "a time history with large displacements can test it"
+        tied = "runs leave out ties, and the linear check alone is left"
+        return tied if self.placed.ties else "a time history with large displacements can test it"
 
     def _check_displacement(self) -> AssessmentCheck:
         """Check the displacement of the capacity curve against the spectrum."""
         given, curve = self.given, (self.curve["d"].values, self.curve["a"].values)
         check = given.rules.check(self.spectrum, given.confidence_factor, *curve)
         higher = not check.at_rest and bool(self.opens or doubt_stretches(self.stretches))
-        assert self.path is not None
-        at_least = self.path.end is not PathEnd.FALLS
+        at_least = self.path is not None and self.path.end is not PathEnd.FALLS
         return replace(check, bounded=self.bounded or higher, at_least=at_least)

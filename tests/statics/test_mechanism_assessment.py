@@ -23,10 +23,10 @@ from archfem.cases.answers import (
     note_ties,
     state_assessments,
 )
+from archfem.cases.defaults import note_loads_left_out
 from archfem.cases.report import margins
 from archfem.cases.report.conclusion import list_facts
 from archfem.cases.report.report_data import ReportData
-from archfem.cases.result_text import note_loads_left_out
 from archfem.cases.toml_file import read_object
 from archfem.limit.finite_mechanism import PathEnd, PathFollower
 from archfem.statics import LIMIT_STATES, AssessmentCheck, LimitState, mechanism_assessment

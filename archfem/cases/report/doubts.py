@@ -8,10 +8,11 @@ from typing import Any
 from archfem._display import NOTE_MARK
 from archfem._files import read_sealed_json
 from archfem.cases.answers import MATCHED, RESULTS, Ratios, read_numbers
+from archfem.cases.defaults import note_loads_left_out
 from archfem.cases.report.motion_rules import check_motions, note_checks
 from archfem.cases.report.report_data import ReportData
 from archfem.cases.report.study_findings import list_studied
-from archfem.cases.result_text import OF_GIVEN_FILL, note_loads_left_out
+from archfem.cases.result_text import OF_GIVEN_FILL
 from archfem.dynamics.collapse_state import COLLAPSE_STATES, FALLEN_STATES, RANGE_REMEDY
 from archfem.dynamics.history import History
 from archfem.dynamics.verdict_range import MAX_RATIO_OF_DISPLACEMENTS, VerdictRange, property_text

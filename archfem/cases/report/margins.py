@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from archfem.cases.answers import Ratios, compare_checks, read_numbers
-from archfem.cases.defaults import say_loads_left_out
+from archfem.cases.defaults import note_loads_left_out, say_loads_left_out
 from archfem.cases.push_factors import PushFactors, peak_of_spectrum, site_acceleration
 from archfem.cases.report.demands import find_demand, name_spectrum
 from archfem.cases.report.doubts import list_checks, object_to_motions, peak_of_ground
@@ -13,7 +13,6 @@ from archfem.cases.report.outcomes import find_worst, sentence
 from archfem.cases.report.report_data import ReportData
 from archfem.cases.report.scales import describe_scales
 from archfem.cases.report.study_findings import OVER_SITE, find_least
-from archfem.cases.result_text import note_loads_left_out
 from archfem.dynamics.collapse_state import COLLAPSE_STATES, FALLEN_STATES
 from archfem.dynamics.rigid_body.rocking_body import describe_first_fall, say_scale
 from archfem.limit.instability import list_margins_at_rest
