@@ -554,8 +554,8 @@ def _print_run(run: Run, at_rest: DeadLoadResult) -> None:
             f"{float(history.time[-1]):.2f} s{took}; {history.outcome}"
         )
         print(f"wrote {run.path}")
-    said = [defaults.describe_defaults(run.case), *defaults.note_loads_left_out(run.case)]
-    listed = "\n".join(filter(None, said))
+    notes = [defaults.describe_defaults(run.case), *defaults.note_loads_left_out(run.case)]
+    listed = "\n".join(filter(None, notes))
     given = run.case.structure, history, at_rest.dead.joints
     across, falls = check_across(run.case.structure, {motion.name: motion})
     # what all motions do across is printed once, after their runs

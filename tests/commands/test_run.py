@@ -435,10 +435,7 @@ def test_scales_of_the_pairs_of_a_suite_stand_side_by_side(searched, tmp_path, c
     words = " ".join(read_page((out / "report.html").read_text(encoding="utf-8")).words)
     least = f"The least margin is {factors['strong']} on 'strong', at a PGA of "
     assert least in words
-    assert (
-        ", of 2 motions. Of the scales that were run "
-        in words.partition(least)[2]
-    )
+    assert ", of 2 motions. Of the scales that were run " in words.partition(least)[2]
     assert " 'middle' was not scaled." in words
     for pair in ("strong", "weak"):
         assert f"Residual displacement under '{pair}' over the scale" in words

@@ -53,8 +53,8 @@ def find_first_failures(data: ReportData) -> Iterator[str]:
     some += "; the search is unfinished: at less it may, too" * unfinished
     for state in ("falls", "dislocated", "mechanism"):
         made = [(x.states[state], x.pga, x.motion) for x in searches if state in x.states]
-        every = made + [(1.0, peak, name) for name, (x, peak) in unscaled.items() if x == state]
-        first = [(scale * pga, scale, name) for scale, pga, name in every]
+        whole = [(1.0, peak, name) for name, (x, peak) in unscaled.items() if x == state]
+        first = [(scale * pga, scale, motion) for scale, pga, motion in [*made, *whole]]
         # a dislocation beyond a fall says nothing
         if not first or min(first)[0] >= least:
             continue
