@@ -268,7 +268,7 @@ def search_scales(
     The first ones are at `begin`; those that were `found` before are kept. The smallest fall is run
     again if it is not whole.
     """
-    scales, made = found or MechanismScales(definitions), ""
+    scales, made, spent, count = found or MechanismScales(definitions), "", 0.0, 0
     try:
         with ProgressReport(f"scale of {name or 'the motion'}", None) as progress:
             while (scale := _next_scale(scales, precision, between, begin)) is not None:
@@ -276,16 +276,40 @@ def search_scales(
                 progress.show("; ".join(filter(None, [made, f"now {scale:#.3g} ×"])))
                 run = run_scaled(scale)
                 seconds = perf_counter() - began
+                spent += seconds
                 if run.ending is Ending.INTERRUPTED:  # says nothing about the scale
                     raise KeyboardInterrupt
                 scales = scales.with_run(run)
                 fall = run.fall
                 result = f"{fall.kind}{fall.dislocated_stones}" if fall else run.outcome
                 made = f"{scale:#.3g} × the motion: {result}, in {seconds:.2g} s"
+                count += 1
+                if left := _count_left(scales, precision, between, begin):
+                    last = spent / count * left
+                    made += f"; about {left} runs, {last:.2g} s, are left by this time step"
                 progress.show(made, 1)
     except KeyboardInterrupt:
         scales = replace(scales, interrupted=True)
     return scales
+
+
+def _count_left(
+    scales: MechanismScales, precision: float, between: tuple[float, float], begin: Sequence[float]
+) -> int:
+    """Count the runs that are left if it falls from the middle of its bracket on.
+
+    A missing end of the bracket is assumed at the next scale; first mechanisms are not counted.
+    """
+    if scales.definitions != (COLLAPSE_DEFINITION,):
+        return 0
+    bracket, count = scales[COLLAPSE_DEFINITION], 0
+    upper = min(bracket.upper, sqrt(2.0) * scales.runs[-1].scale)
+    falls = sqrt(upper * (bracket.lower or scales.runs[0].scale / sqrt(2.0)))
+    while (scale := _next_scale(scales, precision, between, begin)) is not None:
+        kind = FALLEN_STATES[0] if scale >= falls else "stands"
+        fall = CollapseState(kind, None, (), 0.0, 0.0, True)
+        scales, count = scales.with_run(ScaledRun(scale, {}, Ending.FINISHED, "", fall)), count + 1
+    return count
 
 
 def _next_below_fall(scales: MechanismScales, precision: float, smallest: float) -> float | None:

@@ -895,14 +895,15 @@ def test_cases_are_ranked_by_the_kind_of_their_demand(case, fails):
         "times the site's acceleration by a push",
     )
     assert facts["margin"] == (
-        f"The least margins are of vale 2 {push}; of hill 3 {push}; of road 4 times the vehicle."
+        f"The least margins are of vale 2 {push}; of hill 3 {push}; of road 4 times the "
+        "vehicle, LM1."
     )
     if fails:  # a failure is the worst of whatever kind
         assert facts["verdict"].startswith("The worst of 3 cases is road: Rating for LM1: factor 4")
         return
     assert facts["verdict"] == (
         f"The worst of 3 cases, each by its kind of demand, are vale (2 {push}) and road (4 times "
-        "the vehicle)."
+        "the vehicle, LM1)."
     )
     assert {*parts} < {*facts}
 

@@ -117,13 +117,37 @@ def test_lines_within_a_run_name_its_scale_behind_what_the_last_one_found(monkey
 
     search_scales(shaken, ("collapse",), 0.5, (1.0, 1.5), name="first")
     lines = capsys.readouterr().err.splitlines()
-    within = [re.sub(r"in \S+ s", "in t s", x) for x in lines if "loose blocks" in x]
+    within = [re.sub(r"in \S+ s(; about .* step)?", "in t s", x) for x in lines if "loose" in x]
     assert within[:3] == [
         "scale of first: now 1.00 ×; loose blocks: at 1.00",
         "scale of first: 1.00 × the motion: stands, in t s; now 1.41 ×; loose blocks: at 1.41",
         "scale of first: 1.41 × the motion: dislocated (WC), in t s; now 1.50 ×; loose blocks: "
         "at 1.50",
     ]
+
+
+@pytest.mark.parametrize("threshold", [0.3, 1.7, 4.0])
+def test_lines_of_a_search_estimate_how_many_runs_are_left(threshold, monkeypatch, capsys):
+    """At most two more or less once a fall and a stand are known; their time is by the mean."""
+    monkeypatch.setattr("archfem._display.PROGRESS_INTERVAL", 0.0)
+    clock = iter(np.arange(0.0, 1000.0, 1.5))  # read before and after a run
+    monkeypatch.setattr("archfem.dynamics.scale_search.perf_counter", lambda: next(clock))
+    made = []
+
+    def shaken(scale):
+        kind = "fallen" if scale >= threshold else "stands"
+        made.append(scale)
+        return ScaledRun(scale, {}, Ending.FINISHED, "", CollapseState(kind, None, (), 0, 0, True))
+
+    search_scales(shaken, (COLLAPSE_DEFINITION,), 0.05, (0.1, 10.0), name="first")
+    done = [x for x in capsys.readouterr().err.splitlines() if "now" not in x.rpartition(";")[2]]
+    assert len(done) == len(made)
+    known = next(k for k in range(99) if min(made[: k + 1]) < threshold <= max(made[: k + 1]))
+    for k, line in enumerate(done[:-1]):
+        left, seconds = re.search(r"; about (\d+) runs, (\S+) s, are left by this", line).groups()
+        assert float(seconds) == pytest.approx(1.5 * int(left), rel=0.05)  # two digits
+        assert k < known or abs(int(left) - (len(made) - 1 - k)) <= 2
+    assert "left" not in done[-1]
 
 
 def searched(fails, *, ended=lambda scale: Ending.FINISHED, precision=0.05, between=(0.05, 5.0)):
