@@ -55,7 +55,7 @@ LATE_BOUND_METHODS: Mapping[str, str] = {
     "Rating.plot": "view.collapse:draw_rating",
     "RecordSelection.plot": "view.motions:draw_selection",
     "Structure.plot": "view.structure:draw_structure",
-    "VerdictRange.plot": "view.studies:draw_verdict_range",
+    "VerdictRange.plot": "view.verdicts:draw_verdict_range",
 }
 
 

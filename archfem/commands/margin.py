@@ -148,7 +148,7 @@ def scale(options: argparse.Namespace) -> int:
     doubts += found.doubts
     lines = [f"{motion.name}: {found}", *mark_remarks(doubts), *notes, "", found.table()]
     if isinstance(found, CollapseScale):
-        from archfem.view.studies import draw_scale
+        from archfem.view.verdicts import draw_scale
 
         lines[1:1] = filter(None, [found.mechanism])
         limit = DISLOCATION * shallowest_part(case.structure)[0]

@@ -15,6 +15,7 @@
     structure    structures, joint names, loads, displaced shapes
     studies      studies, IDA, fragility, sensitivity, convergence, accuracy
     style        common style of all figures
+    verdicts     verdicts over uncertain properties and scales
 
 Imports all rooms before it. Start reading at `structure`, then at `style`.
 """

@@ -47,6 +47,6 @@ from .studies import draw_fragility as draw_fragility
 from .studies import draw_ida as draw_ida
 from .studies import draw_study as draw_study
 from .studies import draw_tornado as draw_tornado
-from .studies import draw_verdict_range as draw_verdict_range
 from .style import limit_width as limit_width
 from .style import save as save
+from .verdicts import draw_verdict_range as draw_verdict_range

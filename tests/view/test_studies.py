@@ -12,7 +12,7 @@ from archfem.dynamics.history import Ending
 from archfem.dynamics.motion_scaling import CollapseScale
 from archfem.dynamics.scale_search import MechanismScales, ScaledRun
 from archfem.view import draw_findings, draw_study
-from archfem.view.studies import draw_scale
+from archfem.view.verdicts import draw_scale
 
 FOUND = {
     "weak": {"four joints": np.array([0.3, 0.5, 0.9]), "moves": np.array([0.8, 1.2, np.inf])},
