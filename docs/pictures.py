@@ -33,7 +33,7 @@ SOURCES = {
     "envelope": ("histories",),
     "joint": ("histories",),
     "fall": ("collapse",),
-    "verdict_range": ("studies",),
+    "verdict_range": ("verdicts",),
     "fragility": ("studies",),
     "accuracy": ("studies",),
     "programs": (),

@@ -311,18 +311,22 @@ def list_lower(
 
 
 def describe_difference(displaced: float, apart: float, linear: float) -> str:
-    """Say that it passes by displacements and fails by the linear check; empty where it does not.
+    """Say by which of displacements and linear check it passes; "" where by both or by none.
 
     Args:
         displaced: least ratio of the checks by which it passes [-].
         apart: the same with the weights of blocks apart [-].
         linear: least ratio of all linear checks [-].
     """
-    if not apart >= 1.0 > linear:
+    if not (apart >= 1.0 > linear or apart < 1.0 <= linear < np.inf):
         return ""
-    passes = "passes" if displaced >= 1.0 else "passes or fails, by the split of weights,"
+    passes, then = "passes or fails, by the split of weights,", "fails by"
+    if displaced >= 1.0:
+        passes = "passes"
+    elif apart < 1.0:
+        passes, then = "fails", "passes"
     return (
-        f"{passes} by displacements ({format_ratio(displaced)}), fails by the linear check "
+        f"{passes} by displacements ({format_ratio(displaced)}), {then} the linear check "
         f"({format_ratio(linear)}); no clause that was read says which governs"
     )
 

@@ -521,6 +521,8 @@ def test_a_check_that_alone_fails_is_in_every_headline_with_the_force_of_a_tie()
         ),
         ((0.9, 0.9, 0.6), ""),
         ((1.2, 1.2, 1.1), ""),
+        ((0.73, 0.9, 1.16), "fails by displacements (0.73), passes the linear check (1.16); "),
+        ((0.9, 0.9, np.inf), ""),
     ],
 )
 def test_a_difference_of_checks_is_one_of_passing_and_failing(ratios, words):

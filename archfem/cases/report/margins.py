@@ -76,7 +76,7 @@ def judge_check(data: ReportData, check: Ratios) -> tuple[str, str]:
         words = differs or f"it is not shown to withstand {of}, by {check.range}"
         return f"{words}. {_say_test(data)}", ", a lower bound"
     if check.least < 1.0:
-        return f"it does not withstand {of}", ", which it fails"
+        return differs or f"it does not withstand {of}", ", which it fails"
     if check.by_split:
         words = ", which it fails with one weight a body"
         return differs or f"it withstands or not, by the split of weights, {of}", words
