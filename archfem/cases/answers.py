@@ -521,10 +521,12 @@ class _TieSearch:
         if own.margin < 1.01 * least.margin:
             return []
         words = (
-            "{} has a ratio of {} with {:.3g} times the forces of the ties, less than the least, "
-            "{:.3g}, of those given: ties only resist it, so that with these its ratio is no higher"
+            "pushed to the {}, {} has a ratio of {} with {:.3g} times the forces of the ties, and "
+            "with those given the least is {:.3g}: ties only resist it, so that with these it has "
+            "no higher ratio"
         )
-        values = least.mechanism, least.ratios.range, scale, own.margin
+        side = name_side(self.sense)
+        values = side, least.mechanism, least.ratios.range, scale, own.margin
         return [Doubt(words, "take the lower ratio", values)]
 
 
