@@ -32,6 +32,9 @@ PART_ROLES = ("ring", "pier", "other")
 # 0.4. Rings of five stones, with 2.8 and 0.26, bore 1.1 to 1.5 times the push of rings of many.
 MAX_SPAN, MAX_HOLLOW = 2.5, 0.25
 
+# Cosine of the slope up to which a bed is level as drawn, and a springer has none towards its ring
+LEVEL = 0.999
+
 # Cosine of the angle up to which faces of a springing are parallel [-]
 PARALLEL = 0.98
 
@@ -154,7 +157,7 @@ def _find_strays(
     """Find stones apart from others of their ring or pier: why, and other parts.
 
     A few stones apart carry a pier, lie on one as piers do, or stand between voussoirs. The last
-    stone of a ring is as broad as its pier at one end alone.
+    stone of a ring is as broad as its pier at one end alone, or carries the ring on a level joint.
     """
     parts = np.array(["" if b.fixed or b.role == "other" else b.part for b in blocks])
     sides = parts[pairs]
@@ -177,7 +180,12 @@ def _find_strays(
                 mine = (sides == parts[a]).any(axis=1) & moving
                 usual = float(np.median(depths[mine & same])) if (mine & same).any() else np.inf
                 one_end = depths[mine & ~same].min() < 1.15 * usual
-                if one_end and depth > max(1.3 * usual, np.ptp(blocks[b].points[:, 0]) / 1.05):
+                # a springer has a sloping joint towards the ring, the top of a pier a level one
+                inner = normals[same & (pairs == a).any(axis=1), 1]
+                is_top = min(abs(away[1]), np.abs(inner).min(initial=1.0)) > LEVEL
+                if (one_end or is_top) and depth > max(
+                    1.3 * usual, np.ptp(blocks[b].points[:, 0]) / 1.05
+                ):
                     why = f"{format_mm(depth)} broad as '{blocks[b].name}' below, where its joints"
                     found[a] = f"{why} are {format_mm(usual)} deep", f"'{parts[b]}'"
     for (piece, _), faces in touched.items():
@@ -262,7 +270,7 @@ def _find_pier_tops(
         below, above = pair if normal[1] > 0.0 else pair[::-1]
         low, high, least = blocks[below], blocks[above], depths[(pairs == above).any(axis=1)].min()
         one_ring = low.part == high.part and high.role == "ring" and not low.fixed
-        if one_ring and abs(normal[1]) > 0.999 and depth > 1.3 * least:
+        if one_ring and abs(normal[1]) > LEVEL and depth > 1.3 * least:
             why = (
                 f"{format_mm(depth)} broad on '{low.name}' and {format_mm(least)} at its other end"
             )
