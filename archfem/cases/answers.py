@@ -238,6 +238,10 @@ def state_scale(
     return {**stated.as_file("scale"), **files}
 
 
+# All that is unfavourable in the variations of a rating, which may be left out
+ALL_AT_ONCE, NOT_COMPUTED = "all unfavourable at once", "not computed"
+
+
 def state_ratings(
     rated: Sequence[tuple[Rating, Sequence[Remark]]], varied: ResultTable | None = None
 ) -> Statement:
@@ -256,9 +260,13 @@ def state_ratings(
             lost = [] if np.isnan(each.factor) else each.list_losses()
             words_of = [f"{x:.4g} {of}" if x else f"it does not stand {of}" for x, of in lost]
             at += "".join(f"; {x}" for x in (*words_of, flips) if x)
-            state = {"state": ", ".join(of for _, of in lost)} if lost else {}
+            least, state = each.least, ", ".join(of for _, of in lost)
+            if varied and own:
+                least, state = _compare_at_once(each, code, found.factor, varied, state)
             factor = "-" if np.isnan(each.factor) else format_ratio(each.factor, 4)
-            numbers = {"passes": bool(each.passes), "least": each.least, **state}
+            numbers = {"passes": bool(each.passes), "least": least} | (
+                {"state": state} if state else {}
+            )
             rows.append((each.factor, Row("rating", demand, f"{words}{at}", factor, numbers)))
     sentences = [repr(first)]
     if not np.isnan(first.factor):
@@ -275,12 +283,26 @@ def state_ratings(
     return stated.with_remarks([each for _, own in rated for each in own])
 
 
+def _compare_at_once(
+    rated: Rating, code: str, given: float, varied: ResultTable, state: str
+) -> tuple[float, str]:
+    """Return the least factor, with all that is unfavourable at once too, and its state in words.
+
+    `given` is the factor of the varied vehicle. With an impact on one axle that is no share of it.
+    """
+    (cell,) = [cell for name, cell in varied.rows if name == ALL_AT_ONCE] or ["-"]
+    if "CS 454" in code or cell in ("-", NOT_COMPUTED):
+        return rated.least, ", ".join(filter(None, [state, f"{ALL_AT_ONCE} {NOT_COMPUTED}"]))
+    factor = rated.factor / given * float(cell.replace("does not stand", "0"))
+    return (factor, ALL_AT_ONCE) if factor < rated.least else (rated.least, state)
+
+
 def _say_flips(share: float, varied: ResultTable) -> str:
     """Say with which properties a bridge that passes fails, by a multiple of their factors."""
     factors = {
         name: share * float(cell.replace("does not stand", "0"))
         for name, cell in varied.rows
-        if cell not in ("-", "not computed")
+        if cell not in ("-", NOT_COMPUTED)
     }
     fails = [f"{name} ({x:.3g})" for name, x in factors.items() if x < 1.0]
     return f"fails with {join_words(fails)}" * bool(fails)

@@ -18,6 +18,7 @@ import xarray as xr
 from scipy.stats import qmc
 
 from archfem._validation import check_integer, validate_arguments
+from archfem.cases.answers import ALL_AT_ONCE, NOT_COMPUTED
 from archfem.cases.case import Case
 from archfem.cases.defaults import list_default_keys
 from archfem.cases.result_text import ResultTable
@@ -53,8 +54,7 @@ from archfem.studies.parameter_space import Point, WholePoint
 from archfem.studies.result_store import evaluate_with_progress
 from archfem.units import MPa, in_degrees, in_unit
 
-# Row of a rating with the worst value of each property
-ALL_AT_ONCE = "all unfavourable at once"
+# Row of a rating with abutments that move
 FREE = "abutments free"
 
 # Least coefficient of friction of a variation [-]
@@ -443,6 +443,7 @@ def vary_rating(
         known |= {"all of its passive pressure": found.full_pressure}
         none = {"limit.fill.mobilisation": 0.0, "limit.fill.active": 0.0}
         listed.append(("pressure", "no pressure of the fill", none))
+        listed.append(("pressure", "all of its passive pressure", {"limit.fill.mobilisation": 1.0}))
     if has_backing(found.fill):
         known |= {"no backing": np.nan_to_num(found.without_backing)}
         given = [f"limit.fill.{x}" for x in case.settings["limit"]["fill"] if "backing" in x]
@@ -457,7 +458,7 @@ def vary_rating(
     late = [name for name in (*changes, ALL_AT_ONCE) if name not in known]
     order = sorted(known, key=lambda name: np.nan_to_num(known[name], nan=inf))
     rows = [[name, f"{known[name]:.4g}".replace("nan", "-")] for name in order]
-    rows += [[name, "not computed"] for name in late]
+    rows += [[name, NOT_COMPUTED] for name in late]
     if np.isclose(known.get(FREE, inf), found.factor, rtol=1e-3):
         _, arguments = case.structure.origin or ("", {})
         walls = (f"{x.height:.3g} m high on {x.length:.3g} m" for x in arguments["sidewalls"])
@@ -478,10 +479,17 @@ def _merge_worst(listed: Sequence[Change], known: Mapping[str, float]) -> dict[s
     return {key: value for _, change in worst.values() for key, value in change.items()}
 
 
+# Quantities that no measurement finds, in words
+_UNMEASURED = {
+    "pressure": "pressure of the fill, which is assumed",
+    "width": "width that carries a vehicle, a rule",
+}
+
+
 def _say_spreads(
     vehicle: str, listed: Sequence[Change], known: Mapping[str, float], late: int
 ) -> list[str]:
-    """Return the range of single changes, all at once, and the first quantity to measure."""
+    """Return the range of single changes, all at once, and all quantities by their effect."""
     given = known["the values of the case"]
     single = {k: x for k, x in known.items() if k != ALL_AT_ONCE and np.isfinite(x)}
     least, most = min(single, key=single.__getitem__), max(single, key=single.__getitem__)
@@ -494,12 +502,15 @@ def _say_spreads(
     )
     ends = dict[str, list[float]]()
     for subject, name, _ in listed:
-        # that of a vehicle is a rule, and no measurement finds the pressure of a fill
-        if name in single and subject not in ("width", "pressure"):
+        if name in single:
             ends.setdefault(subject, [given]).append(single[name])
-    first = sorted(ends, key=lambda subject: -float(np.ptp(ends[subject])))[:3]
-    spreads = (f"{each} ({min(ends[each]):.4g} to {max(ends[each]):.4g})" for each in first)
-    return [range_text, *([f"measure first, for {vehicle}: {', '.join(spreads)}"] if first else [])]
+    order = sorted(ends, key=lambda subject: -float(np.ptp(ends[subject])))
+    spreads = [
+        f"{_UNMEASURED.get(each, each)} ({min(ends[each]):.4g} to {max(ends[each]):.4g})"
+        for each in order
+        if np.ptp(ends[each]) > 0.0
+    ]
+    return [range_text, *[f"measure first, for {vehicle}: {', '.join(spreads)}"] * bool(spreads)]
 
 
 def _rate_changed(

@@ -890,10 +890,8 @@ def test_cases_are_ranked_by_the_kind_of_their_demand(case, fails):
         vars(data)["transverse_push"] = np.nan
         stated = answers.Statement(["in words"], [rows[name]])
         vars(data)["statements"] = {rows[name].result: stated}
-    facts, push = (
-        dict(conclusion.list_joint_facts(parts)),
-        "times the site's acceleration by a push",
-    )
+    push = "times the site's acceleration by a push"
+    facts = dict(conclusion.list_joint_facts(parts))
     assert facts["margin"] == (
         f"The least margins are of vale 2 {push}; of hill 3 {push}; of road 4 times the "
         "vehicle, LM1."
@@ -1294,6 +1292,13 @@ def test_the_factor_without_a_code_and_its_place_stand_beside_that_of_the_norm(
     margins = dict(conclusion.list_joint_facts({"A": data, "B": data}))["margin"]
     of = f"{format_ratio(margin)} times the vehicle, lorry{by}, with neither"
     assert margins == f"The least margins are of A {of}; of B {of}."
+    # a state that may have less bounds it from above
+    part = "all unfavourable at once not computed"
+    numbers = {"passes": True, "least": margin, "state": part}
+    rows = [row._replace(numbers=numbers) for row in rows if row.numbers["least"] == margin]
+    vars(data)["statements"] = {"rating": answers.Statement([], rows)}
+    margins = dict(conclusion.list_joint_facts({"A": data, "B": data}))["margin"]
+    assert f"of B at most {of.replace('with neither', part)}." in margins
 
 
 @pytest.mark.parametrize(

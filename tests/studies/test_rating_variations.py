@@ -10,7 +10,7 @@ import pytest
 import archfem as af
 from archfem.cases.analysis_keys import rate_case
 from archfem.studies import variations
-from archfem.studies.variations import _list_rating_changes, vary_rating
+from archfem.studies.variations import _list_rating_changes, _say_spreads, vary_rating
 
 PRINTED = 5e-4
 """Relative: factors are printed with four digits."""
@@ -95,6 +95,21 @@ def test_each_row_is_the_rating_of_a_changed_case(tmp_path):
     assert next(iter(cells)) == least_of_all
     assert [*factors.values()] == sorted(factors.values())
     assert words[1].startswith("measure first, for cart: ")
+
+
+def test_all_quantities_are_ranked_by_what_they_change():
+    """Also the pressure of the fill and the width, which no measurement finds."""
+    listed = [
+        (each, f"{each} {end}", {}) for each in ("width", "rings", "pressure") for end in "ab"
+    ]
+    listed += [("friction of joints", "smooth", {})]
+    values = (0.9, 1.1, 0.8, 1.3, 0.6, 1.8, 1.0)
+    known = dict(zip([name for _, name, _ in listed], values, strict=True))
+    _, ranked = _say_spreads("cart", listed, {"the values of the case": 1.0, **known}, 0)
+    assert ranked == (
+        "measure first, for cart: pressure of the fill, which is assumed (0.6 to 1.8), rings (0.8 "
+        "to 1.3), width that carries a vehicle, a rule (0.9 to 1.1)"
+    )
 
 
 @pytest.mark.parametrize("key", ["breadth", "gap"])

@@ -11,7 +11,7 @@ import numpy as np
 
 from archfem._files import group_of, read_file_list
 from archfem.cases import result_text
-from archfem.cases.answers import RESULTS, Ratios, Row, Statement, read_numbers
+from archfem.cases.answers import NOT_COMPUTED, RESULTS, Ratios, Row, Statement, read_numbers
 from archfem.cases.case import REPORT_KEYS
 from archfem.cases.defaults import list_default_keys, list_materials_and_contacts
 from archfem.cases.push_factors import PushFactors
@@ -173,6 +173,7 @@ def _say_factor(data: ReportData, factor: float, kind: str) -> str:
             until = f" until it begins to move, {by}"
     rated = data.statements["rating"].rows if kind == KINDS[2] else []
     for row in (x for x in rated if x.numbers["least"] == factor):
+        bounds += [factor] * (NOT_COMPUTED in row.numbers.get("state", ""))
         until = "".join(f", {x}" for x in (row.demand, row.numbers.get("state")) if x)
     at_least = any(check.unshown and check.decisive == factor for check in checks)
     bound = "at least " if at_least else "at most " * (factor in bounds)
