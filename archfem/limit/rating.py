@@ -11,15 +11,18 @@ from archfem._display import ResultDisplay, track_progress
 from archfem._typing import Array, Metres, NewtonsPerMetre, Pascals
 from archfem._validation import validate_arguments
 from archfem.errors import InvalidInput
+from archfem.limit.backfill import BlocksWithFill
 from archfem.limit.collapse import describe_crushing, describe_fill
 from archfem.limit.fill_range import WEAKER_FILLS, say_part, vary_pressure
 from archfem.limit.fill_strength import Fill, PlasticFill, as_pressure, has_backing, place_backing
+from archfem.limit.linear_programme import Programme
 from archfem.limit.self_weight import check_options, is_balanced, self_weight_programme
 from archfem.limit.thickness import find_geometric_factor
 from archfem.limit.vehicles import (
     BY_CS454,
     DRIVING_DIRECTIONS,
     VEHICLES,
+    AxleRow,
     MovingLoad,
     Vehicle,
     axles_on_rings,
@@ -543,8 +546,9 @@ def rate(  # noqa: PLR0913  (factors of the check, and the strength of the bridg
     """Rate a bridge for a vehicle: the multiple of it, with partial factors, at collapse.
 
     The vehicle drives over the bridge in both directions (`moving_load`), from on to off in steps
-    of 1/100 of the bridge's length, or 1/20 with a plastic fill; without fill also where an axle
-    stands at an end of a stone, beside the least factors of these. Its axles spread through a fill
+    of 1/100 of the bridge's length, or 1/20 with a plastic fill. With a `Fill` a step beside the
+    worst place is searched to a thousandth. Without fill places follow where an axle stands at an
+    end of a stone, beside the least factors of these. Its axles spread through a fill
     along the bridge; across it they spread evenly over `width`. The distributed load of its code
     grows with them, where it is adverse (`moving_load`). The geometric factor of safety is
     Heyman's: all joints are narrowed about their middles, at unchanged weights and with the vehicle
@@ -608,6 +612,10 @@ def rate(  # noqa: PLR0913  (factors of the check, and the strength of the bridg
     if fill is None and (ends := places_at_ends(weighted, axles, moving)):
         at_ends, positions = drive(width, area_load, ends), [*positions, *ends]
         moving = moving.joined(at_ends)
+    if isinstance(fill, Fill) and not np.isnan(moving.worst.factor):
+        loads = _spread_over_bridge(weighted, rows, width, axles)
+        place = _refine_worst_place(weighted, positions, loads, live * area_load, options, moving)
+        moving = moving.joined(drive(width, area_load, [place]))
     by_rule = np.nan
     if width > (1.0 + 1e-9) * rule or area_load < driven.area_load:
         least = min(width, rule), max(area_load, driven.area_load)
@@ -617,8 +625,7 @@ def rate(  # noqa: PLR0913  (factors of the check, and the strength of the bridg
     more: dict[str, Any] = {"strength": strength, "deepest": deepest, "fill": fill}
     others = _other_states(options, crushes)
     for key, each, by, states in _further_searches(driven, rows, live, area_load, options, others):
-        # of the whole width, as the structure is modelled
-        loads = [np.column_stack([structure.width / width * row, axles[:, 1]]) for row in each]
+        loads = _spread_over_bridge(weighted, each, width, axles)
         known = None if key or is_plastic else moving
         found = _find_least_factors(weighted, positions, loads, by * area_load, states, known)
         more |= {key: found} if key else found
@@ -638,11 +645,10 @@ def rate_again(found: Rating, structure: Structure, width: float | None, **optio
     options["dead"] = lay_parapets(structure, found.dead * found.parapets)
     by_rule = np.isclose(found.width, vehicle.spread_over(found.structure))
     usual = vehicle.spread_over(structure) if by_rule else found.width
-    share = structure.width / (usual if width is None else width)
     weighted = _scale_weights(structure, found.dead)
     axles = parse_axles(vehicle.axles, vehicle.spacings)
     rows = vehicle.factored(found.live, found.impact)
-    loads = [np.column_stack([share * row, axles[:, 1]]) for row in rows]
+    loads = _spread_over_bridge(structure, rows, usual if width is None else width, axles)
     given = _places_along(weighted, axles), loads, found.live * found.area_load, {"": options}
     # another property may move the worst place anywhere: no factors guide the search
     return _find_least_factors(weighted, *given, None).get("", np.nan)
@@ -671,6 +677,60 @@ def _scale_weights(structure: Structure, factor: float) -> Structure:
 def _places_along(structure: Structure, vehicle: Array, steps: int = 100) -> Sequence[float]:
     """Return places from where the vehicle drives onto the structure to where it leaves [m]."""
     return tuple(vehicle_positions(structure, vehicle, None, steps).tolist())
+
+
+def _spread_over_bridge(
+    structure: Structure, rows: Sequence[Array], width: float, axles: Array
+) -> list[Array]:
+    """Return axles as they load the whole width, over which the structure is modelled."""
+    return [np.column_stack([structure.width / width * row, axles[:, 1]]) for row in rows]
+
+
+def _refine_worst_place(
+    structure: Structure,
+    places: Sequence[float],
+    vehicles: Sequence[Array],
+    area_load: float,
+    options: dict[str, Any],
+    moving: MovingLoad,
+) -> float:
+    """Return the worst place of a vehicle on a fill, between the places beside the worst [m]."""
+    stones, dead = self_weight_programme(structure, **options)
+    strips = {strip: stones.load([strip]) for strip in cut_road(structure, area_load)}
+    worst = [(vehicle, moving.direction, moving.position) for vehicle in vehicles]
+    found = [_search_between(structure, places, x, stones, dead, strips) for x in worst]
+    return min(found, key=lambda each: each[0])[1]
+
+
+def _search_between(
+    structure: Structure,
+    places: Sequence[float],
+    worst: tuple[Array, str, float],
+    stones: BlocksWithFill,
+    dead: Programme,
+    strips: Mapping[PointLoad, Array],
+) -> tuple[float, float, dict[AxleRow, Array]]:
+    """Return the least factor between the places beside one, its place, and its rows of axles.
+
+    A fill spreads the axles, so that the factor is continuous there, and smooth but where the
+    mechanism changes. Mechanisms of some places bound the factors at all others from above.
+    """
+    vehicle, way, place = worst
+    known = np.unique(places)
+    k = int(np.abs(known - place).argmin())
+    low, high = known[max(k - 1, 0)], known[min(k + 1, len(known) - 1)]
+    least, rows = np.inf, dict[AxleRow, Array]()
+    for _ in range(2):  # to a hundredth of the distance, and to a thousandth of that
+        fine = np.append(place, np.linspace(low, high, 21))
+        at = {axles_on_structure(structure, vehicle, way, x): float(x) for x in fine[::-1]}
+        loads = {row: stones.load(row) for row in at if row}
+        guide = np.where(np.array([at[row] for row in loads]) == place, 0.0, np.inf)
+        rows, factors = find_worst_rows(dead, loads, strips, guide)
+        k = int(factors.argmin())
+        least, place = float(factors[k]), at[[*loads][k]]
+        step = 0.05 * (high - low)
+        low, high = place - step, place + step
+    return least, place, rows
 
 
 def _further_searches(
@@ -721,19 +781,16 @@ def _find_least_factors(
     Those of states with crushing are in a table of their own, undefined (NaN) where it does not.
     Factors of the same vehicle as it is rated, if it is given, are those of the state "factor".
     """
-    rows = [
-        axles_on_structure(structure, vehicle, way, x)
-        for vehicle in vehicles
-        for way in DRIVING_DIRECTIONS
-        for x in places
-    ]
+    at = [(vehicle, way, x) for vehicle in vehicles for way in DRIVING_DIRECTIONS for x in places]
+    rows = [axles_on_structure(structure, *each) for each in at]
+    place_of = dict(zip(rows, at, strict=True))
     # the fans of loads do not depend on pressure, backing and strength
     stones, _ = self_weight_programme(structure, **next(iter(states.values())))
     axles = {row: stones.load(row) for row in dict.fromkeys(rows) if row}
     guides = dict[str, Array]()
     if moving is not None:
-        at = dict(zip(rows, np.tile(moving.factors_at(places), len(vehicles)), strict=True))
-        guides["factor"] = np.array([at[row] for row in axles])
+        own = dict(zip(rows, np.tile(moving.factors_at(places), len(vehicles)), strict=True))
+        guides["factor"] = np.array([own[row] for row in axles])
     strips = {strip: stones.load([strip]) for strip in cut_road(structure, area_load)}
     factors = dict[str, Any]()
     for name in track_progress("other states", [name for name in _GUIDES if name in states]):
@@ -744,6 +801,10 @@ def _find_least_factors(
         guide = next((guides[x] for x in _GUIDES[name] if x in guides), np.zeros(len(axles)))
         # these are worst with sliding that dilates: without, one of the next may be
         worst, guides[name] = find_worst_rows(dead, axles, strips, guide)
+        if isinstance(given["fill"], Fill) and worst:
+            place = place_of[[*axles][int(guides[name].argmin())]]
+            fine = _search_between(structure, places, place, stones, dead, strips)[-1]
+            worst = fine if given["friction"] != "nonassociated" else worst
         worst = dict(islice(worst.items(), 1 if given["friction"] != "nonassociated" else 3))
         factors[name] = min(collapse_factors(stones, dead, worst, given).values())
     crushed = [name for name in states if name.startswith(_CRUSHING)]

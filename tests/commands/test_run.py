@@ -1015,7 +1015,7 @@ def test_vehicles_are_rated_together(tmp_path, unplotted, capsys, monkeypatch):
         if name == "LM1":
             outcome, *others = found.clauses
             stated += [
-                f"rating for {name}: factor {found.factor:.4g} without crushing, {outcome}",
+                f"rating for {name}: factor {found.factor:.4g}, {outcome}",
                 *others,
             ]
             stated += [f"worst {found.place}", "of 4 vehicles it has the least factor"]
