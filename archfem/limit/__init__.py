@@ -22,6 +22,7 @@
     support_movement      finite movement of a support
     thickness             least thickness
     vehicles              vehicles over a bridge
+    worst_places          worst places of a vehicle in states of fill and stones
 
 Imports `masonry`, `joints` and the support modules. Start reading at `collapse`.
 """

@@ -2,42 +2,40 @@
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import islice
 from typing import Any
 
 import numpy as np
 
-from archfem._display import ResultDisplay, track_progress
+from archfem._display import ResultDisplay
 from archfem._typing import Array, Metres, NewtonsPerMetre, Pascals
 from archfem._validation import validate_arguments
 from archfem.errors import InvalidInput
-from archfem.limit.backfill import BlocksWithFill
 from archfem.limit.collapse import describe_crushing, describe_fill
-from archfem.limit.fill_range import WEAKER_FILLS, say_part, vary_pressure
+from archfem.limit.fill_range import say_part, vary_pressure
 from archfem.limit.fill_strength import Fill, PlasticFill, as_pressure, has_backing, place_backing
-from archfem.limit.linear_programme import Programme
-from archfem.limit.self_weight import check_options, is_balanced, self_weight_programme
+from archfem.limit.self_weight import check_options
 from archfem.limit.thickness import find_geometric_factor
 from archfem.limit.vehicles import (
     BY_CS454,
     DRIVING_DIRECTIONS,
     VEHICLES,
-    AxleRow,
     MovingLoad,
     Vehicle,
     axles_on_rings,
-    axles_on_structure,
     check_area_load,
     check_factor,
-    collapse_factors,
-    cut_road,
     find_vehicle,
-    find_worst_rows,
     lay_parapets,
     moving_load,
     name_missing,
     places_at_ends,
     vehicle_positions,
+)
+from archfem.limit.worst_places import (
+    CRUSHING,
+    find_least_factors,
+    refine_worst_place,
+    spread_over_bridge,
 )
 from archfem.masonry.loads import PointLoad
 from archfem.masonry.standing import describe_axles, parse_axles
@@ -59,13 +57,6 @@ ASSUMED_STRENGTH = 5e6
 # Factors of a rating that its outcome is made of, in other states of fill and stones
 _PRESSURES = ("without_pressure", "full_pressure", "without_backing", "without_either")
 _STATES = (*_PRESSURES, "by_pressure")
-
-# Prefix of the states in which stones crush at the assumed strength
-_CRUSHING = "crushing "
-
-# Each state with those whose factors guide its search, in the order of their searches
-_GUIDES: dict[str, Sequence[str]] = {"": (), **WEAKER_FILLS}
-_GUIDES |= {f"{_CRUSHING}{state}": (state, "by_pressure") for state in WEAKER_FILLS}
 
 # What a rating assumes of fill and stones
 _PRESSURE, _BACKING = "the pressure of the fill", "the backing"
@@ -610,28 +601,24 @@ def rate(  # noqa: PLR0913  (factors of the check, and the strength of the bridg
     positions = _places_along(weighted, axles)
     moving = drive(width, area_load, positions[::5] if is_plastic else positions)
     if fill is None and (ends := places_at_ends(weighted, axles, moving)):
-        at_ends, positions = drive(width, area_load, ends), [*positions, *ends]
-        moving = moving.joined(at_ends)
+        moving, positions = moving.joined(drive(width, area_load, ends)), [*positions, *ends]
     if isinstance(fill, Fill) and not np.isnan(moving.worst.factor):
-        loads = _spread_over_bridge(weighted, rows, width, axles)
-        place = _refine_worst_place(weighted, positions, loads, live * area_load, options, moving)
+        loads = spread_over_bridge(weighted, rows, width, axles)
+        place = refine_worst_place(weighted, positions, loads, live * area_load, options, moving)
         moving = moving.joined(drive(width, area_load, [place]))
-    by_rule = np.nan
-    if width > (1.0 + 1e-9) * rule or area_load < driven.area_load:
-        least = min(width, rule), max(area_load, driven.area_load)
-        by_rule = drive(*least, [moving.position]).worst.factor
+    least = min(width, rule), max(area_load, driven.area_load)
+    is_by_rule = np.allclose(least, (width, area_load), rtol=1e-9, atol=0.0)
+    by_rule = np.nan if is_by_rule else drive(*least, [moving.position]).worst.factor
     unknown = np.nan, np.nan
     geometric, deepest = unknown if is_plastic else find_geometric_factor(weighted, moving, options)
-    more: dict[str, Any] = {"strength": strength, "deepest": deepest, "fill": fill}
-    others = _other_states(options, crushes)
-    for key, each, by, states in _further_searches(driven, rows, live, area_load, options, others):
-        loads = _spread_over_bridge(weighted, each, width, axles)
+    more = dict[str, Any](deepest=deepest, fill=fill, missing=missing, parapets=parapets)
+    for key, each, by, states in _further_searches(driven, rows, live, area_load, options, crushes):
+        loads = spread_over_bridge(weighted, each, width, axles)
         known = None if key or is_plastic else moving
-        found = _find_least_factors(weighted, positions, loads, by * area_load, states, known)
+        found = find_least_factors(weighted, positions, loads, by * area_load, states, known)
         more |= {key: found} if key else found
     factors = live, impact, dead, width, area_load
-    more |= {"missing": missing, "parapets": parapets}
-    return Rating(structure, driven, *factors, moving, geometric, by_rule, **more)
+    return Rating(structure, driven, *factors, moving, geometric, by_rule, strength, **more)
 
 
 def rate_again(found: Rating, structure: Structure, width: float | None, **options: Any) -> float:
@@ -648,10 +635,10 @@ def rate_again(found: Rating, structure: Structure, width: float | None, **optio
     weighted = _scale_weights(structure, found.dead)
     axles = parse_axles(vehicle.axles, vehicle.spacings)
     rows = vehicle.factored(found.live, found.impact)
-    loads = _spread_over_bridge(structure, rows, usual if width is None else width, axles)
+    loads = spread_over_bridge(structure, rows, usual if width is None else width, axles)
     given = _places_along(weighted, axles), loads, found.live * found.area_load, {"": options}
     # another property may move the worst place anywhere: no factors guide the search
-    return _find_least_factors(weighted, *given, None).get("", np.nan)
+    return find_least_factors(weighted, *given, None).get("", np.nan)
 
 
 def _check_width(width: float, structure: Structure) -> None:
@@ -679,70 +666,16 @@ def _places_along(structure: Structure, vehicle: Array, steps: int = 100) -> Seq
     return tuple(vehicle_positions(structure, vehicle, None, steps).tolist())
 
 
-def _spread_over_bridge(
-    structure: Structure, rows: Sequence[Array], width: float, axles: Array
-) -> list[Array]:
-    """Return axles as they load the whole width, over which the structure is modelled."""
-    return [np.column_stack([structure.width / width * row, axles[:, 1]]) for row in rows]
-
-
-def _refine_worst_place(
-    structure: Structure,
-    places: Sequence[float],
-    vehicles: Sequence[Array],
-    area_load: float,
-    options: dict[str, Any],
-    moving: MovingLoad,
-) -> float:
-    """Return the worst place of a vehicle on a fill, between the places beside the worst [m]."""
-    stones, dead = self_weight_programme(structure, **options)
-    strips = {strip: stones.load([strip]) for strip in cut_road(structure, area_load)}
-    worst = [(vehicle, moving.direction, moving.position) for vehicle in vehicles]
-    found = [_search_between(structure, places, x, stones, dead, strips) for x in worst]
-    return min(found, key=lambda each: each[0])[1]
-
-
-def _search_between(
-    structure: Structure,
-    places: Sequence[float],
-    worst: tuple[Array, str, float],
-    stones: BlocksWithFill,
-    dead: Programme,
-    strips: Mapping[PointLoad, Array],
-) -> tuple[float, float, dict[AxleRow, Array]]:
-    """Return the least factor between the places beside one, its place, and its rows of axles.
-
-    A fill spreads the axles, so that the factor is continuous there, and smooth but where the
-    mechanism changes. Mechanisms of some places bound the factors at all others from above.
-    """
-    vehicle, way, place = worst
-    known = np.unique(places)
-    k = int(np.abs(known - place).argmin())
-    low, high = known[max(k - 1, 0)], known[min(k + 1, len(known) - 1)]
-    least, rows = np.inf, dict[AxleRow, Array]()
-    for _ in range(2):  # to a hundredth of the distance, and to a thousandth of that
-        fine = np.append(place, np.linspace(low, high, 21))
-        at = {axles_on_structure(structure, vehicle, way, x): float(x) for x in fine[::-1]}
-        loads = {row: stones.load(row) for row in at if row}
-        guide = np.where(np.array([at[row] for row in loads]) == place, 0.0, np.inf)
-        rows, factors = find_worst_rows(dead, loads, strips, guide)
-        k = int(factors.argmin())
-        least, place = float(factors[k]), at[[*loads][k]]
-        step = 0.05 * (high - low)
-        low, high = place - step, place + step
-    return least, place, rows
-
-
 def _further_searches(
     driven: Vehicle,
     rows: Sequence[Array],
     live: float,
     area_load: float,
     options: dict[str, Any],
-    states: dict[str, dict[str, Any]],
+    crushes: bool,
 ) -> Iterator[tuple[str, Sequence[Array], float, dict[str, dict[str, Any]]]]:
     """Yield name, rows of weights, partial factor and states of further least factors."""
-    if states:
+    if states := _other_states(options, crushes):
         yield "", rows, live, states
     is_multiple = len(driven.axles) == 1 and not area_load
     if driven.grade == "given" and not (is_multiple or isinstance(options["fill"], PlasticFill)):
@@ -764,49 +697,5 @@ def _other_states(options: dict[str, Any], crushes: bool) -> dict[str, dict[str,
     if np.isinf(options["strength"]) and crushes:
         soft = options | {"strength": ASSUMED_STRENGTH}
         crushed = {"factor": fill, **fills}
-        states |= {f"{_CRUSHING}{x}": soft | {"fill": other} for x, other in crushed.items()}
+        states |= {f"{CRUSHING}{x}": soft | {"fill": other} for x, other in crushed.items()}
     return states
-
-
-def _find_least_factors(
-    structure: Structure,
-    places: Sequence[float],
-    vehicles: Sequence[Array],
-    area_load: float,
-    states: dict[str, dict[str, Any]],
-    moving: MovingLoad | None,
-) -> dict[str, Any]:
-    """Return the least factor in each state; none where the structure does not stand in it.
-
-    Those of states with crushing are in a table of their own, undefined (NaN) where it does not.
-    Factors of the same vehicle as it is rated, if it is given, are those of the state "factor".
-    """
-    at = [(vehicle, way, x) for vehicle in vehicles for way in DRIVING_DIRECTIONS for x in places]
-    rows = [axles_on_structure(structure, *each) for each in at]
-    place_of = dict(zip(rows, at, strict=True))
-    # the fans of loads do not depend on pressure, backing and strength
-    stones, _ = self_weight_programme(structure, **next(iter(states.values())))
-    axles = {row: stones.load(row) for row in dict.fromkeys(rows) if row}
-    guides = dict[str, Array]()
-    if moving is not None:
-        own = dict(zip(rows, np.tile(moving.factors_at(places), len(vehicles)), strict=True))
-        guides["factor"] = np.array([own[row] for row in axles])
-    strips = {strip: stones.load([strip]) for strip in cut_road(structure, area_load)}
-    factors = dict[str, Any]()
-    for name in track_progress("other states", [name for name in _GUIDES if name in states]):
-        given = states[name]
-        stones, dead = self_weight_programme(structure, **given)
-        if not is_balanced(dead.minimise_residual(), dead):
-            continue
-        guide = next((guides[x] for x in _GUIDES[name] if x in guides), np.zeros(len(axles)))
-        # these are worst with sliding that dilates: without, one of the next may be
-        worst, guides[name] = find_worst_rows(dead, axles, strips, guide)
-        if isinstance(given["fill"], Fill) and worst:
-            place = place_of[[*axles][int(guides[name].argmin())]]
-            fine = _search_between(structure, places, place, stones, dead, strips)[-1]
-            worst = fine if given["friction"] != "nonassociated" else worst
-        worst = dict(islice(worst.items(), 1 if given["friction"] != "nonassociated" else 3))
-        factors[name] = min(collapse_factors(stones, dead, worst, given).values())
-    crushed = [name for name in states if name.startswith(_CRUSHING)]
-    table = {name.removeprefix(_CRUSHING): factors.pop(name, np.nan) for name in crushed}
-    return factors | {"crushing": table}

@@ -925,13 +925,13 @@ def test_factors_of_codes_are_stated_with_outcome_and_range(monkeypatch):
 def test_one_axle_has_multiples_of_its_factors_by_cs454(area_load, searches, monkeypatch):
     """Without a distributed load, against a rating with 1.9 and 1.8; with one it is searched."""
     monkeypatch.setattr(rating, "_places_along", lambda *_: (3.0, 4.0))
-    search, seen = rating._find_least_factors, []
+    search, seen = rating.find_least_factors, []
 
     def find_least_factors(*given):
         seen.append(given)
         return search(*given)
 
-    monkeypatch.setattr(rating, "_find_least_factors", find_least_factors)
+    monkeypatch.setattr(rating, "find_least_factors", find_least_factors)
     bridge, fill = arch_bridge(voussoirs=9), replace(GRAVEL, backing=0.2)
     axle = Vehicle("axle", (5e4,), live=1.2, impact=1.1, area_load=area_load)
     found = af.rate(bridge, axle, fill=fill)

@@ -157,7 +157,7 @@ def test_unequal_stones_that_no_longer_touch_do_not_stand(tmp_path):
         (
             lambda: find_ring(filled()),
             "has 3 joints .*one layer of stones, none missing, that carry nothing else; leave out "
-            r"what is on them, for the bare ring: of a bridge by remove = \['structure.backfill'\], of a drawing by ",
+            r"what is on them, for the bare ring: of a bridge by remove = \['structure.backfill'\]",
         ),
         (lambda: find_ring(ring_of_seven()).with_thickness(0.0), "thickness"),
         (lambda: find_ring(ring_of_seven()).with_thickness(2.5), "crosses or touches itself"),
