@@ -269,6 +269,8 @@ class AssessmentCheck:
             of = floor if self.floor is not None else "one weight a body" * bool(self.bodies)
             return at_least + self.over_fill.format_ends(digits=3) + f" ({of})" * bool(of)
         own = at_least + format_ratio(self.ratio)
+        if at_least and self.bodies is not None:
+            own += f" ({format_ratio(self.bodies)} with one weight a body)"
         return own if self.floor is None else f"{format_ratio(self.floor)} ({floor}) to {own}"
 
     @property

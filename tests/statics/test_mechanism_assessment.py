@@ -646,6 +646,15 @@ def test_a_path_that_ends_early_has_a_lower_bound(held_top, verified):
     assert (check.outcome, found.passes, check.ratio < 1.0) == (NOT_SHOWN, False, True)
     ratio = f"{check.ratio:.3g}"
     assert f"{NOT_SHOWN}, the spectrum may be at least {ratio} times as strong" in str(found)
+    split = replace(check, ratio=1.2, bodies=0.9)  # passes with the weights apart alone
+    assert f"{NOT_SHOWN}, the spectrum may be at least 1.2 (0.9 with one weight a body) " in str(
+        split
+    )
+    assert (split.doubt_split(), len(split.doubt_end(""))) == ([], 1)
+    assert (replace(check, ratio=1.2).passes, replace(check, ratio=1.2).doubt_end("")) == (
+        False,
+        [],
+    )
     (doubt,) = (x for x in found.doubts if "a lower bound" in str(x))
     assert str(doubt).endswith("runs leave out ties, and the linear check alone is left")
     says = f"passes the linear check ({linear:.3g}), and {NOT_SHOWN} by displacements (at least "
