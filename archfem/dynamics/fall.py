@@ -54,8 +54,8 @@ RIGID_STAND = (
     "the fall depends on how the joints close, and with stiffer ones it may not occur"
 )
 
-# What to do where a block slid off the ground
-DRAW_GROUND = (
+# Remedy of a fall beside the fixed blocks
+GROUND_BESIDE = (
     'draw the ground farther, of a shape without ground by `shape = "blocks"`: it may not fall then'
 )
 
@@ -331,7 +331,7 @@ def _doubt_fall(structure: Structure, dataset: xr.Dataset) -> Iterator[Doubt]:
     yield from doubt_soft_blocks(structure)
     if off := _list_slid_off(structure, dataset["fall_pose"].values):
         words = "{} slid beyond the ends of all fixed blocks, and fell there"
-        yield Doubt(words, DRAW_GROUND, (join_names(off),))
+        yield Doubt(words, GROUND_BESIDE, (join_names(off),))
     share, early = (dataset.attrs[f"fall_{key}"] for key in ("unsettled", "unsettled_early"))
     unsettled = "impulses of loose blocks did not settle in"
     if early > MAX_UNSETTLED:

@@ -59,8 +59,9 @@ def find_first_failures(data: ReportData) -> Iterator[str]:
         if not first or min(first)[0] >= least:
             continue
         least, at, name = min(first)
-        steps = [(x.all_steps, x.pga, "") for x in searches if state == "falls" and x.all_steps]
-        ends = [(scale, scale * pga) for scale, pga, _ in [*made, *steps]]
+        ends = [(scale, scale * pga) for scale, pga, _ in made]
+        steps = (x for x in searches if state == "falls")
+        ends += [(x.all_steps, x.all_steps * x.pga) for x in steps if x.all_steps]
         wide, over = "", " and ".join(["motions"] * (len(searches) > 1) + ["time steps"])
         if name not in unscaled:  # the least is of those that were searched
             scale_ends, peaks = map(Ends.of, zip(*ends, strict=True))
