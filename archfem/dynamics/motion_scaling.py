@@ -348,6 +348,11 @@ class CollapseScale:
         return max(at for at in self._stood if at < find_tension(self._runs))
 
     @property
+    def held_in_doubt(self) -> float:
+        """Largest scale at which it stood below any at which it did not, whatever its fill [-]."""
+        return max(self._stood)
+
+    @property
     def held_by_all(self) -> float:
         """Largest such scale by every time step, also of a search that Ctrl-C ended; 0 for none."""
         least = self.held

@@ -14,7 +14,7 @@ from math import inf, sqrt
 from time import perf_counter
 from typing import Any
 
-from archfem._display import ProgressReport
+from archfem._display import ProgressReport, write_progress_line
 from archfem._files import align_columns
 from archfem.dynamics.collapse_state import FALLEN_STATES, CollapseState
 from archfem.dynamics.history import Ending
@@ -112,6 +112,11 @@ class MechanismScales:
         return max((scale for scale in stood if scale <= most), default=0.0)
 
     @property
+    def held_in_doubt(self) -> float:
+        """Largest scale below the first mechanism, whatever its fill [-]; 0 for none."""
+        return self[self.first].lower
+
+    @property
     def states(self) -> dict[str, float]:
         """Smallest scales at which it forms a mechanism, and before at which its fill is pulled."""
         bracket, pulled = self[self.first], find_tension(self.runs)
@@ -193,6 +198,8 @@ def say_bracket(state: str, found: Any, met: str) -> str:
         met = f"at {scale:#.3g} × {PULLED}: {met}"
     met = f"{UNFINISHED}, {met}" if found.interrupted else met
     if not found.held:  # the smaller ones, if any were run, have no answer
+        if found.held_in_doubt:
+            return f"{state} in doubt up to {found.held_in_doubt:#.3g} ×, {met}"
         return f"{met}; no smaller scale is known to survive"
     return f"{state} at {say_scale(found.held, found.pga)}, {met}"
 
@@ -251,6 +258,14 @@ def check_search(precision: float, between: Sequence[float]) -> None:
         )
 
 
+# Progress of a search whose first two runs are in doubt, as its others will be
+_MAY_BE_VAIN = (
+    "elastic fill bears more tension than soil at both scales so far, so that the answer will be "
+    'in doubt: cut the fill into pieces (law = "jointed" in [structure.fill] of a case); Ctrl-C '
+    "ends the search, with its runs kept"
+)
+
+
 @log_doubts_once()
 def search_scales(
     run_scaled: Callable[[float], ScaledRun],
@@ -288,6 +303,8 @@ def search_scales(
                     last = spent / count * left
                     made += f"; about {left} runs, {last:.2g} s, are left by this time step"
                 progress.show(made, 1)
+                if len(scales.runs) == 2 and all(find_tension([x]) < inf for x in scales.runs):
+                    write_progress_line("scale", _MAY_BE_VAIN)
     except KeyboardInterrupt:
         scales = replace(scales, interrupted=True)
     return scales

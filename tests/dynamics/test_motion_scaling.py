@@ -890,6 +890,24 @@ def test_motions_are_scaled_to_five_g_at_most_by_their_strongest_component():
         admissible_range(between, af.Motion(0.0 * weak, 0.01, name="still"))
 
 
+def test_a_search_whose_first_runs_are_in_doubt_says_so_at_once(tmp_path, monkeypatch):
+    """After the second one, once; not where a smaller scale is free of doubt."""
+    for least, count in ((0.1, 1), (0.9, 0)):
+        shake = pretended(dict.fromkeys(DEFINITIONS, beyond(2.5)))
+
+        def doubted(scale, shake=shake, least=least):
+            doubts = (Doubt(FILL_TENSION, "cut it", (5.0 * scale, 0.3)),) * (scale >= least)
+            return replace(shake(scale), doubts=doubts)
+
+        with open(tmp_path / "errors", "w") as errors:
+            monkeypatch.setattr("sys.stderr", errors)
+            search_scales(doubted, DEFINITIONS, 0.5, (0.5, 5.0))
+        lines = (tmp_path / "errors").read_text().splitlines()
+        found = [k for k, line in enumerate(lines) if "so that the answer will be in doubt" in line]
+        assert len(found) == count
+        assert all('law = "jointed"' in lines[k] for k in found)
+
+
 def test_no_margin_is_claimed_where_the_fill_bears_more_tension_than_soil():
     """It stands up to 4, and its fill is in doubt from 2 on: it is known to stand at 1 alone."""
 
@@ -915,8 +933,8 @@ def test_no_margin_is_claimed_where_the_fill_bears_more_tension_than_soil():
     # all of them in tension: nothing is known; tension beyond the fall says nothing
     every = CollapseScale({dt: pulled(search, 0.5) for dt, search in runs.items()})
     assert every.held == 0.0
-    assert str(every).startswith(f"at 1.00 × {words}: falls at 8.00 × the motion")
-    assert "; no smaller scale is known to survive" in str(every)
+    begin = f"stands in doubt up to 4.00 ×, at 1.00 × {words}: falls at 8.00 × the motion"
+    assert str(every).startswith(begin)
     beyond_it = CollapseScale({dt: pulled(search, 8.0) for dt, search in runs.items()})
     assert (beyond_it.held, "tension" in beyond_it.states) == (4.0, False)
     small = searched(dict.fromkeys(DEFINITIONS, beyond(2.5)))
