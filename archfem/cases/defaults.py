@@ -14,12 +14,12 @@ from archfem.cases.toml_file import Table
 from archfem.limit.fill_strength import has_backing
 from archfem.limit.instability import describe_friction, describe_geometric_factor, least_friction
 from archfem.masonry.backfill import describe_held_ends
-from archfem.masonry.joint_closing import finish_range
+from archfem.masonry.joint_closing import USUAL_STRESS, finish_range, usual_depth
 from archfem.masonry.materials import Contact, Material
 from archfem.masonry.structure import Structure, join_names, join_words
 from archfem.models.builder import list_fidelities
 from archfem.motion.design_spectra import FloorSpectrum
-from archfem.units import GPa, MPa, in_unit, kN, kPa, mm
+from archfem.units import GPa, MPa, format_mm, in_unit, kN, kPa, mm
 
 HINGE_REASON = "8 % short of the edge, as in Demirel and Aldemir (2021)"
 
@@ -267,7 +267,9 @@ def list_finish_ranges(
     found = {"normal_stiffness": ("k_n", f"{_range_text(law.initial, 1e9)} MPa/mm at first")}
     if contact.closure:
         found["closure"] = "closing", f"{_range_text(law.closure, mm)} mm at most"
-    return found | {"shear_stiffness": ("k_s", f"{_range_text(law.shear, 1e9)} MPa/mm")}
+    depth = format_mm(usual_depth(structure, contact))
+    of = f"at {USUAL_STRESS / MPa:g} MPa on joints {depth} deep, their median"
+    return found | {"shear_stiffness": ("k_s", f"{_range_text(law.shear, 1e9)} MPa/mm {of}")}
 
 
 def _range_text(values: tuple[float, float, float], unit: float) -> str:

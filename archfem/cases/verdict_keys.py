@@ -37,9 +37,10 @@ def default_ranges(*structures: Structure) -> dict[str, tuple[Any, ...]]:
     """Return what is varied by default, the stiffness of a finish over its own range."""
     own = list[list[tuple[float, ...]]]()
     for structure in structures:
-        for joint in structure.joints:
+        one = {(joint.contact, find_finish(structure, joint)): joint for joint in structure.joints}
+        for (_, finish), joint in one.items():
             factors = [DEFAULT_RANGES["k_n"], DEFAULT_RANGES["k_s"]]
-            if finish := find_finish(structure, joint):
+            if finish:
                 law = finish_range(structure, joint, finish)
                 factors = [tuple(x / k[1] for x in k) for k in (law.initial, law.shear)]
             own.append(factors)

@@ -74,6 +74,9 @@ FINISHED_KEYS = "normal_stiffness", "shear_stiffness", "closure"
 # Strength of stones for which none is given [Pa]
 USUAL_STRENGTH = 56.0 * MPa
 
+# Stress at which the range of a finish is taken [Pa]
+USUAL_STRESS = 0.05 * MPa
+
 # Blocks softer than this are soil, whose faces have no finish [Pa]
 LEAST_STONE_MODULUS = 1.0 * GPa
 
@@ -242,7 +245,7 @@ def joint_stiffness(
     condition: str = "dressed",
     *,
     strength: float = USUAL_STRENGTH,
-    stress: float = 0.05 * MPa,
+    stress: float = USUAL_STRESS,
     poisson: float = 0.2,
     rigid: bool = False,
 ) -> JointStiffness:
@@ -382,11 +385,16 @@ def find_finish(structure: Structure, joint: Joint) -> str | None:
 
 
 def finish_range(structure: Structure, joint: Joint, finish: str) -> JointStiffness:
-    """Return the range of the law of a finish by the stones of a joint."""
+    """Return the range of the law of a finish by the stones of a joint and `usual_depth`."""
     stone = _weaker_stone(structure, joint)
     assert stone is not None  # a joint of soil has no finish
-    strength = stone.strength or USUAL_STRENGTH
-    return joint_stiffness(stone.young, joint.depth, finish, strength=strength)
+    strength, depth = stone.strength or USUAL_STRENGTH, usual_depth(structure, joint.contact)
+    return joint_stiffness(stone.young, depth, finish, strength=strength)
+
+
+def usual_depth(structure: Structure, contact: Contact) -> float:
+    """Return the median depth of the joints of a contact, whose range has one least k_s [m]."""
+    return float(np.median([each.depth for each in structure.joints if each.contact == contact]))
 
 
 def describe_closing(structure: Structure) -> str:

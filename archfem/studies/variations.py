@@ -95,7 +95,7 @@ def verdict_range(  # noqa: PLR0913  (one call, one argument for each thing that
     - "joint_rule": "exact" integration over each joint, "three points" (springs at its ends and
       middle), and "rigid" blocks in contact, without elastic joints or damping;
     - "k_n" and "k_s": factors from 1/3 to 3 on the stiffness of the joints, or over the range of
-      their finish (`joint_stiffness`), evenly in logarithm;
+      their finish (`joint_stiffness` by the median depth of its joints), evenly in logarithm;
     - "friction": -0.1 to 0.1, added to each coefficient that is given, at least to 0.05;
     - "damping_ratio": factors from 0.5 to 2; "damping_kind": "stiffness", or "mass and stiffness"
       (`Rayleigh`), which drags loose blocks;

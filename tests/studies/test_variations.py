@@ -10,7 +10,8 @@ import pytest
 from pages import read_page
 
 import archfem as af
-from archfem.cases.verdict_keys import DEFAULT_RANGES, NEUTRAL
+from archfem.cases.defaults import list_finish_ranges
+from archfem.cases.verdict_keys import DEFAULT_RANGES, NEUTRAL, default_ranges
 from archfem.dynamics import CollapseState, analysis
 from archfem.dynamics.damping import vary_damping
 from archfem.studies import collapse_risk, evaluators, variations
@@ -353,6 +354,21 @@ def test_stiffness_varies_over_the_range_of_the_finish(column, motion, calls):
     assert high / usual > 3.0
     assert ranges["k_s"] == pytest.approx((low / usual, high / usual))
     assert collapse_risk._check_varied({}, [column])["k_s"] == (1.0 / 3.0, 3.0)
+
+
+def test_the_least_shear_stiffness_is_that_of_the_median_depth():
+    """τ = σ tan(JRC log10(JCS / σ) + 30°) is reached at 1 % of a joint's length, by JRC 4."""
+    sizes = {"radius": 1.8, "thickness": 0.42, "voussoirs": 15, "pier_breadth": 0.9}
+    portal = af.masonry.with_finish(af.arch_on_piers(**sizes, courses=[0.6] * 4), "dressed")
+    depths = [joint.depth for joint in portal.joints]
+    assert (min(depths), max(depths)) == pytest.approx((0.42, 0.9))
+    low = 0.05e6 * np.tan(np.radians(4.0 * np.log10(56.0 / 0.05) + 30.0)) / (0.01 * 0.42)
+    usual = portal.joints[0].contact.shear_stiffness
+    assert default_ranges(portal)["k_s"][0] == pytest.approx(low / usual)
+    contact = portal.joints[0].contact
+    _, text = list_finish_ranges(portal, contact, "dressed")["shear_stiffness"]
+    assert f"({low / 1e9:.2g} to " in text
+    assert text.endswith("at 0.05 MPa on joints 420 mm deep, their median")
 
 
 @pytest.mark.slow
