@@ -340,6 +340,10 @@ def test_the_largest_displacement_at_an_end_of_a_sweep_may_not_be_the_largest():
     )
     (text,) = study_findings.say_what_changes(study_findings.collect_findings("", "", swept))
     assert text.endswith("at scale = 2, where the sweep ends: more may lie beyond")
+    # seeds have no order
+    seeds = swept.rename(scale="motion.synthetic.seed")
+    (text,) = study_findings.say_what_changes(study_findings.collect_findings("", "", seeds))
+    assert text.endswith("at motion.synthetic.seed = 2")
 
 
 def test_a_swept_key_that_leaves_the_least_equal_is_no_end_and_no_place():

@@ -389,7 +389,8 @@ def _look_beside(found: StudyFindings, rows: list[Any], row: Any) -> tuple[list[
     """
     swept = {key: found.table[key].values for key in found.keys if key in found.table.dims}
     numbers = {k: sorted(v) for k, v in swept.items() if v.dtype.kind in "if" and len(v) > 2}
-    for key in found.list_tied(row, found.decides):
+    # seeds are labels, with nothing between or beyond
+    for key in (*found.list_tied(row, found.decides), *(k for k in swept if k.endswith("seed"))):
         numbers.pop(key, None)
     ends, step = [k for k, v in numbers.items() if row[k] in (v[0], v[-1])], 0.0
     for key in numbers.keys() - {*ends}:
