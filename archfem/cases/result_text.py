@@ -589,5 +589,5 @@ def _say_course(verdict: Verdict, found: Mechanism | None) -> str:
 
 
 def _seconds(value: float) -> str:
-    """Format a time; "-" if undefined."""
-    return "-" if np.isnan(value) else f"{value:.3f} s"
+    """Format a time or a duration; "-" if undefined, and a bound for parts of a millisecond."""
+    return "-" if np.isnan(value) else "< 0.001 s" if 0.0 < value < 5e-4 else f"{value:.3f} s"

@@ -122,7 +122,8 @@ def of_history(run: History, mechanisms: Mapping[str, Mechanism | None] | None =
 
     Returns:
         The largest values over time and the joints of rings and piers: `eccentricity`, |e| [-], 0.5
-        for an open joint; `friction`, |V| / N [-]; `rotation` [rad], `opening` [m], `slip` [m].
+        for an open joint; `friction`, |V| / N [-], infinite for an open one; `rotation` [rad],
+        `opening` [m], `slip` [m].
         The `largest_displacement` and `residual_displacement` of a block [m]. The time of the first
         mechanism by each definition [s], infinite if there is none, and its class. How the run
         `ended`. `fall`, the state after a collapse, "" for small displacements. `energy_drift`, the

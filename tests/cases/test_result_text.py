@@ -103,6 +103,19 @@ def test_a_mechanism_too_small_to_matter_stands_beside_the_first_that_is_not():
     assert brief.decisive is None
 
 
+def test_a_slide_of_a_part_of_a_millisecond_has_a_bound_in_the_table(run):
+    """One joint slides in a step of 0.3 ms, one in a step of 0.7 ms, and the others do not."""
+    joints = run.joints.isel(time=slice(0, 4)).copy(deep=True)
+    joints["time"] = [1.0, 1.0003, 1.001, 1.002]
+    number = np.flatnonzero(joints["judged"].values)[:3]
+    joints["slide"].values[:] = False
+    joints["slide"].values[1, number[0]] = joints["slide"].values[2, number[1]] = True
+    head, rows = tabulate_joints(joints)
+    columns = head.index("slide from"), head.index("slide for")
+    said = [[row[k] for k in columns] for row in rows[:3]]
+    assert said == [["1.000 s", "< 0.001 s"], ["1.001 s", "0.001 s"], ["-", "-"]]
+
+
 def test_words_and_tables_obey_the_criteria_of_the_run(run):
     loose = run.with_criteria(af.Criteria(hinge=0.3, failures=5))
     assert tabulate_joints(loose.joints) != tabulate_joints(run.joints)
