@@ -94,7 +94,9 @@ def _draw_layers(axes: Axes, closed: Sequence[Outline], scale: float) -> None:
         style.add_polygons(axes, own, face, label=f"layer '{layer}' ({len(own)})")
     for number, outline in enumerate(closed, 1):
         points = outline.drawn
-        room = scale * float(np.ptp(points[:, 0]))
+        x, y = (points - points[0]).T
+        # mean width, as the corners of a sloping stone reach above its neighbours
+        room = scale * 0.5 * float(abs(x @ np.roll(y, 1) - y @ np.roll(x, 1)) / (np.ptp(y) or 1.0))
         names = (outline.name, outline.name.removeprefix(outline.layer).strip(), str(number))
         fitting = (t for t in names if t and style.text_width(len(t), Size.NOTE) < room)
         text = next(fitting, names[-1])

@@ -1,10 +1,13 @@
 """The picture of a drawing that is no structure: outlines, overlaps, gaps, open lines."""
 
 import json
+from itertools import combinations
 
 import ezdxf
+import numpy as np
 import pytest
 import shapely
+from drawn import draw_portal
 
 import archfem as af
 from archfem.view import draw_outlines
@@ -262,3 +265,19 @@ def test_seven_layers_have_colours_of_their_own(tmp_path):
     figure = draw_outlines(draw(tmp_path / "seven.dxf", boxes))
     faces = {tuple(each.get_facecolor()[0]) for each in figure.axes[0].collections}
     assert len(faces) == 7
+
+
+def test_every_stone_of_a_drawing_has_its_name_apart_from_others(tmp_path):
+    """By its whole name, or by its number in its layer, as results name it."""
+    structure = af.Case.read(draw_portal(tmp_path)).structure
+    figure = draw_outlines(tmp_path / "portal.dxf", snap=4e-3)
+    figure.draw_without_rendering()
+    texts = figure.axes[0].texts
+    names = [block.name for block in structure.blocks]
+    for text in texts:
+        x, y = text.get_position() if not hasattr(text, "xy") else text.xy
+        near = np.linalg.norm(structure.centroids - np.array([x, y]) / 1e3, axis=1).argmin()
+        assert names[near].endswith(text.get_text())
+    assert len(texts) == len(names)
+    boxes = [text.get_window_extent().shrunk(0.9, 0.9) for text in texts]
+    assert not any(one.overlaps(other) for one, other in combinations(boxes, 2))
