@@ -379,10 +379,11 @@ class Rating(ResultDisplay):
             least = "none, as the bridge does not stand,"
         if isinstance(self.fill, PlasticFill):
             begin, factor = "not as a plastic body, but by the pressure", self.by_pressure
-        part = f"up to {say_part(fill.mobilisation)} of the passive one"
+        part = f"{say_part(fill.active)} of the active and up to {say_part(fill.mobilisation)} of"
+        most = f"{self.full_pressure:.4g} with all of it"
         return [
-            f"{begin} of the fill, each at its worst place: {least} without it, "
-            f"{factor:.4g} with {part}, {self.full_pressure:.4g} with all of it"
+            f"{begin} of the fill, each at its worst place: {least} with neither active nor "
+            f"passive, {factor:.4g} with {part} the passive one, {most}"
         ]
 
     def describe_backing(self) -> list[str]:

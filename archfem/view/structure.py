@@ -585,15 +585,18 @@ def draw_during(
 def draw_loads(
     axes: Axes, structure: Structure, live: Sequence[Action], *, factor: str = "λ ×"
 ) -> None:
-    """Draw live loads as arrows of one length; the legend has load factor and sizes."""
-    length, sizes = 0.11 * structure.size, []
-    for action in live:
-        start, direction, size = _load_arrow(structure, action, length)
+    """Draw live loads as arrows of one length, with unlike sizes beside them and in the legend."""
+    length = 0.11 * structure.size
+    drawn = [_load_arrow(structure, action, length) for action in live]
+    sizes = [size for *_, size in drawn]
+    for start, direction, size in drawn:
         tip = start + length * direction
         arrow = {"arrowstyle": "-|>", "color": Colour.LOAD, "lw": 2.2, "shrinkA": 0, "shrinkB": 0}
         axes.annotate("", tuple(tip), tuple(start), zorder=9, arrowprops=arrow)
         axes.update_datalim([start, tip])
-        sizes.append(size)
+        if len({*sizes}) > 1:  # which arrow is which
+            look = {"ha": "right", "va": "center", "rotation": 90, "zorder": 9}
+            style.annotate(axes, size, 0.5 * (start + tip), (-3.0, 0.0), **look)
     if sizes:
         named = ", ".join(dict.fromkeys(sizes))
         named = f"({named})" if factor and "," in named else named

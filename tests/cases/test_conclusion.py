@@ -1243,6 +1243,9 @@ def test_a_rating_is_stated_by_the_norm_of_the_report_alone(case, norm, first):
     assert conclusion._rank_verdict(data)[1] == {"the vehicle": pytest.approx(least)}
     pieces = conclusion.build_conclusion(data).pieces
     assert pieces[0].text.startswith(f"Lorry {first[:12]}")
+    settings |= {"report": {"demand": "PGA 0.25 g"}}
+    vars(data)["case"] = af.Case.of(settings)
+    assert demands.tabulate_demands(data) == []  # of a vehicle there is none of an earthquake
     (table,) = (piece for piece in pieces if getattr(piece, "caption", "").startswith("Demand"))
     assert table.caption.endswith("Factors are multiples of the demand: a load makes a mechanism")
     assert first in table.rows[0][1]

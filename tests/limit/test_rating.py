@@ -587,12 +587,13 @@ def test_the_range_over_the_pressure_of_the_fill_is_that_of_all_places(lorry_rat
     assert lorry_rating.without_pressure == pytest.approx(none, rel=EXACT)
     assert lorry_rating.full_pressure == pytest.approx(whole, rel=EXACT)
     assert none < 0.9 * lorry_rating.factor < 0.8 * whole
-    begin = f"over the pressure of the fill, each at its worst place: {none:.4g} without it"
-    share = "up to a third of the passive one"
+    begin = f"over the pressure of the fill, each at its worst place: {none:.4g} with "
+    begin += "neither active nor passive"
+    share = "all of the active and up to a third of the passive one"
     end = f", {whole:.4g} with all of it"
     assert f"\n{begin}, {lorry_rating.factor:.4g} with {share}{end}\n" in str(lorry_rating)
     half = replace(lorry_rating, fill=replace(lorry_rating.fill, mobilisation=0.5))
-    assert half.describe_pressure()[0].endswith(f"with up to 0.5 of the passive one{end}")
+    assert half.describe_pressure()[0].endswith(f"active and up to 0.5 of the passive one{end}")
 
 
 @pytest.mark.slow
@@ -677,7 +678,7 @@ def test_a_plastic_fill_has_the_factors_of_its_pressure_beside_its_own(monkeypat
         assert getattr(found, state) == pytest.approx(getattr(pressed, state), rel=EXACT)
     assert np.isnan(pressed.by_pressure)
     begin = "\nnot as a plastic body, but by the pressure of the fill, each at its worst place: "
-    values = f"{found.without_pressure:.4g} without it, {found.by_pressure:.4g} with up to"
+    values = f"{found.without_pressure:.4g} with neither active nor passive, "
     assert begin + values in str(found)
     weak = replace(found, by_pressure=0.99).outcome
     assert weak.startswith("passes only with the fill as a plastic body if the code's")

@@ -408,9 +408,15 @@ def test_the_legend_has_the_sizes_of_loads(ring, forces, sizes):
     axes = draw_structure(ring).axes[0]
     draw_loads(axes, ring, loads)
     assert axes.get_legend_handles_labels()[1] == [f"live load: λ × {sizes}"]
-    tails = np.array([text.xyann for text in axes.texts])
-    tips = np.array([text.xy for text in axes.texts])
+    arrows = [text for text in axes.texts if not text.get_text()]
+    tails = np.array([text.xyann for text in arrows])
+    tips = np.array([text.xy for text in arrows])
     np.testing.assert_allclose(tips, [load.place(ring)[1] for load in loads])
+    # unlike sizes stand beside their arrows, halfway along
+    named = {text.get_text(): text.xy for text in axes.texts if text not in arrows}
+    middles = 0.5 * (tails + tips) if len({*forces}) > 1 else []
+    assert [*named] == [f"{force / 1e3:g} kN" for force in forces][: len(middles)]
+    np.testing.assert_allclose([*named.values()], middles)
     assert (tails[:, 1] > tips[:, 1]).all()
     np.testing.assert_allclose(tails[:, 0], tips[:, 0])
 

@@ -44,7 +44,8 @@ def tabulate_demands(data: ReportData) -> list[Grid]:
     differ = bool(peaks) and max(peaks) > MAX_RATIO_OF_PEAKS * min(peaks)
     caption = "Demands of an earthquake" + "; a margin on one is none on another" * differ
     head = ("demand", "horizontal", "source in the case", "of which results")
-    return [Grid(head, rows, caption, "words")] if rows[1:] or text else []
+    stated = rows[1:] or (text and data.is_shaken)  # a vehicle has no demand of an earthquake
+    return [Grid(head, rows, caption, "words")] if stated else []
 
 
 def find_demand(data: ReportData) -> float:
