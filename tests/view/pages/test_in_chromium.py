@@ -1,12 +1,14 @@
 """The player and the report in a browser: drawings agree with the history."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from chromium import BROWSER, browser, complaints, opened, printed
 
 import archfem as af
+from archfem.cases.result_text import tabulate_motions
 from archfem.cases.run import carry_out, replace_run
 from archfem.view.pages.document import (
     Document,
@@ -223,6 +225,20 @@ def test_a_report_fits_its_screen_and_follows_the_colour_scheme(small, tmp_path,
         paper = driver.execute_script("return getComputedStyle(document.body).backgroundColor")
         assert (sum(map(int, re.findall(r"\d+", paper))) < 200) == (scheme == "dark")
         assert complaints(driver) == []
+
+
+def test_the_measures_of_motions_fit_a_page_of_1000_pixels(tmp_path):
+    """All twelve columns, down to the length, are seen without scrolling."""
+    motion = af.Motion.synthetic(duration=17.0, pga=4.0, vertical_ratio=0.7)
+    table = Grid(*tabulate_motions([replace(motion, name="eq1")]), "Measures")
+    page = Document("motions", "", (), [Section("Motions", [table])]).page
+    (tmp_path / "page.html").write_text(page, encoding="utf-8")
+    with browser(wide=1000) as driver:
+        opened(driver, tmp_path / "page.html")
+        room, table = driver.execute_script(
+            "const e = document.querySelector('.scroll'); return [e.clientWidth, e.scrollWidth]"
+        )
+    assert table <= room
 
 
 def test_a_text_table_scrolls_and_sentences_wrap(tmp_path):
