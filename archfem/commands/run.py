@@ -411,9 +411,10 @@ def risk(options: argparse.Namespace) -> int:
         target=case.target,
         **case.risk.options,
     )
-    files: Files = {"risk.txt": str(found), "risk.nc": found.save, "risk.png": found.plot()}
+    text = "\n".join([str(found), *defaults.note_loads_left_out(case)])
+    files: Files = {"risk.txt": text, "risk.nc": found.save, "risk.png": found.plot()}
     files |= answers.state_risk(found).as_file("risk")
-    write_results("risk", case, options.out, str(found), lambda: files)
+    write_results("risk", case, options.out, text, lambda: files)
     return doubt_code(found.doubts)
 
 

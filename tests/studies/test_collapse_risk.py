@@ -562,12 +562,17 @@ precision = 0.05
 hazard = { rates = [0.02, 0.001], intensities = ["1 m/s**2", "0.4 g_0"], source = "a test" }
 alternatives.slender = {}
 alternatives.slenderer = { weight = 1.0, set = ["structure.breadth=0.22"] }
+[[assessment.loads]]
+block = "block 1"
+point = [0.0, 1.5]
+weight = "2 kN"
 """
     )
     code = main(["risk", str(path), "--out", str(tmp_path / "out")])
     printed = capsys.readouterr().out
     found = CollapseRisk.read(tmp_path / "out" / "risk.nc")
     assert str(found) in printed
+    assert "note: without the 2 kN of weights of [assessment]" in printed
     assert (code == 3) == bool(found.doubts)
     assert found.rate("slenderer").rate > found.rate("slender").rate
     assert found.hazard.rate_of([1.0, 0.4 * 9.80665]) == pytest.approx([0.02, 0.001])
