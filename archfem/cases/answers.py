@@ -387,9 +387,10 @@ def compare_checks(checks: Sequence[Ratios]) -> str:
             f"passes the linear check ({format_ratio(linear)}), and is not shown to pass by "
             f"displacements, as their ratio, {format_ratio(least.decisive)}, is an upper bound"
         ) * (linear >= 1.0 <= least.decisive)
-    apart = (x.decisive if x.linear else x.least for x in last)
-    ratios = (x.decisive for x in last), apart, (x.decisive for x in checks if x.linear)
-    return describe_difference(*(min(each, default=np.inf) for each in ratios))
+    every = [x for x in checks if x.linear]
+    ratios = [[(x.decisive, x.least) for x in each] for each in (last, every)]
+    pairs = [tuple(map(min, zip(*each, strict=True))) for each in ratios if each]
+    return describe_difference(*pairs)
 
 
 def describe_margin(found: Iterable[KinematicAssessment]) -> str:
@@ -543,12 +544,12 @@ class _TieSearch:
         if own.margin < 1.01 * least.margin:
             return []
         words = (
-            "pushed to the {}, {} has a ratio of {} with {:.3g} times the forces of the ties, and "
-            "with those given the least is {:.3g}: ties only resist it, so that with these it has "
-            "no higher ratio"
+            "pushed to the {}, {} has a ratio of {} ({}) with {:.3g} times the forces of the ties, "
+            "and with those given the least is {:.3g}: ties only resist it, so that with these it "
         )
-        side = name_side(self.sense)
-        values = side, least.mechanism, least.ratios.range, scale, own.margin
+        side, ratios = name_side(self.sense), least.ratios
+        words += "is not shown to pass either" if ratios.unshown else "has no higher ratio"
+        values = side, least.mechanism, ratios.range, ratios.check, scale, own.margin
         return [Doubt(words, "take the lower ratio", values)]
 
 

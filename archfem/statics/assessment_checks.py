@@ -312,25 +312,30 @@ def list_lower(
     return [x for x, other in pairs if x.decisive < 0.999 * other.decisive]
 
 
-def describe_difference(displaced: float, apart: float, linear: float) -> str:
-    """Say by which of displacements and linear check it passes; "" where by both or by none.
+def describe_difference(
+    displaced: tuple[float, float], linear: tuple[float, float] = (np.inf, np.inf)
+) -> str:
+    """Say by which of displacements and linear check it passes; "" where their outcomes are alike.
 
     Args:
-        displaced: least ratio of the checks by which it passes [-].
-        apart: the same with the weights of blocks apart [-].
-        linear: least ratio of all linear checks [-].
+        displaced: least ratio of the checks by which it passes, and with the weights of blocks
+            apart [-].
+        linear: the same of all linear checks, infinite without one.
     """
-    if not (apart >= 1.0 > linear or apart < 1.0 <= linear < np.inf):
+    outcomes = [_say_passing(*ratios) for ratios in (displaced, linear)]
+    if len({*outcomes}) == 1 or np.isinf(linear[0]):
         return ""
-    passes, then = "passes or fails, by the split of weights,", "fails by"
-    if displaced >= 1.0:
-        passes = "passes"
-    elif apart < 1.0:
-        passes, then = "fails", "passes"
     return (
-        f"{passes} by displacements ({format_ratio(displaced)}), {then} the linear check "
-        f"({format_ratio(linear)}); no clause that was read says which governs"
+        f"{outcomes[0]} by displacements ({format_ratio(displaced[0])}), {outcomes[1]} by the "
+        f"linear check ({format_ratio(linear[0])}); no clause that was read says which governs"
     )
+
+
+def _say_passing(decisive: float, apart: float) -> str:
+    """Say whether it passes by a ratio, also if weights of blocks are apart."""
+    if decisive >= 1.0:
+        return "passes"
+    return "fails" if apart < 1.0 else "passes or fails, by the split of weights,"
 
 
 def place_spectrum(spectrum: DesignSpectrum | Motion, foot: float) -> DesignSpectrum | Motion:

@@ -220,9 +220,9 @@ class KinematicAssessment(ResultDisplay):
     def _summary(self) -> str:
         """Describe the result in one line."""
         vanishes = f"d_0* {self.d_0_star:.4g} m, " if np.isfinite(self.d_0_star) else ""
-        last, linear = self.checks[-1], self.linear.decisive
-        apart = last.ratio * (not last.unshown) if self.displacement else linear
-        outcome = describe_difference(last.decisive, apart, linear) or last.outcome
+        last, linear = ((x, (x.decisive, x.ratio)) for x in (self.checks[-1], self.linear))
+        differ = "" if last[0].unshown else describe_difference(last[1], linear[1])
+        outcome = differ or last[0].outcome
         return (
             f"KinematicAssessment of '{self.structure.name}': alpha_0 {self.alpha_0:.4g}, a_0* "
             f"{self.a_0_star:.4g} m/s², {vanishes}{'; '.join([outcome, *self._lower])}"
@@ -730,7 +730,7 @@ class _Oscillator:
     @property
     def remedy(self) -> str:
         """What tests a ratio of displacements; no run, where there are ties."""
-        tied = "runs leave out ties, and the linear check alone is left"
+        tied = "runs leave out ties: judge by the linear check alone"
         return tied if self.placed.ties else "a time history with large displacements can test it"
 
     def _check_displacement(self) -> AssessmentCheck:

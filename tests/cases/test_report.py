@@ -224,7 +224,7 @@ def test_demand_and_capacity_stand_beside_their_doubts(kept, undrawn):
     assert facts["in doubt"] == "limit analysis"
     failed = (
         "By the kinematic assessment on the spectrum of the motion it fails by displacements "
-        "(0.45), passes the linear check (2.89). No clause that was read says which governs."
+        "(0.45), passes by the linear check (2.89). No clause that was read says which governs."
     )
     rate = "Annual rate: median PGA 6 m/s², falls at 0.002 a year."
     unchecked = "Perpendicular to this section, as along a wall, it was not checked."
