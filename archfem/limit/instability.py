@@ -239,7 +239,8 @@ def list_margins_at_rest(
         return
     factors = find_factors_at_rest(structure, strength, fill)
     if 0.0 < (depth := min(factors.values(), default=0.0)) < 1.0 / _LITTLE_DEPTH:
-        yield depth, "the depth of its joints"
+        over = ", the least over what is assumed of its fill" * (len(factors) > 1)
+        yield depth, f"the depth of its joints{over}"
     if (least := least_friction(structure)) and least > _LITTLE_FRICTION:
         yield float(structure.friction.max()) / least, "the friction of its joints"
 

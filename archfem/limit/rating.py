@@ -34,7 +34,7 @@ from archfem.limit.vehicles import (
 from archfem.limit.worst_places import (
     CRUSHING,
     find_least_factors,
-    refine_worst_place,
+    refine_worst_places,
     spread_over_bridge,
 )
 from archfem.masonry.loads import PointLoad
@@ -605,8 +605,8 @@ def rate(  # noqa: PLR0913  (factors of the check, and the strength of the bridg
         moving, positions = moving.joined(drive(width, area_load, ends)), [*positions, *ends]
     if isinstance(fill, Fill) and not np.isnan(moving.worst.factor):
         loads = spread_over_bridge(weighted, rows, width, axles)
-        place = refine_worst_place(weighted, positions, loads, live * area_load, options, moving)
-        moving = moving.joined(drive(width, area_load, [place]))
+        worst = refine_worst_places(weighted, positions, loads, live * area_load, options, moving)
+        moving = moving.joined(drive(width, area_load, worst))
     least = min(width, rule), max(area_load, driven.area_load)
     is_by_rule = np.allclose(least, (width, area_load), rtol=1e-9, atol=0.0)
     by_rule = np.nan if is_by_rule else drive(*least, [moving.position]).worst.factor

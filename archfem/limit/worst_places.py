@@ -40,20 +40,24 @@ def spread_over_bridge(
     return [np.column_stack([structure.width / width * row, axles[:, 1]]) for row in rows]
 
 
-def refine_worst_place(
+def refine_worst_places(
     structure: Structure,
     places: Sequence[float],
     vehicles: Sequence[Array],
     area_load: float,
     options: dict[str, Any],
     moving: MovingLoad,
-) -> float:
-    """Return the worst place of a vehicle on a fill, between the places beside the worst [m]."""
+) -> list[float]:
+    """Return the worst place of a vehicle on a fill in each direction, beside that known [m]."""
     stones, dead = self_weight_programme(structure, **options)
     strips = {strip: stones.load([strip]) for strip in cut_road(structure, area_load)}
-    worst = [(vehicle, moving.direction, moving.position) for vehicle in vehicles]
-    found = [_search_between(structure, places, x, stones, dead, strips) for x in worst]
-    return min(found, key=lambda each: each[0])[1]
+    worst = dict[float, None]()
+    for way in DRIVING_DIRECTIONS:
+        place = float(moving.factors["factor"].sel(direction=way).idxmin("position"))
+        known = [(vehicle, way, place) for vehicle in vehicles]
+        found = [_search_between(structure, places, x, stones, dead, strips) for x in known]
+        worst[min(found, key=lambda each: each[0])[1]] = None
+    return sorted(worst)
 
 
 def _search_between(

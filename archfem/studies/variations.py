@@ -508,7 +508,7 @@ def _say_spreads(
     spreads = [
         f"{_UNMEASURED.get(each, each)} ({min(ends[each]):.4g} to {max(ends[each]):.4g})"
         for each in order
-        if np.ptp(ends[each]) > 0.0
+        if np.ptp(ends[each]) > 1e-4 * given  # digits that are printed
     ]
     return [range_text, *[f"measure first, for {vehicle}: {', '.join(spreads)}"] * bool(spreads)]
 

@@ -209,7 +209,7 @@ def describe_push(data: ReportData, name: str, push: PushFactors) -> Iterator[st
     beside = elastic or not data.runs or "pushover" in data.statements
     less = "; elastic joints may bear less, and no pushover was computed" * (not beside)
     yield f"{text}; to move is no collapse{less}"
-    if then := moves if data.runs else "shaken it may begin to move at less":
+    if then := moves if data.runs else "shaken it may begin to move at less than by that push":
         yield then
 
 
