@@ -699,8 +699,9 @@ def test_a_mechanism_of_stronger_ties_puts_the_ratio_of_given_ones_in_doubt(held
         f"displacements: two-hinge mechanism has {ratio}; the linear check alone is passed from "
         f"{needed:.3g} kN of the tie at block 2 on"
     )
-    lower = f"pushed to the right, two-hinge mechanism has {ratio} (NTC-2018 SLV) with 1.41 times the forces"
-    assert doubt.startswith(f"{lower} of the ties, and with those given the least is {own:.3g}: ")
+    lower = f"pushed to the right, two-hinge mechanism has {ratio} (NTC-2018 SLV) with 1.41 times"
+    given = f"the forces of the ties, and with those given the least is {own:.3g}: "
+    assert doubt.startswith(f"{lower} {given}")
     # a bound from below bounds no ratio with less force
     assert "with these it is not shown to pass either" in doubt
 
