@@ -53,8 +53,10 @@ def refine_worst_places(
     strips = {strip: stones.load([strip]) for strip in cut_road(structure, area_load)}
     worst = dict[float, None]()
     for way in DRIVING_DIRECTIONS:
-        place = float(moving.factors["factor"].sel(direction=way).idxmin("position"))
-        known = [(vehicle, way, place) for vehicle in vehicles]
+        factors = moving.factors["factor"].sel(direction=way)
+        # of places that mirror each other the first one, whatever the rounding
+        first = int(np.argmax(factors.values <= (1.0 + 1e-6) * factors.values.min()))
+        known = [(vehicle, way, float(factors["position"][first])) for vehicle in vehicles]
         found = [_search_between(structure, places, x, stones, dead, strips) for x in known]
         worst[min(found, key=lambda each: each[0])[1]] = None
     return sorted(worst)
