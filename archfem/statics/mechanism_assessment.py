@@ -571,10 +571,14 @@ class _Oscillator:
 
     @cached_property
     def control(self) -> int:
-        """Number of the block of the control point, the centroid fastest along x at rest."""
+        """Number of the block of the control point, the centroid fastest along x at rest.
+
+        Of centroids that are equally fast it is the first one, whatever the rounding.
+        """
         assert self.path is not None
         free = np.array(self.placed.structure.free)
-        return int(free[np.abs(self.path.velocity[free, 0]).argmax()])
+        speeds = np.abs(self.path.velocity[free, 0])
+        return int(free[np.argmax(speeds >= (1.0 - 1e-6) * speeds.max())])
 
     @cached_property
     def e_star(self) -> float:
