@@ -220,8 +220,8 @@ class KinematicAssessment(ResultDisplay):
     def _summary(self) -> str:
         """Describe the result in one line."""
         vanishes = f"d_0* {self.d_0_star:.4g} m, " if np.isfinite(self.d_0_star) else ""
-        last, pairs = self.checks[-1], [(x.decisive, x.ratio) for x in (self.checks[-1], self.linear)]
-        outcome = last.outcome if last.unshown else describe_difference(*pairs) or last.outcome
+        last, both = self.checks[-1], [(x.decisive, x.ratio) for x in self.checks[::-1]]
+        outcome = last.outcome if last.unshown else describe_difference(*both) or last.outcome
         return (
             f"KinematicAssessment of '{self.structure.name}': alpha_0 {self.alpha_0:.4g}, a_0* "
             f"{self.a_0_star:.4g} m/s², {vanishes}{'; '.join([outcome, *self._lower])}"
