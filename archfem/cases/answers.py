@@ -409,9 +409,9 @@ def describe_margin(found: Iterable[KinematicAssessment]) -> str:
         of = of if ratios.floor is None else " with e* = 1"
         outcome = over.outcome if ratios.needed else check.words
         return f"least margin{of} {over.describe(digits=3)}, by {check.name}: {outcome}"
-    others = [x.decisive for x, way in alike if way != sense and x.ratio > 1.001 * check.ratio]
+    others, least = [x.decisive for x, way in alike if way != sense], ratios.decisive
     side, other = "", ""
-    if others:
+    if others and min(others) > 1.001 * least:
         side = f", pushed to the {name_side(sense)}"
         other = f"; pushed to the {name_side(-sense)} {format_ratio(min(others))} by the same check"
     outcome = compare_checks(checks) or check.words

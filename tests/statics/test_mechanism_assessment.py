@@ -250,6 +250,13 @@ def test_a_tie_bears_what_equilibrium_needs(force, factor, pull):
     )
     assert ", pushed to the left: " in describe_margin([found, free])
     assert ", pushed to" not in describe_margin([free, replace(free, direction=1.0)])
+    # one more mechanism of the other sense, of a higher ratio, makes that no stronger
+    checks = {
+        name: replace(getattr(free, name), ratio=2.0 * getattr(free, name).ratio, bodies=None)
+        for name in ("linear", "displacement")
+    }
+    both = [free, replace(free, direction=1.0), replace(free, direction=1.0, **checks)]
+    assert ", pushed to" not in describe_margin(both)
 
 
 def overturn(height, top, weight, pull=0.0, level=0.0, half=0.25):
