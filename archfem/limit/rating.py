@@ -32,7 +32,7 @@ from archfem.limit.vehicles import (
     vehicle_positions,
 )
 from archfem.limit.worst_places import (
-    CRUSHING,
+    CRUSHING_PREFIX,
     find_least_factors,
     refine_worst_places,
     spread_over_bridge,
@@ -539,7 +539,7 @@ def rate(  # noqa: PLR0913  (factors of the check, and the strength of the bridg
 
     The vehicle drives over the bridge in both directions (`moving_load`), from on to off in steps
     of 1/100 of the bridge's length, or 1/20 with a plastic fill. With a `Fill` a step beside the
-    worst place is searched to a thousandth. Without fill places follow where an axle stands at an
+    worst place is searched to a hundredth. Without fill places follow where an axle stands at an
     end of a stone, beside the least factors of these. Its axles spread through a fill
     along the bridge; across it they spread evenly over `width`. The distributed load of its code
     grows with them, where it is adverse (`moving_load`). The geometric factor of safety is
@@ -698,5 +698,5 @@ def _other_states(options: dict[str, Any], crushes: bool) -> dict[str, dict[str,
     if np.isinf(options["strength"]) and crushes:
         soft = options | {"strength": ASSUMED_STRENGTH}
         crushed = {"factor": fill, **fills}
-        states |= {f"{CRUSHING}{x}": soft | {"fill": other} for x, other in crushed.items()}
+        states |= {f"{CRUSHING_PREFIX}{x}": soft | {"fill": other} for x, other in crushed.items()}
     return states

@@ -26,11 +26,11 @@ from archfem.masonry.loads import PointLoad
 from archfem.masonry.structure import Structure
 
 # Prefix of the states in which stones crush at the assumed strength
-CRUSHING = "crushing "
+CRUSHING_PREFIX = "crushing "
 
 # Each state with those whose factors guide its search, in the order of their searches
 _GUIDES: dict[str, Sequence[str]] = {"": (), **WEAKER_FILLS}
-_GUIDES |= {f"{CRUSHING}{state}": (state, "by_pressure") for state in WEAKER_FILLS}
+_GUIDES |= {f"{CRUSHING_PREFIX}{state}": (state, "by_pressure") for state in WEAKER_FILLS}
 
 
 def spread_over_bridge(
@@ -80,7 +80,7 @@ def _search_between(
     k = int(np.abs(known - place).argmin())
     low, high = known[max(k - 1, 0)], known[min(k + 1, len(known) - 1)]
     least, rows = np.inf, dict[AxleRow, Array]()
-    for _ in range(2):  # to a hundredth of the distance, and to a thousandth of that
+    for _ in range(2):  # to a tenth of the step between places, then to a hundredth
         fine = np.append(place, np.linspace(low, high, 21))
         at = {axles_on_structure(structure, vehicle, way, x): float(x) for x in fine[::-1]}
         loads = {row: stones.load(row) for row in at if row}
@@ -125,13 +125,13 @@ def find_least_factors(
             continue
         guide = next((guides[x] for x in _GUIDES[name] if x in guides), np.zeros(len(axles)))
         # these are worst with sliding that dilates: without, one of the next may be
+        several = given["friction"] == "nonassociated"
         worst, guides[name] = find_worst_rows(dead, axles, strips, guide)
-        if isinstance(given["fill"], Fill) and worst:
+        if isinstance(given["fill"], Fill) and worst and not several:
             place = place_of[[*axles][int(guides[name].argmin())]]
-            fine = _search_between(structure, places, place, stones, dead, strips)[-1]
-            worst = fine if given["friction"] != "nonassociated" else worst
-        worst = dict(islice(worst.items(), 1 if given["friction"] != "nonassociated" else 3))
+            worst = _search_between(structure, places, place, stones, dead, strips)[-1]
+        worst = dict(islice(worst.items(), 3 if several else 1))
         factors[name] = min(collapse_factors(stones, dead, worst, given).values())
-    crushed = [name for name in states if name.startswith(CRUSHING)]
-    table = {name.removeprefix(CRUSHING): factors.pop(name, np.nan) for name in crushed}
+    crushed = [name for name in states if name.startswith(CRUSHING_PREFIX)]
+    table = {name.removeprefix(CRUSHING_PREFIX): factors.pop(name, np.nan) for name in crushed}
     return factors | {"crushing": table}

@@ -33,7 +33,7 @@ PART_ROLES = ("ring", "pier", "other")
 MAX_SPAN, MAX_HOLLOW = 2.5, 0.25
 
 # Cosine of the slope up to which a bed is level as drawn, and a springer has none towards its ring
-LEVEL = 0.999
+MIN_LEVEL_COSINE = 0.999
 
 # Cosine of the angle up to which faces of a springing are parallel [-]
 PARALLEL = 0.98
@@ -182,7 +182,7 @@ def _find_strays(
                 one_end = depths[mine & ~same].min() < 1.15 * usual
                 # a springer has a sloping joint towards the ring, the top of a pier a level one
                 inner = normals[same & (pairs == a).any(axis=1), 1]
-                is_top = min(abs(away[1]), np.abs(inner).min(initial=1.0)) > LEVEL
+                is_top = min(abs(away[1]), np.abs(inner).min(initial=1.0)) > MIN_LEVEL_COSINE
                 if (one_end or is_top) and depth > max(
                     1.3 * usual, np.ptp(blocks[b].points[:, 0]) / 1.05
                 ):
@@ -270,7 +270,7 @@ def _find_pier_tops(
         below, above = pair if normal[1] > 0.0 else pair[::-1]
         low, high, least = blocks[below], blocks[above], depths[(pairs == above).any(axis=1)].min()
         one_ring = low.part == high.part and high.role == "ring" and not low.fixed
-        if one_ring and abs(normal[1]) > LEVEL and depth > 1.3 * least:
+        if one_ring and abs(normal[1]) > MIN_LEVEL_COSINE and depth > 1.3 * least:
             why = (
                 f"{format_mm(depth)} broad on '{low.name}' and {format_mm(least)} at its other end"
             )

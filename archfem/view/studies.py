@@ -26,7 +26,7 @@ REQUIRED_FACTORS = ("factor", "without_pressure", "full_pressure", "geometric")
 WIDE_RATIO = 50.0
 
 # Dashes of the lines over a key, one after the other
-DASHES = "-", "--", "-.", ":"
+LINE_DASHES = "-", "--", "-.", ":"
 
 
 class FragilityCurve(Protocol):
@@ -231,7 +231,7 @@ def _draw_over_key(
         colour = colours.setdefault(words, Colour.LINES[len(colours)])
         known = group[np.isfinite(group["value"])].sort_values(key)
         look = {"ms": 3.5, "lw": 1.2, "color": colour, "label": label}
-        dashes = DASHES[[*colours].index(words) % len(DASHES)]  # equal lines show through
+        dashes = LINE_DASHES[[*colours].index(words) % len(LINE_DASHES)]  # equal lines show through
         axes.plot(known[key], known["value"], "o" + dashes * joined, **look)
         bounds = known[known["bounded"]]
         if len(bounds):
