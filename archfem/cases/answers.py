@@ -39,10 +39,10 @@ from archfem.units import STANDARD_GRAVITY, Ends, format_ratio, kN
 # Results by the names of their files
 RESULTS = {
     "limit": "limit analysis",
-    "thickness": "least thickness",
     "pushover": "pushover",
     "rating": "rating",
     "assessment": "kinematic assessment",
+    "thickness": "least thickness",
     "scale": "scale of the motion",
     "risk": "annual rate of collapse",
     "modes": "modes",

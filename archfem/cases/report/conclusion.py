@@ -1,10 +1,8 @@
 """Head and conclusion of a report: who signs what, outcome with margin and range."""
 
 import re
-from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from itertools import compress
 from typing import Any
 
 import numpy as np
@@ -13,7 +11,11 @@ from archfem._files import group_of, read_file_list
 from archfem.cases import result_text
 from archfem.cases.answers import NOT_COMPUTED, RESULTS, Ratios, Row, Statement, read_numbers
 from archfem.cases.case import REPORT_KEYS
-from archfem.cases.defaults import list_default_keys, list_materials_and_contacts
+from archfem.cases.defaults import (
+    list_default_keys,
+    list_materials_and_contacts,
+    say_loads_left_out,
+)
 from archfem.cases.push_factors import PushFactors
 from archfem.cases.report import margins, outcomes
 from archfem.cases.report.demands import list_demands, name_spectrum, tabulate_demands
@@ -33,12 +35,13 @@ from archfem.cases.report.motion_rules import find_missed, find_rule, name_norm
 from archfem.cases.report.outcomes import sentence
 from archfem.cases.report.report_data import SHOWN_RESULTS, ReportData
 from archfem.cases.report.scales import find_first_failures, say_fragile
-from archfem.cases.report.study_findings import say_what_changes
+from archfem.cases.report.study_findings import MAX_TIE_DIFFERENCE, say_what_changes
 from archfem.cases.run import CASE_FILE
 from archfem.dynamics.collapse_state import COLLAPSE_STATES, FALLEN_STATES, RANGE_REMEDY
 from archfem.dynamics.rigid_body.rocking_body import describe_first_fall
 from archfem.dynamics.verdict_range import UNVARIED, VerdictRange
 from archfem.dynamics.walls_across import SCALES_ACROSS
+from archfem.limit.instability import list_margins_at_rest
 from archfem.masonry.structure import join_names, join_words
 from archfem.models.model import Doubt
 from archfem.units import Ends, format_mm, format_ratio
@@ -67,6 +70,15 @@ DEFAULT_STIFFNESS = "the stiffness of joints is a default: measured ones differ 
 
 # Demands of which factors of several cases are multiples, in words
 KINDS = "the earthquake", "the site's acceleration by a push", "the vehicle", "the given load"
+
+# Verdicts on cases, the worst first
+VERDICTS = (
+    "It does not survive",
+    "A check or a demand fails",
+    "Not decided",
+    "It survives with damage",
+    "All that was checked is passed",
+)
 
 # Project in the templates of new cases
 PLACEHOLDER = "Name of the project"
@@ -111,41 +123,41 @@ def list_facts(data: ReportData) -> list[tuple[str, str]]:
 
 
 def list_joint_facts(parts: Mapping[str, ReportData]) -> list[tuple[str, str]]:
-    """List who signs what, the worst verdict and the least margin, and the answer of each case."""
+    """List who signs what, the worst verdict, the least margins, and the other verdicts."""
     heads = {name: list_facts(data) for name, data in parts.items()}
     keys = [key for head in heads.values() for key, _ in head if key in _SIGNED]
     signed = [(key, _join_values(heads, key)) for key in dict.fromkeys(keys)]
     answer, margin, _, left = HEAD
-    unchecked = [text for head in heads.values() for key, text in head if key == left]
-    said = dict[str, str]()
-    for name, head in heads.items():
-        alone = {left} if unchecked.count(dict(head).get(left, "")) == 1 else set()
-        texts = [text for key, text in head if key in {answer, margin, *alone}]
-        texts += [f"In doubt: {text}." for key, text in head if key == "in doubt"]
-        said[name] = " ".join(texts)
     ranks = {name: _rank_verdict(data) for name, data in parts.items()}
     place = min(each for each, _ in ranks.values())
-    worst, listed = dict[str, str](), list[str]()
+    worst, listed = dict[str, list[str]](), list[str]()
     for kind in KINDS:  # factors on demands of several kinds have no order
         own = {name: least[kind] for name, (_, least) in ranks.items() if kind in least}
-        sizes = {name: _say_factor(parts[name], x, kind) for name, x in own.items()}
         order = sorted(own, key=own.__getitem__)
-        listed += [f"of {name} {sizes[name]}" for name in order]
-        for name in [name for name in order if ranks[name][0] == place][:1]:
-            worst.setdefault(name, f"{name} ({sizes[name]})")
+        sizes = {name: _say_factor(parts[name], own[name], kind) for name in order}
+        listed += [f"of {name} {size}" for name, size in sizes.items()]
+        first = [name for name in order if ranks[name][0] == place]
+        for name in first:
+            if own[name] <= own[first[0]] * (1.0 + MAX_TIE_DIFFERENCE):
+                worst.setdefault(name, []).append(sizes[name])
     listed += [f"of {name} not known" for name, (_, least) in ranks.items() if not least]
     facts = [("cases", "; ".join(data.name for data in parts.values()))]
-    words = f"The worst of {len(parts)} cases, each by its kind of demand, are "
+    said = {name: dict(head).get(answer, "") for name, head in heads.items()}
     if len(worst) > 1:
-        facts.append((answer, f"{words}{join_words([*worst.values()])}."))
+        named = [f"{name} ({join_words(each)})" for name, each in worst.items()]
+        kinds = ", each by its kind of demand," * (len({*map(tuple, worst.values())}) > 1)
+        words = f"the worst of {len(parts)} cases{kinds} are {join_words(named)}."
+        facts.append((answer, f"{VERDICTS[place]}: {words}"))
     else:
         name = next(iter(worst), min(ranks, key=lambda x: ranks[x][0]))
         facts.append((answer, f"The worst of {len(parts)} cases is {name}: {said.pop(name)}"))
     facts.append((margin, f"The least margins are {'; '.join(listed)}."))
-    for text in (x for x in dict.fromkeys(unchecked) if unchecked.count(x) > 1):
-        alike = [name for name, head in heads.items() if (left, text) in head]
-        facts.append((left, f"{join_words(alike)}: {text}"))
-    return [*signed, *facts, *said.items()]
+    unchecked = dict[str, list[str]]()
+    for name, head in heads.items():
+        for text in (text for key, text in head if key == left):
+            unchecked.setdefault(text, []).append(name)
+    facts += [(left, f"{join_words(names)}: {text}") for text, names in unchecked.items()]
+    return [*signed, *facts, *((name, text) for name, text in said.items() if text)]
 
 
 def _join_values(heads: Mapping[str, list[tuple[str, str]]], key: str) -> str:
@@ -174,7 +186,8 @@ def _say_factor(data: ReportData, factor: float, kind: str) -> str:
     rated = data.statements["rating"].rows if kind == KINDS[2] else []
     for row in (x for x in rated if x.numbers["least"] == factor):
         bounds += [factor] * (NOT_COMPUTED in row.numbers.get("state", ""))
-        until = "".join(f", {x}" for x in (row.demand, row.numbers.get("state")) if x)
+        named = row.demand.partition(" (")[0], row.numbers.get("state")
+        until = "".join(f", {x}" for x in named if x)
     at_least = any(check.unshown and check.decisive == factor for check in checks)
     bound = "at least " if at_least else "at most " * (factor in bounds)
     return f"{bound}{format_ratio(factor)} times {kind}{until}"
@@ -203,8 +216,8 @@ def _rank_verdict(data: ReportData) -> tuple[int, dict[str, float]]:
     demands = shaken, pushed, [x.numbers["least"] for x in rows], factors
     every = zip(KINDS, (min(x, default=np.inf) for x in demands), strict=True)
     undecided = outcome.startswith("may") or (bool(data.runs) and bool(_say_why_undecided(data)))
-    places = outcome == "does not survive", any(fails), undecided, "damage" in outcome, True
-    return places.index(True), {kind: least for kind, least in every if least < np.inf}
+    holds = outcome == "does not survive", any(fails), undecided, "damage" in outcome, True
+    return holds.index(True), {kind: least for kind, least in every if least < np.inf}
 
 
 def _say_plainly(data: ReportData, doubtful: Sequence[str]) -> Iterator[tuple[str, str]]:
@@ -234,7 +247,9 @@ def _say_plainly(data: ReportData, doubtful: Sequence[str]) -> Iterator[tuple[st
             yield from ((answer, x) for x in _say_ratings(data, stated))
         elif name == "risk" or not (data.runs or pushes or name in ("assessment", "scale")):
             for row in stated.rows[:1]:
-                times = f", at {row.factor} times {row.demand}" * (row.factor != "-")
+                of_load = name in ("limit", "pushover")
+                times = f"at {row.factor} times" if of_load else f"factor {row.factor}"
+                times = f", {times} {row.demand}" * (row.factor != "-")
                 yield answer, f"{row.result}: {row.outcome}{times * (name != 'risk')}"
     less = [words for x, words, _ in margins.say_less(data) if x < 1.0 or not data.runs]
     yield from ((depends, words) for words in less)
@@ -355,6 +370,8 @@ def _say_conditions(data: ReportData) -> Iterator[str]:
     ):
         norm = name_norm(find_rule(data))
         yield f"the motions do not meet {norm} by their {listed}"
+    if len(data.runs) + len(data.missing) == 1 and outcomes.find_worst(data)[1] == "survives":
+        yield "one motion was run, and others of its size may do otherwise"
     ranges = sorted(data.verdict_ranges, key=lambda x: (x.falls.sum(), x.dislocated.sum()))
     for found in ranges[-1:]:
         motion = found.dataset.attrs.get("motion")
@@ -407,7 +424,6 @@ def build_conclusion(data: ReportData) -> Section:
             doubts.setdefault(result, []).append(doubt)
         stated.add(doubt.kind)
     doubtful, decisive = [*dict.fromkeys(x for x, _ in every)], list_decisive_doubts(data, every)
-    rows, whole = _mark_rows(data, every, decisive)
     blocks: list[Any] = tabulate_demands(data)
     for lead, texts in _build_paragraphs(data, decisive).items():
         sentences = [*map(sentence, texts)]
@@ -426,46 +442,48 @@ def build_conclusion(data: ReportData) -> Section:
         blocks.append(TextBlock(f"{lead}, {result}: {' '.join(shown)}", manner))
     for result, notes in list_notes(data).items():
         blocks.append(TextBlock(f"Note, {result}: {' '.join(map(sentence, notes))}", "missing"))
-    if rows:
-        head = ("", "demand", "capacity or outcome", "factor")
-        named = dict.fromkeys(_FACTORS[name] for name in _FACTORS if name in data.statements)
-        factors = f". Factors are multiples of the demand: {'; '.join(named)}" * bool(named)
-        factors += f". In doubt as a whole: {join_words(whole)}" * bool(whole)
-        blocks.append(Grid(head, rows, f"Demand and capacity{factors}", "words"))
+    # of several cases one table has them all
+    blocks += [] if data.label else tabulate_capacities({"": data})
     blocks += map(TextBlock, _list_outdated(data))
     blocks += [] if data.label else [build_signatures(data.case.report)]
     return Section("Conclusion", blocks)
 
 
-def _mark_rows(
-    data: ReportData, doubts: Sequence[tuple[str, Doubt]], decisive: Sequence[str]
-) -> tuple[list[Sequence[str]], list[str]]:
-    """Return the rows of the capacities, and results of which all rows of several are in doubt.
+def tabulate_capacities(parts: Mapping[str, ReportData]) -> list[Grid]:
+    """Tabulate demands and capacities of one or several cases; none without any."""
+    named = dict[Sequence[str], list[str]]()
+    for name, data in parts.items():
+        for row in _mark_rows(data):
+            named.setdefault(row, []).append(name)
+    rows = [(join_words(names), *row) if names[0] else row for row, names in named.items()]
+    stated = {name for data in parts.values() for name in data.statements}
+    words = dict.fromkeys(_FACTORS[name] for name in _FACTORS if name in stated)
+    factors = f". Factors are multiples of the demand: {'; '.join(words)}" * bool(words)
+    head = (*["case"] * (len(parts) > 1), "", "demand", "capacity or outcome", "factor")
+    return [Grid(head, rows, f"Demand and capacity{factors}", "words")] if rows else []
 
-    Rows are marked that a doubt is about, by its motion or its check; without, it is about all.
+
+def _mark_rows(data: ReportData) -> Iterator[tuple[str, ...]]:
+    """Yield the rows of the capacities of a case, each marked that a doubt is about.
+
+    A doubt is about rows of its motion or its check; without these, about all rows of its result.
     """
     rows, pairs = [*_capacity_rows(data)], {*data.runs, *data.pairs}
     checks = {row.numbers.get("check") for _, row in rows}
+    doubts = list_doubts(data)
+    decisive = list_decisive_doubts(data, doubts)
 
     def is_about(doubt: Doubt, row: Row) -> bool:
         named = [f"'{pair}'" for pair in pairs if f"'{pair}'" in doubt.place]
         named += [name for name in checks if name and name in doubt.values]
         return not named or any(name in f"{row.result} {row.demand}" for name in named)
 
-    marked = [
+    for result, row in rows:
         # what a bound from above fails it fails for certain
-        (row.numbers.get("most", 1.0) >= 1.0 or result in decisive)
-        and any(of == result and is_about(doubt, row) for of, doubt in doubts)
-        for result, row in rows
-    ]
-    names = [result for result, _ in rows]
-    counts = Counter(compress(names, marked))
-    whole = [result for result, count in counts.items() if 1 < count == names.count(result)]
-    grid = list[Sequence[str]]()
-    for (result, row), mark in zip(rows, marked, strict=True):
-        in_doubt = " (in doubt)" * (mark and result not in whole)
-        grid.append((*row[:2], f"{row.outcome}{in_doubt}", row.factor))
-    return grid, whole
+        uncertain = row.numbers.get("most", 1.0) >= 1.0 or result in decisive
+        about = any(of == result and is_about(doubt, row) for of, doubt in doubts)
+        in_doubt = " (in doubt)" * (uncertain and about)
+        yield row.result, row.demand, f"{row.outcome}{in_doubt}", row.factor
 
 
 def _list_outdated(data: ReportData) -> Iterator[str]:
@@ -561,6 +579,7 @@ def _capacity_rows(data: ReportData) -> Iterator[tuple[str, Row]]:
     if data.runs:
         verdicts = [run.verdict for run in data.runs.values()]
         demand, outcome = outcomes.describe_peaks(data.runs.values()), verdicts[0].outcome
+        demand = f"{len(verdicts)} motion{'s' * (len(verdicts) > 1)}, {demand}"
         outcome = result_text.count_outcomes(verdicts) if len(verdicts) > 1 else outcome
         outcome += f"; not run: {', '.join(data.missing)}" * bool(data.missing)
         # of a fall it is the way to the ground
@@ -591,3 +610,8 @@ def _capacity_rows(data: ReportData) -> Iterator[tuple[str, Row]]:
         of = f" of {name_spectrum(data)}" if result == "assessment" else ""
         for row in sorted(statement.rows, key=lambda x: not _is_of_norm(data, x.demand)):
             yield RESULTS[result], row._replace(demand=f"{row.demand}{of}")
+    case, limit = data.case, data.case.limit
+    at_rest = list_margins_at_rest(case.structure, limit.strength, limit.fill)
+    for times, of in () if "thickness" in data.statements else at_rest:
+        outcome = f"stands; the factor is of {of}{say_loads_left_out(case)}"
+        yield "", Row("at rest", "its own weight", outcome, format_ratio(times), {})

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from archfem.cases.answers import Ratios, compare_checks, read_numbers
-from archfem.cases.defaults import note_loads_left_out, say_loads_left_out
+from archfem.cases.defaults import note_loads_left_out
 from archfem.cases.push_factors import PushFactors, peak_of_spectrum, site_acceleration
 from archfem.cases.report.demands import find_demand, name_spectrum
 from archfem.cases.report.doubts import list_checks, object_to_motions, peak_of_ground
@@ -15,7 +15,6 @@ from archfem.cases.report.scales import describe_scales
 from archfem.cases.report.study_findings import OVER_SITE, find_least
 from archfem.dynamics.collapse_state import COLLAPSE_STATES, FALLEN_STATES
 from archfem.dynamics.rigid_body.rocking_body import describe_first_fall, say_scale
-from archfem.limit.instability import list_margins_at_rest
 from archfem.masonry.out_of_plane import UNCHECKED_ACROSS, describe_transverse_push
 from archfem.units import Ends, format_ratio
 from archfem.view.pages.document import TextBlock
@@ -137,18 +136,9 @@ def describe_margin(data: ReportData) -> Iterator[str]:
 def rank_margins(data: ReportData) -> list[tuple[float, bool, list[str]]]:
     """Return what `list_margins` yields, the least first.
 
-    That at rest, if it counts, is among them where it is less than all. Of what a push may overturn
-    across the plane, unchecked, the least is said to be in the plane.
+    Of what a push may overturn across the plane, unchecked, the least is said to be in the plane.
     """
     margins = sorted(list_margins(data), key=lambda each: each[0])
-    limit = data.case.limit
-    at_rest = list_margins_at_rest(data.case.structure, limit.strength, limit.fill)
-    least = min((each[0] for each in margins), default=np.inf)
-    for factor, of in sorted(at_rest)[:1]:
-        if factor < least:  # alone it has no rank
-            ranked = (factor, True) if least < np.inf else (np.inf, False)
-            left_out = say_loads_left_out(data.case)
-            margins.insert(0, (*ranked, [f"{format_ratio(factor)} at rest, of {of}{left_out}"]))
     push, demand = find_unchecked_push(data) or (np.nan, 0.0)
     for factor, _, texts in [each for each in margins if each[1]][:1]:
         if push < demand * factor:

@@ -16,7 +16,12 @@ from archfem._files import read_listed
 from archfem.cases.answers import Ratios, read_numbers
 from archfem.cases.defaults import describe_margins_at_rest
 from archfem.cases.report import response
-from archfem.cases.report.conclusion import build_conclusion, build_signatures, list_facts
+from archfem.cases.report.conclusion import (
+    build_conclusion,
+    build_signatures,
+    list_facts,
+    tabulate_capacities,
+)
 from archfem.cases.report.doubts import list_elastic_fill, list_ranges, list_varied, spans_run
 from archfem.cases.report.inputs import compare_inputs, describe_value, tabulate_inputs
 from archfem.cases.report.motion_rules import find_rule
@@ -94,8 +99,11 @@ def build_joint_sections(parts: Mapping[str, ReportData]) -> list[Section]:
     report = {key: "; ".join(filter(None, texts)) for key, texts in signed.items()}
     firsts = {join_words(own): parts[own[0]].case.structure for own in labels.values()}
     drawn = [_draw_assessed(each, f"{own}: the") for own, each in firsts.items()]
-    sections = [Section("Signatures and drawings", [build_signatures(report), *drawn])]
-    sections.append(Section("Inputs of all cases", compare_inputs(parts)))
+    sections = [
+        Section("Demand and capacity", tabulate_capacities(parts)),
+        Section("Signatures and drawings", [build_signatures(report), *drawn]),
+        Section("Inputs of all cases", compare_inputs(parts)),
+    ]
     for data in parts.values():
         own = [replace(each, level=each.level + 1) for each in build_sections(data)]
         sections += [Section(data.name, [Grid((), list_facts(data))]), *own]
