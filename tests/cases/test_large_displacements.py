@@ -145,8 +145,8 @@ def test_a_range_in_the_folder_stands_in_place_of_what_a_run_cannot_know(held):
     head = head_of(list_facts(data))
     assert head.startswith(
         "It survives: it stands under the motion 'shake' of PGA 0.03 g, and moves by 0.102 mm. "
-        "From which acceleration on it falls was not computed. With other plausible properties it "
-        "falls in 1 of 4 variations. "
+        "From which acceleration on it falls was not computed. One motion was run, and others of "
+        "its size may do otherwise. With other plausible properties it falls in 1 of 4 variations. "
     )
     lead, changes = sentences_of(data)
     # the share alone would be surer than four runs are: beta.ppf(0.975, 2, 3)

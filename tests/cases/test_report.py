@@ -179,7 +179,12 @@ def test_demand_and_capacity_stand_beside_their_doubts(kept, undrawn):
     moved = "up to {} under 'second', {} at the end".format(*map(format_mm, sizes))
     assert np.argmax([each.displacement for each in verdicts]) == [*data.runs].index("second")
     assert table.rows == [
-        ("time histories", "PGA 0.05 g", f"no mechanism in 2 of 2 runs; displaced by {moved}", "-"),
+        (
+            "time histories",
+            "2 motions, PGA 0.05 g",
+            f"no mechanism in 2 of 2 runs; displaced by {moved}",
+            "-",
+        ),
         ("limit analysis", "the given load", "it turns, at 4.8 times the load (in doubt)", "4.8"),
         ("rating", "LM1", "passes without all, with 2 axles at -0.1, 1.1 m", "1.25"),
         *(

@@ -14,6 +14,7 @@ from pages import head_of
 import archfem as af
 from archfem._files import replace_results
 from archfem.cases import answers
+from archfem.cases.analysis_keys import LimitAnalysis
 from archfem.cases.case import case_of
 from archfem.cases.report import conclusion, inputs, outcomes, report_data, response, sections
 from archfem.cases.report.response import _check_row, supported_weight_ratio
@@ -25,7 +26,10 @@ from archfem.models.model import Doubt
 
 def made_case(structure, **values):
     """A made-up case of a report, without demands."""
-    none = {"limit": SimpleNamespace(demand=None), "assessment": SimpleNamespace(spectrum=None)}
+    none = {
+        "limit": LimitAnalysis((), "coulomb"),
+        "assessment": SimpleNamespace(spectrum=None, options={}),
+    }
     own = {"title": "piers", "structure": structure, "report": {}, "suite": None, "target": None}
     return SimpleNamespace(**own | none | {"settings": {"structure": {}}} | values)
 
