@@ -92,6 +92,11 @@ def scales(motion, held, **given):
     return answers.Scales(motion, 0.2, held, found, given.pop("unfinished", False), **given)
 
 
+def words_of(data):
+    """Return the paragraphs of the conclusion."""
+    return [x.text for x in conclusion.build_conclusion(data).pieces if x.kind == "words"]
+
+
 def say_margin(data, **statements):
     """Sentences on the margin of made-up results."""
     vars(data)["statements"] = statements
@@ -429,11 +434,7 @@ def test_what_fails_under_a_motion_that_was_not_scaled_has_a_margin_below_one(ca
         "of the scales that were run it first is dislocated at 2.00 × and falls at 4.00 ×",
         "'c' was not scaled",
     ]
-    assert (
-        conclusion.build_conclusion(data)
-        .pieces[0]
-        .text.startswith("The least margin is below 1 on 'b'")
-    )
+    assert words_of(data)[0].startswith("The least margin is below 1 on 'b'")
     falls = dict.fromkeys("bde", verdict_of("fallen"))
     many = data_of(case, a=verdict_of(), **falls, f=verdict_of("dislocated"))
     many.runs["e"].dataset.attrs["pga"] = 3.0  # g is 9.81 m/s²
@@ -471,7 +472,7 @@ def test_the_stones_that_are_dislocated_stand_in_no_sentence_of_the_conclusion(c
     first = "It is first dislocated at 0.19 g at most, 0.950 × 'a'; 1 of 2 motions was scaled."
     assert first in plain
     assert "Under 'a' it stands at 1.00 ×, but is dislocated at 0.950 ×: not" in plain
-    assert "loses" not in conclusion.build_conclusion(data).pieces[0].text
+    assert "loses" not in words_of(data)[0]
 
 
 def test_the_box_has_the_push_and_no_scale_of_a_fill_in_tension_at_all(case):
@@ -986,7 +987,7 @@ def test_of_unequal_outcomes_the_worst_is_the_first(case):
     vars(data)["verdict_ranges"] = (VerdictRange(parted),)
     varied = f"{text} and is dislocated in 1, under 'first'. {rest}"
     assert head_of(conclusion.list_facts(data)) == varied
-    text = conclusion.build_conclusion(data).pieces[0].text
+    text = words_of(data)[0]
     assert text.startswith("Under 'first' it falls in none of 2 variations and is disl")
 
 
@@ -1240,12 +1241,11 @@ def test_a_rating_is_stated_by_the_norm_of_the_report_alone(case, norm, first):
     least = 0.9 * float(codes[first])
     assert verdict == f"Rating for lorry {first}: factor {codes[first]}{needed}, passes."
     assert conclusion._rank_verdict(data)[1] == {"the vehicle": pytest.approx(least)}
-    pieces = conclusion.build_conclusion(data).pieces
-    assert pieces[0].text.startswith(f"Lorry {first[:12]}")
+    assert words_of(data)[0].startswith(f"Lorry {first[:12]}")
+    (table,) = conclusion.tabulate_capacities({"": data})
     settings |= {"report": {"demand": "PGA 0.25 g"}}
     vars(data)["case"] = af.Case.of(settings)
     assert demands.tabulate_demands(data) == []  # of a vehicle there is none of an earthquake
-    (table,) = (piece for piece in pieces if getattr(piece, "caption", "").startswith("Demand"))
     assert table.caption.endswith("Factors are multiples of the demand: a load makes a mechanism")
     assert first in table.rows[0][1]
     assert {row[3] for row in table.rows} == {*codes.values()}  # others are not left out
@@ -1654,8 +1654,8 @@ def test_a_push_is_compared_with_a_demand_in_numbers_and_words_are_not_read(
     assert af.commands.main(["limit", str(path), "--out", str(tmp_path / "out")]) == 0
     found = af.cases.open_results(tmp_path / "out")
     data = ReportData(found.case, {}, found.folder)
-    demands, *blocks, table, _ = conclusion.build_conclusion(data).pieces
-    text = " ".join(block.text for block in blocks)
+    demands, table = [x for x in conclusion.build_conclusion(data).pieces if x.kind == "grid"][:2]
+    text = " ".join(words_of(data))
     own = [("push", "PGA 0.2 g", "[limit]", "limit analysis")] if demand else []
     assert [*demands.rows] == [
         (

@@ -240,13 +240,9 @@ def test_demand_and_capacity_stand_beside_their_doubts(kept, undrawn):
     assert head_of(facts.items()).endswith(f"No property was varied. {default} {unchecked}")
     assert f" {rest}{rate} From which acceleration" in head_of(facts.items())
     alone = report_data.ReportData(case, {}, found.folder)
-    (as_stated,), result, margin = (
-        getattr(x, "rows", x) for x in build_conclusion(alone).pieces[:3]
-    )
-    assert as_stated == demands.rows[0]
-    assert result.lead == "Result:"
+    given, _, margin = build_conclusion(alone).pieces[:3]
+    assert given.rows == demands.rows[:1]
     turns = "it turns, at 4.8 times the load"
-    assert result.text.startswith(f"Limit analysis: {turns}")
     assert margin.text.startswith("The least margin is 0.45 (0.5 with the weights apart), on the ")
     facts = dict(list_facts(alone))
     assert head_of(facts.items()).startswith(

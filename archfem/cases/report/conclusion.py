@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -146,8 +147,9 @@ def list_joint_facts(parts: Mapping[str, ReportData]) -> list[tuple[str, str]]:
     if len(worst) > 1:
         named = [f"{name} ({join_words(each)})" for name, each in worst.items()]
         kinds = ", each by its kind of demand," * (len({*map(tuple, worst.values())}) > 1)
+        doubt = ", some of it in doubt" * any("in doubt" in dict(head) for head in heads.values())
         words = f"the worst of {len(parts)} cases{kinds} are {join_words(named)}."
-        facts.append((answer, f"{VERDICTS[place]}: {words}"))
+        facts.append((answer, f"{VERDICTS[place]}{doubt}: {words}"))
     else:
         name = next(iter(worst), min(ranks, key=lambda x: ranks[x][0]))
         facts.append((answer, f"The worst of {len(parts)} cases is {name}: {said.pop(name)}"))
@@ -425,6 +427,8 @@ def build_conclusion(data: ReportData) -> Section:
         stated.add(doubt.kind)
     doubtful, decisive = [*dict.fromkeys(x for x, _ in every)], list_decisive_doubts(data, every)
     blocks: list[Any] = tabulate_demands(data)
+    # of several cases one table has all capacities
+    blocks += [] if data.label else tabulate_capacities({"": data})
     for lead, texts in _build_paragraphs(data, decisive).items():
         sentences = [*map(sentence, texts)]
         if data.statements.keys() != {"rating"}:  # of a result that stands alone each is one
@@ -442,8 +446,6 @@ def build_conclusion(data: ReportData) -> Section:
         blocks.append(TextBlock(f"{lead}, {result}: {' '.join(shown)}", manner))
     for result, notes in list_notes(data).items():
         blocks.append(TextBlock(f"Note, {result}: {' '.join(map(sentence, notes))}", "missing"))
-    # of several cases one table has them all
-    blocks += [] if data.label else tabulate_capacities({"": data})
     blocks += map(TextBlock, _list_outdated(data))
     blocks += [] if data.label else [build_signatures(data.case.report)]
     return Section("Conclusion", blocks)
@@ -513,11 +515,11 @@ def _list_outdated(data: ReportData) -> Iterator[str]:
 def _build_paragraphs(data: ReportData, doubtful: Sequence[str]) -> dict[str, list[str]]:
     """Return the sentences of the answer by their leads: outcomes, margin, what may change it."""
     answer = list[str]()
-    if not data.runs:
-        # an assessment is stated by the margin; a result that stands alone states all of itself
-        stated = [each.sentences for name, each in data.statements.items() if name != "assessment"]
-        stated = [sorted(each, key=lambda x: not _is_of_norm(data, x)) for each in stated]
-        answer += [*stated[0]] if len(data.statements) == 1 and stated else [x for x, *_ in stated]
+    if not data.runs:  # of several results the table has the outcomes, and of an assessment
+        stated = [each for name, each in data.statements.items() if name != "assessment"]
+        told = [each for each in stated if len(data.statements) == 1 or not each.rows]
+        ordered = (sorted(x.sentences, key=lambda y: not _is_of_norm(data, y)) for x in told)
+        answer += chain.from_iterable(ordered)
     answer += [*outcomes.describe_ends(data), *_describe_ranges(data)]
     changes = [*_say_causes(data.verdict_ranges)]
     if not data.runs:  # the head has them beside runs
