@@ -204,7 +204,8 @@ def test_the_extremes_of_each_part_are_those_of_its_joints(piers):
 def test_the_first_lines_of_a_report_have_the_largest_of_all_runs(piers, runs):
     data = report_data.ReportData(made_case(piers), runs)
     facts = dict(conclusion.list_facts(data))
-    assert facts["structure"] == f"{len(piers.free)} blocks, {len(piers.joints)} joints"
+    counts = f"{len(piers.free)} blocks, {len(piers.joints)} joints"
+    assert facts["structure"] == f"{counts}, 2 m wide"
     assert re.fullmatch(r"Does it withstand motions of PGA 0.03\d to 0.0\d+ g\?", facts["question"])
     doubtful = any(run.verdict.doubts for run in runs.values())
     assert facts.get("in doubt") == ("time histories" if doubtful else None)

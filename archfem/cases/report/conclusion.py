@@ -43,7 +43,7 @@ from archfem.dynamics.rigid_body.rocking_body import describe_first_fall
 from archfem.dynamics.verdict_range import UNVARIED, VerdictRange
 from archfem.dynamics.walls_across import SCALES_ACROSS
 from archfem.limit.instability import list_margins_at_rest
-from archfem.masonry.structure import join_names, join_words
+from archfem.masonry.structure import Structure, join_names, join_words
 from archfem.models.model import Doubt
 from archfem.units import Ends, format_mm, format_ratio
 from archfem.view.pages.document import Grid, Section, TextBlock
@@ -110,7 +110,8 @@ def list_facts(data: ReportData) -> list[tuple[str, str]]:
     ]
     structure = data.case.structure
     joints = len({*structure.face_names})
-    blocks = [("structure", f"{len(structure.free)} blocks, {joints} joints")]
+    extent = f"{joints} joints, {describe_width(structure)}"
+    blocks = [("structure", f"{len(structure.free)} blocks, {extent}")]
     blocks += [("joints", structure.assessment)] if structure.assessment else []
     doubtful = list_decisive_doubts(data, list_doubts(data))
     doubts = [("in doubt", ", ".join(doubtful))] if doubtful else []
@@ -121,6 +122,12 @@ def list_facts(data: ReportData) -> list[tuple[str, str]]:
     named = [f"{x.partition(',')[0]} of PGA {p:.2g} g" for x, p, _, of in list_demands(data) if of]
     question = [("question", f"Does it withstand {join_words(named)}?")] if named else []
     return [*signed, *question, *head, *doubts, *blocks]
+
+
+def describe_width(structure: Structure) -> str:
+    """Say how wide a structure is across its drawing, which is the length of a wall across it."""
+    word = "long" if structure.above is not None else "thick" if structure.heads.any() else "wide"
+    return f"{structure.width:.4g} m {word}"
 
 
 def list_joint_facts(parts: Mapping[str, ReportData]) -> list[tuple[str, str]]:

@@ -19,6 +19,7 @@ from archfem.cases.report import response
 from archfem.cases.report.conclusion import (
     build_conclusion,
     build_signatures,
+    describe_width,
     list_facts,
     tabulate_capacities,
 )
@@ -257,12 +258,11 @@ def _describe_extent(structure: Structure) -> str:
     # the ground is no part of its size
     moving = [structure.blocks[number] for number in structure.free]
     length, height = np.ptp(np.concatenate([block.drawn() for block in moving]), axis=0)
-    along, width = f"{length:.3g} m long", "thick" if structure.heads.any() else "wide"
+    along = f"{length:.3g} m long"
     if structure.above is not None:  # across the plane of a wall, which may lean
-        depths = Ends.of(joint.depth for joint in structure.joints)
-        along, width = f"{depths:.3g} m thick", "long"
+        along = f"{Ends.of(joint.depth for joint in structure.joints):.3g} m thick"
     text = (
-        f"{along}, {height:.3g} m high and {structure.width:.4g} m {width}; "
+        f"{along}, {height:.3g} m high and {describe_width(structure)}; "
         f"{len(moving)} blocks that can move, weighing {structure.weight / kN:.4g} kN, and "
         f"{len({*structure.face_names})} joints."
     )
