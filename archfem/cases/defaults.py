@@ -93,7 +93,7 @@ def list_default_keys(case: Case, item: Material | Contact) -> list[str]:
         and (value := getattr(item, key, None)) is not None
         # other values follow from a finish, or from the shape; E of the pieces of a fill is that of
         # its preset in their joints
-        and (key == "young" or value == getattr(own.preset, key, None))
+        and (key == "young" or value == getattr(own.preset or type(item), key, None))
     ]
 
 

@@ -35,7 +35,14 @@ from archfem.masonry.joint_closing import (
     usual_law,
     with_finish,
 )
-from archfem.masonry.materials import CONTACT_PRESETS, MATERIAL_PRESETS, STONE, Contact, Material
+from archfem.masonry.materials import (
+    CONTACT_PRESETS,
+    MATERIAL_PRESETS,
+    STONE,
+    Contact,
+    DefaultValue,
+    Material,
+)
 from archfem.masonry.shapes import bridges, rings, walls
 from archfem.masonry.shapes.bridge_parts import Arch, Backfill, Paving, Pier, Sidewall
 from archfem.masonry.standing import StandingBody, carrying
@@ -457,18 +464,23 @@ class _PresetNames:
         """Sections [materials] and [contacts]; presets as they are need no table."""
         sections: dict[str, Any] = {}
         for (section, name), item in self.objects.items():
-            if (usual := PRESETS[section].get(name, type(item))) != item:
-                # what equals the default of reading is not given
-                own = _list_fields(item).items()
-                table = {k: x for k, x in own if k != "name" and x != getattr(usual, k, None)}
-                if isinstance(item, Material) and item.strength == STONE.strength:
-                    # a changed copy of the preset, whose own values remain defaults
-                    table = {key: x for key, x in table.items() if x != getattr(STONE, key)}
-                    table |= {"preset": STONE.name} if name != STONE.name else {}
-                table |= {"name": item.name} if item.name != name else {}
-                if isinstance(item, Contact) and (finish := self.finishes.get(item)):
-                    table = {k: v for k, v in table.items() if k not in FINISHED_KEYS}
-                    table["finish"] = finish
+            usual = PRESETS[section].get(name, type(item))
+            # a changed copy of the preset, whose own values remain defaults
+            if isinstance(getattr(item, "strength", None), DefaultValue):
+                usual = STONE
+            table = {
+                key: x
+                for key, x in _list_fields(item).items()
+                if key != "name"
+                # what equals the default of reading is given by hand alone
+                and (x != getattr(usual, key, None) or (x and not isinstance(x, DefaultValue)))
+            }
+            table |= {"preset": STONE.name} if usual is STONE and name != STONE.name else {}
+            table |= {"name": item.name} if item.name != name else {}
+            if isinstance(item, Contact) and (finish := self.finishes.get(item)):
+                table = {k: v for k, v in table.items() if k not in FINISHED_KEYS}
+                table["finish"] = finish
+            if table:
                 sections.setdefault(section, {})[name] = table
         return sections
 

@@ -87,9 +87,9 @@ def columns_across(wall: Structure, *, above: Metres | None = None) -> dict[str,
         loads = [join_words(sorted({*filter(None, compress(words, each))})) for each in areas.T]
         stones, values = [stack.blocks[0]], (weights / width / heights).round(3).tolist()
         for block, weight, load in zip(stack.blocks[1:], values, loads, strict=True):
-            # equal ones share a material
-            stands_for = load or (COURSE_LENGTH if weight != material.unit_weight else None)
-            stone = replace(material, unit_weight=weight, stands_for=stands_for)
+            stone = replace(material, stands_for=load or None)  # equal ones share a material
+            if weight != material.unit_weight:  # or it remains the default that it may be
+                stone = replace(material, unit_weight=weight, stands_for=load or COURSE_LENGTH)
             stones.append(replace(block, material=stone))
         return replace(stack, blocks=tuple(stones), width=width, name=f"{wall.name}, {piece}")
 
@@ -101,9 +101,8 @@ def columns_across(wall: Structure, *, above: Metres | None = None) -> dict[str,
         "strip": build("strip", 1.0, *_fill_strip(levels, solid, carried, areas, spans)),
         "whole": build("whole", foot, *_split_high(blocks, levels, shares, areas)),
     }
-    if pier := _find_worst_pier(wall, levels, shares, unit_weights):
-        columns["pier"] = build(*pier)
-    return columns
+    pier = _find_worst_pier(wall, levels, shares, unit_weights)
+    return columns | ({"pier": build(*pier)} if pier else {})
 
 
 def _split_high(

@@ -15,6 +15,7 @@ from archfem.cases.toml_file import format_tables, parse_tables
 from archfem.joints import DryJoint
 from archfem.joints.own_law import registered_laws
 from archfem.masonry import Stage, assembled
+from archfem.masonry.materials import STONE_TO_STONE
 
 CASES = sorted(
     path
@@ -65,6 +66,41 @@ def test_what_equals_its_default_is_not_written_and_not_given(
     assert (case.settings["analysis"]["damping"] == {"modes": "effective"}) is (mark == "default")
     assert (marks["contact: k_n"], marks["contact: μ"]) == ("given", "given")
     assert not {"contact: cohesion", "contact: dilatancy"} & marks.keys()
+
+
+def marks_of_ring(folder, stone, contact):
+    """Return the marks of the values of a ring's stone and joints after it was written and read."""
+    sizes = {"radius": 3.0, "thickness": 0.5, "embrace": 160.0, "voussoirs": 5}
+    ring = af.circular_arch(**sizes, material=stone, contact=contact)
+    analysis = af.Analysis(ring, fidelity="rigid")
+    case = af.Case.read(analysis.write(folder / "ring.toml"))
+    assert case.analysis == analysis
+    return {row[0]: row[-1] for row in tabulate_inputs(ReportData(case, {})).rows}
+
+
+def test_values_given_in_python_are_given_in_the_file_though_they_equal_defaults(tmp_path):
+    """As friction 0.6, and all that a preset has; what Python left out is a default there too."""
+    given = {"normal_stiffness": 1.48e9, "shear_stiffness": 0.3e9}
+    for name in ("stone to stone", "ashlar"):
+        own = marks_of_ring(tmp_path, af.STONE, af.Contact(**given, friction=0.6, name=name))
+        assert [own[f"{name}: {key}"] for key in ("k_n", "k_s", "μ")] == ["given"] * 3
+        left = marks_of_ring(tmp_path, af.STONE, af.Contact(**given, name=name))
+        assert [left[f"{name}: {key}"] for key in ("k_n", "k_s", "μ")] == [
+            "given",
+            "given",
+            "default",
+        ]
+    changed = marks_of_ring(tmp_path, af.STONE, replace(STONE_TO_STONE, normal_stiffness=2e9))
+    marks = [changed[f"stone to stone: {key}"] for key in ("k_n", "k_s", "μ")]
+    assert marks == ["given", "default", "default"]
+    for name in ("stone", "granite"):
+        stone = af.Material(30e9, 0.2, 20e3, 56e6, name)
+        own = marks_of_ring(tmp_path, stone, STONE_TO_STONE)
+        assert [own[f"{name}: {key}"] for key in ("E", "weight", "strength")] == ["given"] * 3
+        # a strength that is given counts in limit analysis
+        assert af.Case.read(tmp_path / "ring.toml").limit.strength == 56e6
+    again = af.Case.read(tmp_path / "ring.toml").analysis.write(tmp_path / "again.toml")
+    assert again.read_text() == (tmp_path / "ring.toml").read_text()
 
 
 def test_a_shape_is_written_by_its_lengths(tmp_path):
