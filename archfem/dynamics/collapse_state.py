@@ -26,7 +26,7 @@ COLLAPSE_STATES = ("stands", "dislocated", "partly fallen", "fallen")
 # Displacement above which a structure is dislocated, over the depth of the shallowest part [-]
 DISLOCATION = 0.1
 
-# Ratio of the residual displacement to that limit within which the kind is so by little [-]
+# Ratio of the residual displacement to that limit within which other steps may change the kind [-]
 NEAR_LIMIT = 1.5
 
 # Share of the Arias intensity left when strong motion ends, after 95 % of it (Trifunac and Brady,
@@ -215,8 +215,8 @@ def doubt_collapse(
         )
     if limit / NEAR_LIMIT < fall.residual < NEAR_LIMIT * limit and fall.resting:
         yield Doubt(
-            f"it {'stands' if fall.kind == COLLAPSE_STATES[0] else 'is dislocated'} by little: "
-            f"residual displacement {{:mm}}, limit {format_mm(limit)}",
+            f"the residual displacement of {{:mm}} is within a factor of {NEAR_LIMIT} of "
+            f"{format_mm(limit)}, from which on it counts as dislocated",
             "state the displacement rather than the kind",
             (fall.residual,),
         )
@@ -227,9 +227,10 @@ def doubt_standing(structure: Structure, kinds: Iterable[str], residuals: Array)
     limit = DISLOCATION * shallowest_part(structure)[0]
     near = residuals[residuals > limit / NEAR_LIMIT]
     if near.size and not {*kinds} & {*COLLAPSE_STATES[1:]}:
-        words = f"in {{}} of {len(residuals)} runs it stands by little: residual displacements"
-        remedy, values = "state the displacement rather than the kind", (near.size, near.max())
-        yield Doubt(f"{words} of up to {{:mm}}, limit {format_mm(limit)}", remedy, values)
+        words = f"in {{}} of {len(residuals)} runs a residual displacement, up to {{:mm}}, is "
+        words += f"within a factor of {NEAR_LIMIT} of {format_mm(limit)}, where it is dislocated"
+        remedy = "state the displacement rather than the kind"
+        yield Doubt(words, remedy, (near.size, near.max()))
 
 
 def shallowest_part(structure: Structure) -> tuple[float, str]:

@@ -137,9 +137,9 @@ def test_stones_without_a_joint_do_not_pass_through_each_other(build, peak, met)
     (loose,) = [doubt for doubt in run.doubts if doubt.words == LOOSE_BLOCKS]
     others = [doubt for doubt in run.doubts if doubt != loose]
     assert loose.remedy == MEETING_REMEDY
-    by_little = any("is dislocated by little" in doubt.cause for doubt in others)
+    near = any("is within a factor of 1.5 of" in doubt.cause for doubt in others)
     # the wall is displaced by 26 mm, and rigid blocks by 19 mm, where 20 mm decide
-    assert by_little == bool(others) == (build is running_bond)
+    assert near == bool(others) == (build is running_bond)
     frames = [model.rigid_motions(q, q)[0] for q in run.dataset["q"].values]
     frames += list(run.dataset["fall_pose"].values)
     assert deepest_overlap(structure, frames) < DEEPEST
@@ -148,7 +148,7 @@ def test_stones_without_a_joint_do_not_pass_through_each_other(build, peak, met)
     start = af.dynamics.LooseBlocks.as_built(structure)
     rigid = list(simulation.frames(start, motion.duration + 20.0, motion))
     expected = af.dynamics.classify_collapse(structure, rigid).kind
-    assert run.fall.kind == expected or (by_little and expected == "stands")
+    assert run.fall.kind == expected or (near and expected == "stands")
 
 
 def rings_side_by_side(gap):
