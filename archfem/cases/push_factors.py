@@ -1,12 +1,14 @@
 """Pushes as multiples of the acceleration of a site, by `[limit]` or the spectrum of a case."""
 
 from collections.abc import Iterable
+from contextlib import suppress
 from typing import NamedTuple
 
 import numpy as np
 
 from archfem.cases import defaults
 from archfem.cases.case import Case
+from archfem.errors import ArchfemError
 from archfem.limit.collapse import Collapse, Outcome
 from archfem.limit.fill_range import FillRange
 from archfem.masonry.loads import Action, BodyForce
@@ -61,6 +63,23 @@ def compare_with_site(case: Case, *senses: Collapse | None) -> PushFactors | Non
         proved = min(each.bracket[0] for each in searched) * factors.least / low
         factors = factors._replace(proved=max(proved, 0.0))
     return factors and factors._replace(bounded=any(x.bounded for x in ends))
+
+
+def compare_with_motion(case: Case, found: Collapse) -> str:
+    """Say how many times the peak of the case's motion a push is; "" where it has a demand.
+
+    The peak of one motion is no demand of a site.
+    """
+    ends = np.multiply(abs(found.push), found.range)  # [g]
+    is_push = found.push and found.outcome is not Outcome.BRACKETED and np.isfinite(ends[0])
+    if is_push and case.motion and np.isnan(site_acceleration(case)):
+        with suppress(ArchfemError):  # limit analysis needs no record
+            motion = case.ground_motion()
+            site = f"the PGA of '{motion.name}', {motion.pga / STANDARD_GRAVITY:.3g} g"
+            bounded = found.bounded or bool(found.solutions and found.solutions.may_be_less)
+            low, high = ends * STANDARD_GRAVITY / motion.pga
+            return f"{PushFactors(low, high, site, bounded=bounded)} times {site}"
+    return ""
 
 
 def compare_push(case: Case, low: float, high: float, dead: Iterable[Action]) -> PushFactors | None:

@@ -14,7 +14,7 @@ from archfem._optional import can_film
 from archfem._validation import validate_arguments, validate_methods
 from archfem.cases.answers import NO_DEMAND, state_outcome
 from archfem.cases.case import Case
-from archfem.cases.push_factors import PushFactors, compare_push
+from archfem.cases.push_factors import PushFactors, compare_push, compare_with_motion
 from archfem.cases.result_text import Remark, describe_pushover, note_collapse
 from archfem.cases.run import (
     CASE_FILE,
@@ -195,7 +195,8 @@ def limit_files(
     columns = ["name", "N", "V", "M", "eccentricity"]
     joints = collapse.joints.to_dataframe()[columns].to_csv(index=False).rstrip()
     # without a site the factor of a push would be read as one on a demand
-    demand = NO_DEMAND if collapse.push else "the given load"
+    demand = "; ".join(filter(None, [NO_DEMAND, compare_with_motion(case, collapse)]))
+    demand = demand if collapse.push else "the given load"
     if not collapse.push and collapse.outcome is Outcome.COLLAPSES:
         site = PushFactors(*collapse.range, bounded=collapse.bounded)
     remarks: list[Remark] = list(doubts)

@@ -16,7 +16,7 @@ from archfem._files import align_columns
 from archfem.cases import defaults
 from archfem.cases.analysis_keys import LimitAnalysis
 from archfem.cases.case import Case
-from archfem.cases.push_factors import PushFactors, compare_with_site
+from archfem.cases.push_factors import PushFactors, compare_with_motion, compare_with_site
 from archfem.cases.run import DeadLoadResult
 from archfem.dynamics.accuracy import Accuracy
 from archfem.dynamics.collapse_state import FALLEN_STATES
@@ -474,7 +474,8 @@ def describe_limit(
         rank = _compare_senses(found, opposite)
         others.append(f"in the other sense: {opposite.sentence} ({rank})")
     others += filter(None, [defaults.describe_fill_defaults(case)])
-    others += [f"it begins to move at {site} times {site.site}"] if site else []
+    beside = f"{site} times {site.site}" if site else compare_with_motion(case, found)
+    others += [f"it begins to move at {beside}"] * bool(beside)
     others += defaults.note_loads_left_out(case)
     text = describe_collapse(case.structure, found, case.limit, case.parapets)
     return found, "\n".join([text, *others]), site

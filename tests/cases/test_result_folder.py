@@ -1,5 +1,6 @@
 """Files of result folders."""
 
+import json
 import os
 import shutil
 from hashlib import sha256
@@ -12,7 +13,9 @@ import archfem as af
 from archfem._files import read_file_list, replace_results, write_sealed_json
 from archfem.cases import result_folder as results
 from archfem.cases import run as run_module
+from archfem.cases.answers import NO_DEMAND
 from archfem.cases.run import carry_out, link_file, replace_run, run_time_history
+from archfem.cases.toml_file import format_tables
 
 
 def test_more_pairs_than_colours_share_several_pictures(small):
@@ -542,3 +545,35 @@ def test_files_that_are_missing_are_named(two_runs, unplotted, caplog):
     page = af.cases.open_results(folder).report().read_text(encoding="utf-8")
     for text in (caplog.text, page):
         assert "a listed file is missing: first/envelope.png, second/history.nc; put" in text
+
+
+@pytest.mark.parametrize(
+    ("changes", "shown", "factor"),
+    [
+        ([], "2.5 times the PGA of 'synthetic 1', 0.2 g", "-"),
+        (["motion.scale=2.0"], "1.25 times the PGA of 'synthetic 1', 0.4 g", "-"),
+        (["limit.horizontal=0.25"], "2.5 times the PGA of 'synthetic 1', 0.2 g", "-"),
+        (["limit.demand=0.1 g"], "the demand of 0.1 g; vertical acceleration is left out", "5"),
+        (['motion={file="lost.txt"}'], "", "-"),
+    ],
+)
+def test_a_push_stands_beside_the_peak_of_the_motion_which_is_no_demand(
+    changes, shown, factor, tmp_path, capsys, unplotted
+):
+    """A stone 0.5 m broad and 1 m high, which a push of 0.5 g overturns, and a motion of 0.2 g."""
+    tables = {
+        "title": "a stone",
+        "structure": {"shape": "column", "breadth": 0.5, "heights": [1.0]},
+        "contacts": {"stone to stone": {"friction": 0.8}},
+        "limit": {"horizontal": 1.0},
+        "motion": {"synthetic": {"seed": 1, "pga": 0.2 * 9.80665}},
+    }
+    path = tmp_path / "stone.toml"
+    path.write_text(format_tables(tables), encoding="utf-8")
+    given = [x for change in changes for x in ("--set", change)]
+    assert af.commands.main(["limit", str(path), *given, "--out", str(tmp_path / "out")]) == 0
+    ((_, demand, _, capacity, _),) = json.loads((tmp_path / "out/limit.json").read_text())["rows"]
+    none = "; ".join(filter(None, [NO_DEMAND, shown]))
+    assert (demand, capacity) == (none if factor == "-" else shown, factor)
+    said = f"it begins to move at {shown if factor == '-' else '5 times'}"
+    assert (said in capsys.readouterr().out) == bool(shown)
