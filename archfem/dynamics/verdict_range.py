@@ -143,7 +143,7 @@ class VerdictRange(ResultDisplay):
         An outcome is 1 where `decisive`, else 0; where all or none are, it is the rank of a run by
         its residual displacement. The share is the correlation ratio, numbers in three parts of
         their range (a first-order index of sensitivity; Saltelli and others, Global Sensitivity
-        Analysis, 2008, section 1.2.6).
+        Analysis, 2008, section 1.2.6). Runs that are `in_doubt` count, as in `share`.
 
         Returns:
             By property, in descending order; chance alone explains about 2 / runs.
@@ -180,19 +180,13 @@ class VerdictRange(ResultDisplay):
             return
         kinds = self.falls, self.dislocated
         counts = [np.count_nonzero(x & kind) for x in (doubted, others) for kind in kinds]
-        slips = self.dataset["slip_at_rest"].values[doubted]
-        remedy = "`archfem check` says which joints, and what to do"
-        if "k_s" in self.properties:
-            factors = self.dataset["k_s"].values
-            # slips are nearly in inverse proportion to k_s; rounded up to two digits
-            enough = 1.05 * float((factors[doubted] * slips).max()) / MAX_SLIP_AT_REST
-            if enough < factors.max():
-                ends = f"[{enough:.2g},{factors.max():.3g}]"
-                remedy = f"leave them out, `--set verdict.vary.k_s={ends}`"
+        slips = np.where(self.answered, self.dataset["slip_at_rest"].values, 0.0)
+        # a k_s that is not varied leaves nothing out
+        factors = self.dataset["k_s"].values if "k_s" in self.properties else np.ones_like(slips)
         yield Doubt(
             "shear displaces joints by up to {:mm} under dead load in {} of {} variations, which "
             "do not stand as drawn: of them {} fall and {} are dislocated, of the others {} and {}",
-            remedy,
+            leave_out_soft(factors, slips, "`--set verdict.vary.k_s=[{:.2g},{:.3g}]`"),
             (float(slips.max()), *map(int, (doubted.sum(), self.answered.sum(), *counts))),
         )
 
@@ -356,10 +350,13 @@ class VerdictRange(ResultDisplay):
                 count = int(self.decisive[self.answered & group].sum())
                 words.append(f"{count} of the {own} that vary {name}")
         share = f"{low:.0%} to {high:.0%} at 95%"
+        # without these the sample were none of the ranges, but one of stiffer joints
+        doubted = int((self.answered & self.in_doubt).sum())
+        also = f"; shares count {doubted} runs in doubt under dead load" * bool(doubted)
         if self.counted != "falls":
             number = int((self.answered & sampled).sum())
-            return f"{', '.join(words)}; share of falls {share} by the {number}"
-        return f"{', '.join(words)} ({share})"
+            return f"{', '.join(words)}; share of falls {share} by the {number}{also}"
+        return f"{', '.join(words)} ({share}){also}"
 
     @cached_property
     def _explained(self) -> "tuple[str, NDArray[np.bool_], list[Condition]]":
@@ -479,6 +476,15 @@ class VerdictRange(ResultDisplay):
 
     def _summary(self) -> str:
         return f"VerdictRange: {self.sentence}"
+
+
+def leave_out_soft(factors: Array, slips: Array, given: str) -> str:
+    """Return the remedy of runs with soft joints from all factors on k_s and slips at rest [m]."""
+    # slips are nearly in inverse proportion to k_s; rounded up to two digits
+    enough = 1.05 * float((factors * slips)[slips > MAX_SLIP_AT_REST].max()) / MAX_SLIP_AT_REST
+    if enough < factors.max():
+        return f"leave them out, {given.format(enough, factors.max())}"
+    return "`archfem check` says which joints, and what to do"
 
 
 class SingleChange(NamedTuple):

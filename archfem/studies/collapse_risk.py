@@ -43,6 +43,7 @@ from archfem.dynamics.analysis import Analysis
 from archfem.dynamics.collapse_state import FALLEN_STATES, CollapseState, doubt_soft_blocks
 from archfem.dynamics.recorder import Record
 from archfem.dynamics.scale_search import check_search
+from archfem.dynamics.verdict_range import leave_out_soft
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.masonry.structure import Structure
 from archfem.models.model import Doubt, read_doubts, write_doubts
@@ -51,7 +52,7 @@ from archfem.motion.hazard import DESIGN_PERIOD, MEASURES, Hazard
 from archfem.motion.motion import Motion, admissible_range
 from archfem.motion.response_spectra import measure_intensity, response_spectrum
 from archfem.motion.suite import Suite
-from archfem.statics.equilibrium import Equilibrium
+from archfem.statics.equilibrium import MAX_SLIP_AT_REST, Equilibrium
 from archfem.statics.fill_checks import fill_doubts
 from archfem.statics.modes import modes
 from archfem.studies.fragility import (
@@ -63,7 +64,14 @@ from archfem.studies.fragility import (
     variance_component,
 )
 from archfem.studies.result_store import evaluate_with_progress
-from archfem.studies.variations import Variation, as_falling, doubt_runs, draw_samples, prepare_runs
+from archfem.studies.variations import (
+    Variation,
+    as_falling,
+    doubt_runs,
+    draw_samples,
+    find_slip_at_rest,
+    prepare_runs,
+)
 from archfem.units import STANDARD_GRAVITY
 
 # Kind of the file of all samples
@@ -79,6 +87,7 @@ FIRST_ROUND = 8
 # Variables of the table that are results, and their values before a run; an error has any length
 RESULTS = {
     **{"lower": 0.0, "upper": inf, "admissible_step": inf, "runs": 0, "lacks_joints": 0},
+    "slip_at_rest": 0.0,
     "error": np.array("", dtype=object),
 }
 
@@ -148,7 +157,7 @@ def bracket_capacity(sample: RiskSample) -> dict[str, Any]:
     bounds = [states[at].admissible_step for at in (stands, falls) if at in states]
     lacking = stands in states and states[stands].lacks_joints
     found = {"lower": stands, "upper": falls, "runs": runs, "admissible_step": min(bounds)}
-    return found | {"lacks_joints": lacking}
+    return found | {"lacks_joints": lacking, "slip_at_rest": find_slip_at_rest(run)}
 
 
 def _search_factor(wide: float) -> float:
@@ -366,7 +375,7 @@ def _continue_file(out: str | Path | None, table: xr.Dataset) -> None:
     first = table.isel(sample=slice(count))
     varies = (*RESULTS, "unscaled_sa")  # which is at the period of the hazard
     same = all(
-        key in kept and (key in varies or np.array_equal(kept[key].values, first[key].values))
+        key in varies or (key in kept and np.array_equal(kept[key].values, first[key].values))
         for key in first
     )
     keys = ("properties", "inputs")
@@ -374,7 +383,7 @@ def _continue_file(out: str | Path | None, table: xr.Dataset) -> None:
         raise InvalidInput(
             f"{out} has samples of other arguments: name another file, or delete this one"
         )
-    for name in RESULTS:
+    for name in RESULTS.keys() & kept:  # one may have no slips at rest
         table[name].values[:count] = kept[name].values
     write_dataset(table, Path(out), FILE_KIND)  # with the hazard of this call
 
@@ -405,7 +414,8 @@ class CollapseRisk(ResultDisplay):
 
     Attributes:
         dataset: over `sample`: the varied properties, the `alternative`, the
-            `record_number`, `lower` and `upper` scale of the bracket, `runs`, and `error`; over
+            `record_number`, `lower` and `upper` scale of the bracket, `runs`, `error`, and
+            `slip_at_rest`, the largest displacement along a joint under dead load [m]; over
             `record` the intensities of the unscaled records, `unscaled_pga` and others.
     """
 
@@ -624,11 +634,28 @@ class CollapseRisk(ResultDisplay):
         found, dt = self.dataset, self.dataset.attrs["dt"]
         steps, lacking = found["admissible_step"].values, found["lacks_joints"].values
         doubts += doubt_runs(steps.tolist(), lacking.tolist(), dt, "samples", "")
+        doubts += self._doubt_rest()
         count = len(self.dataset["sample"])
         # a twentieth of all is what the 90 % interval leaves out at each of its ends
         if count - len(self.answered) > 0.05 * count:
             doubts.append(Doubt(f"the rate is that of some: {self._describe_missing()}", ""))
         return tuple(doubts)
+
+    def _doubt_rest(self) -> Iterator[Doubt]:
+        """Yield the doubt of samples that do not stand as drawn under dead load."""
+        slips = self._of_answered("slip_at_rest") if "slip_at_rest" in self.dataset else np.zeros(1)
+        stands = np.flatnonzero(slips <= MAX_SLIP_AT_REST)
+        if len(stands) == len(slips):
+            return
+        cause = "shear displaces joints by up to {:mm} under dead load in {} of {} samples, which "
+        cause += "do not stand as drawn"
+        if len(stands) >= FIRST_ROUND:
+            every = [np.full(len(slips), True)]
+            rates = [self._integrate(x[None], every)[0] for x in (stands, np.arange(len(slips)))]
+            cause += f"; without these the rate is {rates[0] / rates[1]:.2g} times as large"
+        given = "`collapse_risk(…, vary={{'k_s': ({:.2g}, {:.3g})}})`"
+        remedy = leave_out_soft(self._of_answered("k_s"), slips, given)
+        yield Doubt(cause, remedy, (float(slips.max()), len(slips) - len(stands), len(slips)))
 
     def _doubt_records(self) -> Iterator[Doubt]:
         """Yield a doubt where records are few, or hardly differ in their spectra."""

@@ -301,11 +301,10 @@ def evaluate_variation(variation: Variation) -> dict[str, Any]:
     if changes["sign"] == "reversed":
         motion = motion.reversed()
     runs = prepare_runs(replace(analysis, structure=structure), changes)
-    state, rest = runs(motion), runs.rest if isinstance(runs, FallingRuns) else None
-    slip = 0.0 if rest is None else float(slips_at_rest(rest.joints).max())
+    state = runs(motion)
     time = np.nan if state.time is None else state.time
     same = ("displacement", "residual", "admissible_step", "lacks_joints")
-    kept = {"outcome": state.kind, "time": time, "slip_at_rest": slip}
+    kept = {"outcome": state.kind, "time": time, "slip_at_rest": find_slip_at_rest(runs)}
     return kept | {name: getattr(state, name) for name in same}
 
 
@@ -333,6 +332,12 @@ def prepare_runs(
     rule: Any = {"quadrature": "trapezoidal", "quadrature_points": 3} if three else {}
     rule = {"quadrature": "exact", "quadrature_points": None, **rule}
     return FallingRuns(**vars(change_properties(replace(analysis, dt=dt, **rule), changes)))
+
+
+def find_slip_at_rest(runs: Callable[[Motion], CollapseState]) -> float:
+    """Return how far shear displaces joints under dead load; 0 of rigid blocks [m]."""
+    rest = runs.rest if isinstance(runs, FallingRuns) else None
+    return 0.0 if rest is None else float(slips_at_rest(rest.joints).max())
 
 
 def change_properties(analysis: Analysis, changes: Mapping[str, Any]) -> PreparedRuns:

@@ -111,6 +111,8 @@ def test_runs_in_doubt_under_dead_load_are_counted_marked_and_drawn():
     # the largest of 4 × 0.1, 1.01 × 0.2 and 1.5 × 0.3 is displaced by 1 mm, with 5 % added
     assert "verdict.vary.k_s=[0.47,2]" in doubt.remedy
     assert str(found).splitlines()[1].endswith(str(doubt))
+    assert found.groups.endswith("; shares count 3 runs in doubt under dead load")
+    assert found.share == pytest.approx(1.0 / 3.0)  # of three that are sampled and answered
     marked = "shear stiffness / 10 (in doubt under dead load)"
     assert [each.name for each in found.single_changes] == [marked, "unvaried"]
     drawn = {line.get_label(): line for line in found.plot().axes[0].get_lines()}

@@ -14,9 +14,11 @@ from scipy.optimize import brentq
 from scipy.stats import norm
 
 import archfem as af
+from archfem._netcdf import write_dataset
 from archfem.cases import risk_keys
 from archfem.commands.cli import main
-from archfem.studies.collapse_risk import CollapseRisk, RiskSample, bracket_capacity
+from archfem.studies.collapse_risk import FILE_KIND, CollapseRisk, RiskSample, bracket_capacity
+from archfem.studies.variations import FallingRuns, as_falling
 
 SITE = af.Hazard.power(2e-3, 2.5)
 
@@ -133,6 +135,29 @@ def test_a_rate_from_beyond_the_periods_of_codes_is_in_doubt_with_a_law(factor, 
     assert (words in str(risk)) == doubted == bool(risk.doubts)
     ratio = 5.0 / (475.0 * factor) ** 0.4
     assert f"of pga, {ratio:.2g} times that of 475 years" in risk.sentence
+
+
+def test_samples_that_do_not_stand_as_drawn_are_in_doubt_with_the_rate_of_the_others():
+    """Rates of lognormal capacities by Cornell's formula, k_0 m^-k exp((k β)² / 2)."""
+    capacity = np.exp(np.linspace(0.0, 1.0, 20))
+    soft, found = capacity < 1.5, risk_of(capacity, np.arange(20) % 10)
+    assert "under dead load" not in str(found.doubts)  # a file without their slips
+    found.dataset["k_s"] = "sample", np.where(soft, 0.5, 2.0)
+    found.dataset["slip_at_rest"] = "sample", np.where(soft, 1.2e-3, 0.9e-3)
+    (doubt,) = (each for each in found.doubts if "under dead load" in each.cause)
+
+    def cornell(capacities):
+        logs = np.log(capacities)
+        return np.exp(0.5 * (2.5 * np.std(logs)) ** 2 - 2.5 * np.mean(logs))
+
+    (times,) = re.findall(r"the rate is (.*) times", doubt.cause)
+    # two digits; brackets are as narrow as 1 %
+    assert float(times) == pytest.approx(cornell(capacity[~soft]) / cornell(capacity), rel=0.03)
+    assert f"by up to 1.2 mm under dead load in {soft.sum()} of 20 samples" in doubt.cause
+    assert "vary={'k_s': (0.63, 2)}" in doubt.remedy  # 0.5 × 1.2 with 5 % added
+    found.dataset["slip_at_rest"][:] = 1.2e-3
+    (doubt,) = (each for each in found.doubts if "under dead load" in each.cause)
+    assert "in 20 of 20 samples, which do not stand as drawn; `archfem check`" in str(doubt)
 
 
 @pytest.mark.slow
@@ -403,6 +428,35 @@ def test_samples_are_kept_and_continued(tmp_path, monkeypatch, quick_runs):
     assert "falls at" in str(CollapseRisk.read(options["out"]))
     with pytest.raises(af.InvalidInput, match="other arguments"):
         af.collapse_risk(analysis, motions, SITE, **options | {"seed": 1})
+
+
+def test_a_file_without_slips_under_dead_load_continues(tmp_path, quick_runs):
+    """As one that was begun before these were kept: what is there counts as none."""
+    analysis, motions = tilted_block()
+    options = {"out": tmp_path / "risk.nc", "precision": 0.02}
+    first = af.collapse_risk(analysis, motions, SITE, samples=10, **options).dataset
+    write_dataset(first.drop_vars("slip_at_rest"), options["out"], FILE_KIND)
+    more = af.collapse_risk(analysis, motions, SITE, samples=20, **options).dataset
+    np.testing.assert_array_equal(more["upper"].values[:10], first["upper"].values)
+    assert not more["slip_at_rest"].values[:10].any()
+
+
+def test_each_sample_keeps_how_far_its_dead_load_shears_the_joints(monkeypatch):
+    """V / (k_s A) of closed joints by an analysis of the dead load alone."""
+    ring = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=9)
+    stands = af.dynamics.CollapseState("stands", None, (), 0.0, 0.0, True)
+    monkeypatch.setattr(FallingRuns, "__call__", lambda *_: stands)
+    analysis, motion = as_falling(ring), af.Motion.synthetic(seed=1, duration=1.0, pga=1.0)
+    for factor in (0.05, 1.0):
+        sample = RiskSample(analysis, motion, (("k_s", factor),), 1.0, (0.5, 2.0), 0.5)
+        given = ring.joints[0].contact
+        contact = replace(given, shear_stiffness=factor * given.shear_stiffness)
+        joints = tuple(replace(joint, contact=contact) for joint in ring.joints)
+        rest = af.dead_load(af.build(replace(ring, joints=joints), fidelity="rigid")).joints
+        sheared = abs(rest["V"].values) / (contact.shear_stiffness * ring.depths * ring.width)
+        # displacements of a sample may be large
+        slip = bracket_capacity(sample)["slip_at_rest"]
+        assert slip == pytest.approx(sheared.max(), rel=0.02)
 
 
 @pytest.mark.slow
