@@ -22,6 +22,7 @@ from archfem.dynamics.scale_search import (
     COLLAPSE_DEFINITION,
     FILLED_SHARE,
     NEAR_RATIO,
+    NOT_VARIED,
     Bracket,
     KeptRuns,
     MechanismScales,
@@ -192,7 +193,7 @@ class CollapseScale:
     def __repr__(self) -> str:
         """Return the sentence, how closely scales were run, and what was varied."""
         steps = join_names([f"{1e3 * dt:g}" for dt in sorted(self._every, reverse=True)])
-        varied = f"; varied were the scale and the time step ({steps} ms), and no property"
+        varied = f"; varied were the scale and the time step ({steps} ms), and {NOT_VARIED}"
         return f"{self.sentence}{self._say_tested()}{varied}"
 
     @property

@@ -32,6 +32,9 @@ COLLAPSE_DEFINITION = "collapse"
 # Words beside the bounds of a search that Ctrl-C has ended
 UNFINISHED = "search unfinished"
 
+# What a search leaves open
+NOT_VARIED = "no property or motion: how far others, such as other seeds, differ is unknown"
+
 # Gaps between scales are filled down to a ratio, from a share of the smallest fall on [-]
 FILLED_SHARE, FILLED_RATIO = 0.5, 1.1
 NEAR_SHARE, NEAR_RATIO = 0.7, 1.05  # where windows of falls are most frequent
@@ -133,8 +136,8 @@ class MechanismScales:
         return say_bracket("no mechanism", self, met)
 
     def __repr__(self) -> str:
-        """Return the sentence."""
-        return self.sentence
+        """Return the sentence, and what was varied."""
+        return f"{self.sentence}; varied was the scale, and {NOT_VARIED}"
 
     @property
     def doubts(self) -> tuple[Doubt, ...]:

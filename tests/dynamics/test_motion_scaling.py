@@ -414,7 +414,7 @@ def test_the_fall_of_steps_too_long_for_sliding_is_stated_and_bounds_nothing(mon
     low, high = min(given.bracket(dt).upper for dt in given.searches), given.longer[0.005]
     high = high["collapse"].upper
     assert f"the first fall at {low:#.3g} to {high:#.3g} × the motion" in doubt.cause
-    assert "time step (5, 3, 1.5 ms), and no property" in str(given)
+    assert "time step (5, 3, 1.5 ms), and no property or motion: how far" in str(given)
     steps = [row[0] for row in given.rows()[1]]
     assert {*steps} == {"5 ms", "3 ms", "1.5 ms"}
     assert all(row[2] == "as given" for row in given.rows()[1])
@@ -577,7 +577,8 @@ def test_collapse_is_between_a_stable_and_a_falling_run_at_every_step():
         "stands at 1.00 × the motion, falls at 2.00 × the motion, by steps of 5 ms first at "
         "2.50 ×, and stands again at some scales from 2.70 to 3.00 ×; stands at every "
         "smaller scale that was run: from 0.500 × on they are up to a factor of 2.00 apart, and "
-        "none between was run; varied were the scale and the time step (10, 5 ms), and no property"
+        "none between was run; varied were the scale and the time step (10, 5 ms), and no property "
+        "or motion: how far others, such as other seeds, differ is unknown"
     )
     assert [str(doubt) for doubt in found.doubts] == [
         "by 10 ms: it is not monotonic: above a fall it survives 3.00 × the motion",
@@ -621,7 +622,8 @@ def test_collapse_is_between_a_stable_and_a_falling_run_at_every_step():
     assert (never.lower, never.upper, never.above) == (1.0, inf, ())
     assert str(never) == (
         "stands at 1.00 × the motion, falls at 2.00 × the motion, by steps of 5 ms at no scale; "
-        "varied were the scale and the time step (10, 5 ms), and no property"
+        "varied were the scale and the time step (10, 5 ms), and no property or motion: how far "
+        "others, such as other seeds, differ is unknown"
     )
     (doubt,) = never.doubts
     assert str(doubt) == "a time step finds a fall at 2.00 ×, and another none"
@@ -800,11 +802,12 @@ def test_a_first_mechanism_is_said_in_g():
     lower, upper = found["verified"].lower, found["verified"].upper
     assert str(found) == (
         f"no mechanism at {lower:#.3g} g ({lower:#.3g} × the motion), first mechanism at "
-        f"{upper:#.3g} g ({upper:#.3g} × the motion), by verified"
+        f"{upper:#.3g} g ({upper:#.3g} × the motion), by verified; varied was the scale, and no "
+        "property or motion: how far others, such as other seeds, differ is unknown"
     )
     assert found.doubts == ()
     none = searched(dict.fromkeys(DEFINITIONS, beyond(inf)))
-    assert str(none).endswith("nor at any scale that was tried")
+    assert none.sentence.endswith("nor at any scale that was tried")
     assert "interrupted" in replace(none, interrupted=True).doubts[0].cause
 
 
