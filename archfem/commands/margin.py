@@ -152,7 +152,8 @@ def scale(options: argparse.Namespace) -> int:
 
         lines[1:1] = filter(None, [found.mechanism])
         limit = DISLOCATION * shallowest_part(case.structure)[0]
-        files["scale.png"] = draw_scale(found, limit)
+        if any(run.fall for run in found.kept_runs.values()):
+            files["scale.png"] = draw_scale(found, limit)
     files["scale.txt"] = text = "\n".join(lines)
     if found.interrupted:
         runs = [(dt, asdict(run)) for (dt, _), run in found.kept_runs.items()]

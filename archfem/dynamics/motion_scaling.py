@@ -47,6 +47,9 @@ from archfem.motion.motion import Motion, admissible_range
 from archfem.statics.equilibrium import Equilibrium, dead_load
 from archfem.units import Ends
 
+# State of a run that says nothing of a fall
+NO_ANSWER = "no answer"
+
 # Step of a search that is given none, and the least to which it is shortened for sliding [s]
 OWN_STEP, LEAST_STEP = 0.005, 0.0005
 
@@ -422,7 +425,7 @@ class CollapseScale:
                 f"{1e3 * dt:g} ms",
                 f"{run.scale:.3g}",
                 "as given",
-                f"{fall.kind}{fall.dislocated_stones}" if fall else "no answer",
+                f"{fall.kind}{fall.dislocated_stones}" if fall else NO_ANSWER,
                 f"{fall.time:.2f} s" if fall and fall.time is not None else "-",
                 f"{fall.residual:.3g} m" if fall and run.whole else "-",
             ]

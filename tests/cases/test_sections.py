@@ -22,6 +22,7 @@ from archfem.cases.result_text import tabulate_joints, tabulate_motions, tabulat
 from archfem.cases.run import MOTION_VARIABLE
 from archfem.dynamics import VerdictRange
 from archfem.models.model import Doubt
+from archfem.view import style
 
 
 def made_case(structure, **values):
@@ -157,6 +158,31 @@ def test_falls_by_property_are_a_table_whose_cells_wrap(piers, tmp_path):
     assert name == "k_n"
     assert cell.count(" of ") == 3
     assert table.manner == "words"
+
+
+@pytest.mark.parametrize(
+    ("runs", "drawn"),
+    [
+        (["stands", "no answer"], True),
+        (["dislocated (block 1)"], True),
+        (["no answer", "no answer"], False),
+        ([], False),
+        (None, False),  # a folder without a table of runs
+    ],
+)
+def test_a_search_without_an_answered_run_has_no_figure(runs, drawn, tmp_path, piers):
+    """Its figure has the limit alone."""
+    with replace_results(tmp_path, "scale", "inputs") as draft:
+        (draft / "case.toml").touch()
+        (draft / "scale.txt").write_text("a: stands\n\nstep  scale")
+        style.new_axes(1.0, 1.0, "", "")[0].savefig(draft / "scale.png")
+        if runs is not None:
+            rows = [f"5 ms,{1.0 + k},as given,{run},-,-" for k, run in enumerate(runs)]
+            (draft / "scale.csv").write_text("\n".join(["step,scale,properties,is,at,by", *rows]))
+    data = report_data.ReportData(made_case(piers), {}, tmp_path)
+    text, *others = sections._build_scale(data)
+    assert text.text.startswith("a: stands")
+    assert ("plate" in [piece.kind for piece in others]) is drawn
 
 
 def test_a_part_without_a_name_has_a_dash(unplotted):

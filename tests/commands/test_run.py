@@ -25,7 +25,8 @@ from archfem.cases.run import carry_out, run_time_history
 from archfem.commands import margin
 from archfem.commands.run import print_results
 from archfem.dynamics import fall, motion_scaling, time_history
-from archfem.dynamics.scale_search import ScaledRun
+from archfem.dynamics.motion_scaling import CollapseScale
+from archfem.dynamics.scale_search import MechanismScales, ScaledRun
 from archfem.errors import logger
 from archfem.models.model import Doubt
 from archfem.studies import study, variations
@@ -387,6 +388,21 @@ motion = {{ file = "tap.txt", dt = 0.01, units = "m/s2" }}
     if runs:  # a row for each step and outcome
         table = shown.partition("at the scales [× the motion]")[2]
         assert all(re.search(rf" 5 ms {state} [\d.]+", table) for state in ("stands", "fallen"))
+
+
+def test_a_search_without_an_answer_is_not_drawn(tmp_path, undrawn, monkeypatch):
+    """A figure of its runs would have the limit alone."""
+    column = 'structure = { shape = "column", breadth = 0.25, heights = [1.0] }\n'
+    column += 'model = { fidelity = "rigid", displacements = "large" }\n'
+    column += "motion = { synthetic = { seed = 1, duration = 0.5 } }\n"
+    (tmp_path / "block.toml").write_text(column, encoding="utf-8")
+    stands = af.dynamics.CollapseState("stands", None, (), 0.0, 0.0, True)
+    for state in (None, stands):
+        run = ScaledRun(1.0, {}, af.dynamics.Ending.FINISHED, "broken off", state)
+        found = CollapseScale({0.005: MechanismScales(("collapse",), (run,))}, pga=1.0)
+        monkeypatch.setattr(margin, "collapse_scale", lambda *_, found=found, **__: found)
+        af.commands.main(["scale", str(tmp_path / "block.toml"), "--out", str(tmp_path / "out")])
+        assert (tmp_path / "out" / "scale.png").exists() is (state is not None)
 
 
 PAIRS = """

@@ -38,6 +38,7 @@ from archfem.cases.result_text import UPPER_BOUNDS
 from archfem.cases.run import DRAWING_FILE
 from archfem.dynamics.collapse_state import DISLOCATION, FALLEN_STATES, shallowest_part
 from archfem.dynamics.history import SIGN_CONVENTION
+from archfem.dynamics.motion_scaling import NO_ANSWER
 from archfem.dynamics.recorder import library_versions
 from archfem.dynamics.verdict_range import COUNTED, VerdictRange
 from archfem.errors import InvalidInput
@@ -427,8 +428,8 @@ def _build_scale(data: ReportData) -> list[Any]:
             f"Residual displacement{under} over the scale of the motion; falls are at the top."
         )
         text, *figures = data.read_result(name, caption)
-        if (runs := data.read_text(f"{name}.csv")) is None:
-            built += [text, *figures]
+        if (runs := data.read_text(f"{name}.csv")) is None:  # nor a figure that has any
+            built.append(text)
             continue
         scales: dict[tuple[str, str], list[str]] = {}
         for step, scale, _, outcome, *_ in [*reader(runs.splitlines())][1:]:
@@ -436,7 +437,8 @@ def _build_scale(data: ReportData) -> list[Any]:
         rows = [(*key, ", ".join(found)) for key, found in scales.items()]
         head = ("time step", "the structure", "at the scales [× the motion]")
         table = Grid(head, rows, f"Runs of the search{under}", "words")
-        built += [replace(text, text=text.text.rpartition("\n\n")[0]), table, *figures]
+        answered = any(outcome != NO_ANSWER for _, outcome in scales)
+        built += [replace(text, text=text.text.rpartition("\n\n")[0]), table, *figures * answered]
     return built
 
 
