@@ -10,8 +10,9 @@ import numpy as np
 
 import archfem as af
 from archfem.dynamics import Ending, Equation, State
+from archfem.dynamics.solvers.snes import SnesSolver
 from archfem.masonry import STONE_TO_STONE
-from archfem.statics import Equilibrium
+from archfem.statics import Equilibrium, Newton
 from archfem.statics.newton import load_magnitude
 
 DAMPING = af.Rayleigh(0.05, (8.0, 16.0))
@@ -190,23 +191,44 @@ def unbalanced_steps(run: af.History, dead: Equilibrium, motion: af.Motion, damp
     give speeds, by the midpoint rule, and what joints remember. Other than a history by SNES this
     is one yardstick for every step, also for one that SNES only finds in halves: those are other
     equations, whose solution differs by far more than rounding, and so does all that follows.
+
+    Of a step in halves the end of the first half is not stored: SNES solves for it, and the second
+    half must balance from there to the stored end. Shorter parts of a step have no yardstick, and
+    count as out of balance.
     """
     equation, dt = Equation(dead.model, motion, damping), float(run.time[1] - run.time[0])
     stored = np.stack([run.joints[key].values for key in ("N", "V", "M")], axis=-1)
     largest, scale = np.abs(stored).max(axis=(0, 1)), load_magnitude(equation.weight)
     before, worst = equation.at_rest(dead.q, memory=dead.model.memory), 0.0
-    grounds, frames = equation.ground(run.time[1:], dt)[0], run.dataset["q"].values
-    for time, ground, q, given in zip(run.time[1:], grounds, frames[1:], stored[1:], strict=True):
-        passage = equation.with_memory(before).begin_step(before.q, equation.lag / dt)
-        speed = 2.0 * (q - before.q) / dt - before.velocity
-        change, drag = (speed - before.velocity) / dt, 0.5 * (speed + before.velocity)
-        load = equation.weight - equation.model.mass_influence @ ground
-        moving = equation.model.mass @ change + equation.viscous @ drag
-        lacks = float(np.linalg.norm(moving + passage.force(q) - load)) / scale
-        errs = float((np.abs(passage.resultants(q) - given) / largest).max())
-        worst = max(worst, lacks, errs)
-        before = State(float(time), q, speed, change, passage.updated_memory(q))
+    halves, parts = SnesSolver(equation, Newton(tolerance=1e-12)), run.dataset["smallest_step"]
+    rows = zip(run.time, dt / parts.values, run.dataset["q"].values, stored, strict=True)
+    for time, count, q, given in list(rows)[1:]:
+        ends, means = [q], list[np.ndarray]()
+        if round(float(count)) == 2:
+            ends.insert(0, halves.whole(before, 0.5 * dt).state.q)
+        elif round(float(count)) > 2:
+            return np.inf
+        step = dt / len(ends)
+        for number, end in enumerate(ends, 1 - len(ends)):
+            lacks, mean, before = _balance(equation, before, end, float(time) + number * step, step)
+            means.append(mean)
+            worst = max(worst, lacks / scale)
+        worst = max(worst, float((np.abs(np.mean(means, axis=0) - given) / largest).max()))
     return worst
+
+
+def _balance(
+    equation: Equation, before: State, q: np.ndarray, time: float, dt: float
+) -> tuple[float, np.ndarray, State]:
+    """What a step lacks to balance [N], its N, V and M, and the state at its end."""
+    passage = equation.with_memory(before).begin_step(before.q, equation.lag / dt)
+    speed = 2.0 * (q - before.q) / dt - before.velocity
+    change, drag = (speed - before.velocity) / dt, 0.5 * (speed + before.velocity)
+    ground = equation.ground(np.array([time]), dt)[0, 0]
+    load = equation.weight - equation.model.mass_influence @ ground
+    moving = equation.model.mass @ change + equation.viscous @ drag
+    lacks = float(np.linalg.norm(moving + passage.force(q) - load))
+    return lacks, passage.resultants(q), State(time, q, speed, change, passage.updated_memory(q))
 
 
 def answer(run: af.History, error: float, tolerance: float, words: str = "") -> Found:

@@ -1,6 +1,9 @@
 """The quick ones of the hard cases, each judged by its own study; all: `python -m hard`."""
 
+import numpy as np
 import pytest
+from hard.cases_of_bridges import DAMPING, IN_BALANCE_IN_HALVES, stiffly_filled
+from hard.setting import unbalanced_steps
 from hard.table import CASES
 
 LONG = (
@@ -59,3 +62,21 @@ def test_hard_case(case):
 def test_long_cases_are_among_the_hard_ones():
     """Under an older name a case would run here, and take its seconds."""
     assert {case.name for case in CASES} >= set(LONG)
+
+
+@pytest.mark.slow
+def test_a_step_in_halves_is_out_of_balance_by_what_is_off_by_a_millionth():
+    run, dead, motion = stiffly_filled()
+    steps, moved = (run.dataset[name].values for name in ("smallest_step", "q"))
+    (halved,) = np.flatnonzero(steps < 0.75 * steps[1])[-1:]
+    off = {"nothing": unbalanced_steps(run, dead, motion, DAMPING)}
+    off["motion"] = unbalanced_steps(run, dead, motion.scaled(1.0 + 1e-6), DAMPING)
+    whole, place = moved.copy(), abs(moved[halved]).argmax()
+    moved[halved:, place] *= 1.0 + 1e-6
+    off["displacement"] = unbalanced_steps(run, dead, motion, DAMPING)
+    moved[:], steps[halved] = whole, steps[1]
+    off["halves"] = unbalanced_steps(run, dead, motion, DAMPING)
+    steps[halved] /= 4.0  # has no yardstick
+    off["quarters"] = unbalanced_steps(run, dead, motion, DAMPING)
+    assert off.pop("nothing") < IN_BALANCE_IN_HALVES
+    assert min(off.values()) > IN_BALANCE_IN_HALVES, off
