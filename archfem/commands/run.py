@@ -123,7 +123,8 @@ def write_results(
     owner = _files.group_of(_files.intact_file_list(Path(out)), CASE_FILE)
     if owner is not None and owner.inputs != inputs:
         others = f"{NOTE_MARK}{out} has results of another case, drawing or version of archfem"
-        text += f"\n{others}: a report shows those of one alone; run all again, or name another"
+        remedy = "a report shows those of one alone: give all the same `--set`, or name another"
+        text += f"\n{others}: {remedy}"
     # a reader of the text, such as `head`, may leave before its end
     with _print_at_end(Path(out), name, text):
         folder = create_result_folder(out)

@@ -1000,8 +1000,9 @@ def test_a_command_renews_who_signs_the_case_of_a_run(changed, author, undrawn, 
     assert "case.toml" in listed["run"].files
     assert "case.toml" not in listed["limit"].files
     assert af.cases.open_results(folder).case.report == {"author": author}
-    noted = f"note: {folder} has results of another case" in capsys.readouterr().out
-    assert noted == (changed == "2.0")
+    said = capsys.readouterr().out
+    assert (f"note: {folder} has results of another case" in said) == (changed == "2.0")
+    assert ("give all the same `--set`, or name another" in said) == (changed == "2.0")
 
 
 def test_a_kinematic_assessment_alone_has_a_report(unplotted, tmp_path, capsys):
