@@ -165,6 +165,10 @@ class StatedWeight(float):
     """Unit weight that was given with its unit, so that none is guessed [N/m³]."""
 
 
+class Usual(float):
+    """Number of a preset or a default: an equal one that is given by hand is a plain one."""
+
+
 class Ends(tuple[float, ...]):
     """Least and largest of a number, of one format; "mm" is that of lengths, "ratio" of ratios."""
 

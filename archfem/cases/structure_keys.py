@@ -35,21 +35,14 @@ from archfem.masonry.joint_closing import (
     usual_law,
     with_finish,
 )
-from archfem.masonry.materials import (
-    CONTACT_PRESETS,
-    MATERIAL_PRESETS,
-    STONE,
-    Contact,
-    DefaultValue,
-    Material,
-)
+from archfem.masonry.materials import CONTACT_PRESETS, MATERIAL_PRESETS, STONE, Contact, Material
 from archfem.masonry.shapes import bridges, rings, walls
 from archfem.masonry.shapes.bridge_parts import Arch, Backfill, Paving, Pier, Sidewall
 from archfem.masonry.standing import StandingBody, carrying
 from archfem.masonry.structure import Joint, Structure, join_names, suggest_name
 from archfem.masonry.survey.layers import Layer
 from archfem.masonry.survey.outlines import Survey, read_outlines, surveyed
-from archfem.units import StatedWeight
+from archfem.units import StatedWeight, Usual
 
 Described = TypeVar("Described")
 
@@ -464,18 +457,14 @@ class _PresetNames:
         """Sections [materials] and [contacts]; presets as they are need no table."""
         sections: dict[str, Any] = {}
         for (section, name), item in self.objects.items():
-            usual = PRESETS[section].get(name, type(item))
-            # a changed copy of the preset, whose own values remain defaults
-            if isinstance(getattr(item, "strength", None), DefaultValue):
-                usual = STONE
-            table = {
-                key: x
-                for key, x in _list_fields(item).items()
-                if key != "name"
-                # what equals the default of reading is given by hand alone
-                and (x != getattr(usual, key, None) or (x and not isinstance(x, DefaultValue)))
-            }
-            table |= {"preset": STONE.name} if usual is STONE and name != STONE.name else {}
+            # a changed copy of the preset of stone, whose own values remain defaults
+            copied = isinstance(getattr(item, "strength", None), Usual)
+            usual = STONE if copied else PRESETS[section].get(name, type(item))
+            own = {key: x for key, x in _list_fields(item).items() if key != "name"}
+            # what equals the default of reading is given by hand alone
+            by_hand = {key for key, x in own.items() if x and not isinstance(x, Usual)}
+            table = {k: x for k, x in own.items() if k in by_hand or x != getattr(usual, k, None)}
+            table |= {"preset": STONE.name} if copied and name != STONE.name else {}
             table |= {"name": item.name} if item.name != name else {}
             if isinstance(item, Contact) and (finish := self.finishes.get(item)):
                 table = {k: v for k, v in table.items() if k not in FINISHED_KEYS}

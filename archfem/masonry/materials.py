@@ -3,7 +3,7 @@
 from collections.abc import Hashable
 from dataclasses import dataclass, replace
 from math import inf, nextafter
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any
 
 from archfem._typing import (
     Friction,
@@ -15,18 +15,10 @@ from archfem._typing import (
 )
 from archfem._validation import check_between, check_number, check_words, is_one_of
 from archfem.errors import InvalidInput
-from archfem.units import G, GPa, MPa, StatedWeight, kN
+from archfem.units import G, GPa, MPa, StatedWeight, Usual, kN
 
 # Largest closing of a joint [m]: those measured are below 1 mm, so that more is in millimetres
 MAX_CLOSURE = 0.02
-
-
-class DefaultValue(float):
-    """Value of a preset or a default: an equal one that is given by hand is a plain number."""
-
-
-# Coefficient of friction of a contact to which none is given [-]
-FRICTION = DefaultValue(0.60)
 
 
 def _check_range(item: Any, key: str, low: float, high: float, remedy: str) -> None:
@@ -142,7 +134,7 @@ class Contact:
 
     normal_stiffness: PascalsPerMetre
     shear_stiffness: PascalsPerMetre
-    friction: Friction = FRICTION
+    friction: Friction = Usual(0.60)  # noqa: RUF009
     name: str = "contact"
     cohesion: Pascals = 0.0
     dilatancy: float = 0.0
@@ -258,24 +250,12 @@ class Contact:
 # than the wall
 COURSE_LENGTH = "its length"
 
-
-Properties = TypeVar("Properties", Material, Contact)
-
-
-def _preset(item: Properties) -> Properties:
-    """Return a material or contact whose numbers are defaults."""
-    numbers: dict[str, Any] = {
-        key: DefaultValue(x) for key, x in vars(item).items() if isinstance(x, float)
-    }
-    return replace(item, **numbers)
-
-
 # Presets, Table 2 of Demirel and Aldemir (2021); it gives no μ for soil. The shear modulus of
 # 2.60 MPa that it prints for backfill is that of an isotropic material, E / 2 (1 + ν).
-STONE = _preset(Material(30.0 * GPa, 0.2, 20.0 * kN, 56.0 * MPa, "stone"))
-BACKFILL = _preset(Material(6.25 * MPa, 0.2, 18.0 * kN, None, "backfill"))
-STONE_TO_STONE = _preset(Contact(1.48e9, 0.30e9, 0.60, "stone to stone"))
-SOIL_TO_STONE = _preset(Contact(0.30e9, 0.24e9, 0.60, "soil to stone"))
+STONE = Material(Usual(30.0 * GPa), Usual(0.2), Usual(20.0 * kN), Usual(56.0 * MPa), "stone")
+BACKFILL = Material(Usual(6.25 * MPa), Usual(0.2), Usual(18.0 * kN), None, "backfill")
+STONE_TO_STONE = Contact(Usual(1.48e9), Usual(0.30e9), Usual(0.60), "stone to stone")
+SOIL_TO_STONE = Contact(Usual(0.30e9), Usual(0.24e9), Usual(0.60), "soil to stone")
 
 # Named presets
 MATERIAL_PRESETS = {material.name: material for material in (STONE, BACKFILL)}

@@ -64,14 +64,7 @@ from archfem.studies.fragility import (
     variance_component,
 )
 from archfem.studies.result_store import evaluate_with_progress
-from archfem.studies.variations import (
-    Variation,
-    as_falling,
-    doubt_runs,
-    draw_samples,
-    find_slip_at_rest,
-    prepare_runs,
-)
+from archfem.studies.variations import Variation, as_falling, doubt_runs, draw_samples, prepare_runs
 from archfem.units import STANDARD_GRAVITY
 
 # Kind of the file of all samples
@@ -157,7 +150,7 @@ def bracket_capacity(sample: RiskSample) -> dict[str, Any]:
     bounds = [states[at].admissible_step for at in (stands, falls) if at in states]
     lacking = stands in states and states[stands].lacks_joints
     found = {"lower": stands, "upper": falls, "runs": runs, "admissible_step": min(bounds)}
-    return found | {"lacks_joints": lacking, "slip_at_rest": find_slip_at_rest(run)}
+    return found | {"lacks_joints": lacking, "slip_at_rest": getattr(run, "slip_at_rest", 0.0)}
 
 
 def _search_factor(wide: float) -> float:

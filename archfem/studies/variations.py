@@ -304,7 +304,7 @@ def evaluate_variation(variation: Variation) -> dict[str, Any]:
     state = runs(motion)
     time = np.nan if state.time is None else state.time
     same = ("displacement", "residual", "admissible_step", "lacks_joints")
-    kept = {"outcome": state.kind, "time": time, "slip_at_rest": find_slip_at_rest(runs)}
+    kept = {"outcome": state.kind, "time": time, "slip_at_rest": getattr(runs, "slip_at_rest", 0.0)}
     return kept | {name: getattr(state, name) for name in same}
 
 
@@ -317,6 +317,11 @@ class FallingRuns(PreparedRuns):
         if history.fall is None:
             raise DidNotConverge(f"the run {history.outcome}", last=None)
         return history.fall
+
+    @property
+    def slip_at_rest(self) -> float:
+        """How far shear displaces joints under dead load; runs of rigid blocks have none [m]."""
+        return 0.0 if self.rest is None else float(slips_at_rest(self.rest.joints).max())
 
 
 def prepare_runs(
@@ -332,12 +337,6 @@ def prepare_runs(
     rule: Any = {"quadrature": "trapezoidal", "quadrature_points": 3} if three else {}
     rule = {"quadrature": "exact", "quadrature_points": None, **rule}
     return FallingRuns(**vars(change_properties(replace(analysis, dt=dt, **rule), changes)))
-
-
-def find_slip_at_rest(runs: Callable[[Motion], CollapseState]) -> float:
-    """Return how far shear displaces joints under dead load; 0 of rigid blocks [m]."""
-    rest = runs.rest if isinstance(runs, FallingRuns) else None
-    return 0.0 if rest is None else float(slips_at_rest(rest.joints).max())
 
 
 def change_properties(analysis: Analysis, changes: Mapping[str, Any]) -> PreparedRuns:
