@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 from contextlib import suppress
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -70,15 +71,13 @@ def compare_with_motion(case: Case, found: Collapse) -> str:
 
     The peak of one motion is no demand of a site.
     """
-    ends = np.multiply(abs(found.push), found.range)  # [g]
-    is_push = found.push and found.outcome is not Outcome.BRACKETED and np.isfinite(ends[0])
-    if is_push and case.motion and np.isnan(site_acceleration(case)):
+    if case.motion and np.isnan(site_acceleration(case)):
         with suppress(ArchfemError):  # limit analysis needs no record
             motion = case.ground_motion()
-            site = f"the PGA of '{motion.name}', {motion.pga / STANDARD_GRAVITY:.3g} g"
-            bounded = found.bounded or bool(found.solutions and found.solutions.may_be_less)
-            low, high = ends * STANDARD_GRAVITY / motion.pga
-            return f"{PushFactors(low, high, site, bounded=bounded)} times {site}"
+            peak = replace(case, limit=replace(case.limit, demand=motion.pga))
+            if factors := compare_with_site(peak, found):
+                words = factors.site.replace("demand of", f"PGA of '{motion.name}',")
+                return f"{factors} times {words}"
     return ""
 
 

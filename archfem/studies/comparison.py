@@ -125,12 +125,10 @@ def _falls_text(finding: Finding) -> str:
 
 def _incomplete_runs(findings: Mapping[str, Finding]) -> list[str]:
     """A text with a line for each case with incomplete runs; no text if there are none."""
-    lines = []
-    for name, finding in findings.items():
-        failed = [run["ended"] == Ending.FAILED for run in finding.runs.values()]
-        if any(failed):
-            lines.append(f"{name}: {sum(failed)} of {len(failed)} runs broke off")
-    return ["\n".join(lines)] if lines else []
+    ends = {name: [run["ended"] for run in each.runs.values()] for name, each in findings.items()}
+    failed = {name: own.count(Ending.FAILED) for name, own in ends.items()}
+    lines = [f"{k}: {failed[k]} of {len(ends[k])} runs broke off" for k in ends if failed[k]]
+    return ["\n".join(lines)] * bool(lines)
 
 
 def _median_eccentricity(finding: Finding, role: str) -> str:

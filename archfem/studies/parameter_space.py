@@ -8,7 +8,7 @@ from contextlib import suppress
 from copy import deepcopy
 from dataclasses import dataclass, field, replace
 from functools import partial
-from itertools import chain, product
+from itertools import product
 from math import isfinite, log2
 from pathlib import Path
 from typing import Any
@@ -306,10 +306,8 @@ def flatten_tables(tables: Mapping[str, Any], prefix: str = "") -> dict[str, Any
 
 def group_by_model(points: Iterable[tuple[int, Point]]) -> list[tuple[int, Point]]:
     """Return points in their order, but those of one model together, so that it is built once."""
-    groups: dict[str, list[tuple[int, Point]]] = {}
-    for number, point in points:
-        groups.setdefault(point.model_key, []).append((number, point))
-    return list(chain.from_iterable(groups.values()))
+    places: dict[str, int] = {}  # of models, in the order of their first points
+    return sorted(points, key=lambda each: places.setdefault(each[1].model_key, len(places)))
 
 
 def _copy_tables(tables: Mapping[str, Any]) -> dict[str, Any]:

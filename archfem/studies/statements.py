@@ -129,12 +129,9 @@ def _rises(structure: Structure, joints: xr.Dataset) -> dict[str, float]:
     """Return the rise of each ring: of a circle through its joints' middles above the first [m]."""
     places = np.array([structure.joints[n].middle for n in joints["joint"].values])
     rings = [part for part, role in part_roles(joints).items() if role == "ring"]
-    rises = {}
-    for ring in rings:
-        own = places[joints["part"].values == ring]
-        circle = fitted_circle(own)
-        rises[ring] = float(circle.centre[1] + circle.radius - own[0, 1])
-    return rises
+    middles = {ring: places[joints["part"].values == ring] for ring in rings}
+    circles = {ring: fitted_circle(own) for ring, own in middles.items()}
+    return {k: float(x.centre[1] + x.radius - middles[k][0, 1]) for k, x in circles.items()}
 
 
 def history_findings(run: History, case: Case) -> dict[str, Any]:
