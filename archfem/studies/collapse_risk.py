@@ -80,7 +80,6 @@ FIRST_ROUND = 8
 # Variables of the table that are results, and their values before a run; an error has any length
 RESULTS = {
     **{"lower": 0.0, "upper": inf, "admissible_step": inf, "runs": 0, "lacks_joints": 0},
-    "slip_at_rest": 0.0,
     "error": np.array("", dtype=object),
 }
 
@@ -150,7 +149,9 @@ def bracket_capacity(sample: RiskSample) -> dict[str, Any]:
     bounds = [states[at].admissible_step for at in (stands, falls) if at in states]
     lacking = stands in states and states[stands].lacks_joints
     found = {"lower": stands, "upper": falls, "runs": runs, "admissible_step": min(bounds)}
-    return found | {"lacks_joints": lacking, "slip_at_rest": getattr(run, "slip_at_rest", 0.0)}
+    slip = getattr(run, "slip_at_rest", 0.0)  # else it is in no doubt by it
+    in_doubt = {"slip_at_rest": slip} if slip > MAX_SLIP_AT_REST else {}
+    return found | {"lacks_joints": lacking} | in_doubt
 
 
 def _search_factor(wide: float) -> float:
@@ -368,7 +369,7 @@ def _continue_file(out: str | Path | None, table: xr.Dataset) -> None:
     first = table.isel(sample=slice(count))
     varies = (*RESULTS, "unscaled_sa")  # which is at the period of the hazard
     same = all(
-        key in varies or (key in kept and np.array_equal(kept[key].values, first[key].values))
+        key in kept and (key in varies or np.array_equal(kept[key].values, first[key].values))
         for key in first
     )
     keys = ("properties", "inputs")
@@ -376,8 +377,8 @@ def _continue_file(out: str | Path | None, table: xr.Dataset) -> None:
         raise InvalidInput(
             f"{out} has samples of other arguments: name another file, or delete this one"
         )
-    for name in RESULTS.keys() & kept:  # one may have no slips at rest
-        table[name].values[:count] = kept[name].values
+    for name in (*RESULTS, *{"slip_at_rest"} & kept.keys()):
+        _column_of(table, name)[:count] = kept[name].values
     write_dataset(table, Path(out), FILE_KIND)  # with the hazard of this call
 
 
@@ -397,7 +398,14 @@ def _first_scales(table: xr.Dataset, measure: str, begin: int) -> Array:
 def _store_row(table: xr.Dataset, number: int, row: Mapping[str, Any]) -> None:
     """Store the bracket of a sample, or the text of its error."""
     for name, value in {**row["found"], "error": str(row["error"])}.items():
-        table[name].values[number] = value
+        _column_of(table, name)[number] = value
+
+
+def _column_of(table: xr.Dataset, name: str) -> Any:
+    """Return the values of a result, of which one may be new."""
+    if name not in table:
+        table[name] = "sample", np.zeros(table.sizes["sample"])
+    return table[name].values
 
 
 @validate_methods
@@ -407,9 +415,10 @@ class CollapseRisk(ResultDisplay):
 
     Attributes:
         dataset: over `sample`: the varied properties, the `alternative`, the
-            `record_number`, `lower` and `upper` scale of the bracket, `runs`, `error`, and
-            `slip_at_rest`, the largest displacement along a joint under dead load [m]; over
-            `record` the intensities of the unscaled records, `unscaled_pga` and others.
+            `record_number`, `lower` and `upper` scale of the bracket, `runs`, `error`, and where
+            some samples are in doubt by it `slip_at_rest`, the largest displacement along a joint
+            under dead load, of these [m]; over `record` the intensities of the unscaled records,
+            `unscaled_pga` and others.
     """
 
     dataset: xr.Dataset
