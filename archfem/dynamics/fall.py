@@ -39,8 +39,9 @@ from archfem.dynamics.separation import is_overturning, is_resting, swings_littl
 from archfem.dynamics.state import State
 from archfem.errors import DidNotConverge, logger
 from archfem.masonry.block import rotate
+from archfem.masonry.materials import Contact
 from archfem.masonry.stiffness_ratio import find_yielding_blocks, list_stones, mark_stone_joints
-from archfem.masonry.structure import Structure, join_names
+from archfem.masonry.structure import Structure, join_names, with_contacts
 from archfem.models.model import Doubt, Model
 from archfem.motion.motion import Motion
 from archfem.units import STANDARD_GRAVITY
@@ -315,12 +316,11 @@ def _list_slid_off(structure: Structure, poses: Array) -> list[str]:
 
 def with_sliding_joints(structure: Structure) -> Structure:
     """Return the structure with friction, and no cohesion, in joints that never slide."""
-    joints = list(structure.joints)
-    for number, joint in enumerate(joints):
-        if not joint.contact.slides:
-            contact = replace(joint.contact, friction=ASSUMED_FRICTION, cohesion=0.0)
-            joints[number] = replace(joint, contact=contact)
-    return replace(structure, joints=tuple(joints))
+
+    def slide(given: Contact) -> Contact:
+        return given if given.slides else replace(given, friction=ASSUMED_FRICTION, cohesion=0.0)
+
+    return with_contacts(structure, slide)
 
 
 def _doubt_fall(structure: Structure, dataset: xr.Dataset) -> Iterator[Doubt]:

@@ -9,7 +9,7 @@ import inspect
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, wraps
 from itertools import pairwise
 from numbers import Integral
@@ -584,6 +584,12 @@ def record_origin(shape: Shape) -> Shape:
         return structure
 
     return wrapper  # type: ignore[return-value]
+
+
+def with_contacts(structure: Structure, change: Callable[[Contact], Contact]) -> Structure:
+    """Return the structure with other contacts of its joints."""
+    joints = (replace(joint, contact=change(joint.contact)) for joint in structure.joints)
+    return replace(structure, joints=tuple(joints))
 
 
 def find_supported_blocks(structure: Structure, blocks: Iterable[int]) -> set[int]:

@@ -211,9 +211,8 @@ def _describe_modes(rows: Rows, statement: Statement) -> str:
 def _describe_capacity(rows: Rows, statement: Statement) -> str:
     """Return the largest load factor by pushover, and that of limit analysis."""
     row = _first(rows)
-    known = f"{row['factor']:.4g}"
-    if np.isnan(row["factor"]):
-        known = f"at most {row['factor_at_most']:.4g}"
+    bounded = np.isnan(row["factor"])
+    known = f"at most {row['factor_at_most']:.4g}" if bounded else f"{row['factor']:.4g}"
     return f"pushover {row['peak']:.4g}, limit analysis {known}"
 
 

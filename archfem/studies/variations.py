@@ -44,7 +44,7 @@ from archfem.errors import DidNotConverge, InvalidInput, InvalidStructure, logge
 from archfem.limit.fill_strength import PlasticFill, has_backing
 from archfem.limit.rating import ASSUMED_STRENGTH, Rating, rate_again
 from archfem.masonry.joint_closing import with_finish
-from archfem.masonry.structure import Structure, join_words
+from archfem.masonry.structure import Structure, join_words, with_contacts
 from archfem.models.model import Doubt, write_doubts
 from archfem.motion.motion import Motion
 from archfem.statics.equilibrium import MAX_SLIP_AT_REST, slips_at_rest
@@ -355,17 +355,15 @@ def _vary_contacts(structure: Structure, changes: Mapping[str, Any]) -> Structur
         return structure
     if changes["finish"] != "as given":
         structure = with_finish(structure, changes["finish"])
-    joints = []
-    for joint in structure.joints:
-        given = joint.contact
-        contact = replace(
+    return with_contacts(
+        structure,
+        lambda given: replace(
             given,
             normal_stiffness=changes["k_n"] * given.normal_stiffness,
             shear_stiffness=changes["k_s"] * given.shear_stiffness,
             friction=max(given.coefficient + changes["friction"], LEAST_FRICTION),
-        )
-        joints.append(replace(joint, contact=contact))
-    return replace(structure, joints=tuple(joints))
+        ),
+    )
 
 
 def _run_rigid_blocks(structure: Structure, motion: Motion, *, dt: float) -> CollapseState:
