@@ -328,17 +328,35 @@ def test_results_of_another_case_are_named_and_not_stated(kept, undrawn):
     data = report_data.ReportData(found.case, found.runs, found.folder)
     pieces = build_conclusion(data).pieces
     texts = [each.text for each in pieces if each.kind == "words"]
-    said = "Not stated, for its case, drawing or version of archfem is not that of the runs: {}"
-    said += ". If the runs are older, run `archfem run` again."
-    assert said.format("limit analysis (run `archfem limit` again)") in texts
-    assert sum(text.startswith("Not stated") for text in texts) == 1
     assert not any("turns" in text for text in texts)
     (table,) = (each for each in pieces[:-1] if each.kind == "grid")
     assert [row[0] for row in table.rows] == [
         *("time histories", "rating"),
         *(f"assessment: {check.name}, right and left" for check in CHECKS),
         "annual rate",
+        "limit analysis",
     ]
+    assert table.rows[-1][2:] == (
+        "not stated, for its case, drawing or version of archfem is another: run `archfem limit`, "
+        "or `archfem run`, again with the same `--set`",
+        "-",
+    )
+
+
+def test_a_result_of_one_pair_of_another_case_is_named_beside_that_of_the_others(kept, undrawn):
+    for pair, inputs in (("first", read_file_list(kept)["run"].inputs), ("second", "other")):
+        with replace_results(kept, f"scale --pair {pair}", inputs) as draft:
+            (draft / pair).mkdir()
+            stated = answers.state_outcome("scale of the motion", f"{pair} stands")
+            files = {"scale.txt": pair, **stated.as_file("scale")}
+            write_files({f"{pair}/{name}": text for name, text in files.items()}, draft)
+    found = af.cases.open_results(kept)
+    data = report_data.ReportData(found.case, found.runs, found.folder)
+    (table,) = conclusion.tabulate_capacities({"": data})
+    said = [row[2] for row in table.rows if row[0] == "scale of the motion"]
+    assert said[0] == "first stands"
+    assert "run `archfem scale --pair second`, or" in said[1]
+    assert len(said) == 2
 
 
 def test_missing_pairs_are_named_and_different_cases_refused(kept, unplotted):

@@ -58,7 +58,7 @@ SECTIONS |= {STUDIES: "Study of many cases", RESULTS["rating"]: "Rating for a ve
 VARIED_FIDELITY = "rigid"
 
 # What commands keep of results that they have not finished
-_BEGUN = {RESULTS["risk"]: "risk_samples.nc"}
+_BEGUN = {"risk": "risk_samples.nc"}
 
 # Lines of the head with the answer, in their order
 HEAD = ("verdict", "margin", "depends on", "not checked")
@@ -453,7 +453,7 @@ def build_conclusion(data: ReportData) -> Section:
         blocks.append(TextBlock(f"{lead}, {result}: {' '.join(shown)}", manner))
     for result, notes in list_notes(data).items():
         blocks.append(TextBlock(f"Note, {result}: {' '.join(map(sentence, notes))}", "missing"))
-    blocks += map(TextBlock, _list_outdated(data))
+    blocks += map(TextBlock, _list_unfinished(data))
     blocks += [] if data.label else [build_signatures(data.case.report)]
     return Section("Conclusion", blocks)
 
@@ -495,28 +495,29 @@ def _mark_rows(data: ReportData) -> Iterator[tuple[str, ...]]:
         yield row.result, row.demand, f"{row.outcome}{in_doubt}", row.factor
 
 
-def _list_outdated(data: ReportData) -> Iterator[str]:
-    """Yield sentences on results that another case has left, or no answer."""
+def _list_outdated(data: ReportData) -> Iterator[Row]:
+    """Yield a row for each result that another case has left."""
     listed = {} if data.folder is None else read_file_list(data.folder)
-    shown = [name for name in SHOWN_RESULTS if data.list_parts(f"{name}.txt")]
-    unstated = RESULTS.keys() - {*shown, *data.statements}
-    absent = {f"{name}.txt": RESULTS[name] for name in unstated}
     own = group_of(listed, CASE_FILE)
-    other = [
-        f"{absent[name]} (run `archfem {command}` again)"
-        for command, group in listed.items()
-        for path in group.files
-        if (name := path.rpartition("/")[2]) in absent and not (own and group.inputs == own.inputs)
-    ]
-    for name in _BEGUN.keys() & absent.values():
-        if data.folder and (data.folder / _BEGUN[name]).exists():
-            yield f"The {name} was begun and has no answer: runs are left to compute."
+    for command, group in listed.items():
+        names = {path.rpartition("/")[2].removesuffix(".txt") for path in group.files}
+        if own is None or group.inputs != own.inputs:
+            for result in (RESULTS[name] for name in RESULTS if name in names):
+                # digests of inputs do not say which is the older
+                again = f"run `archfem {command}`, or `archfem run`, again with the same `--set`"
+                outcome = (
+                    f"not stated, for its case, drawing or version of archfem is another: {again}"
+                )
+                yield Row(result, "-", outcome, "-", {})
+
+
+def _list_unfinished(data: ReportData) -> Iterator[str]:
+    """Yield sentences on what is left to compute, or to fill in."""
+    for name, file in _BEGUN.items():
+        if name not in data.statements and data.folder and (data.folder / file).exists():
+            yield f"The {RESULTS[name]} was begun and has no answer: runs are left to compute."
     if data.case.report.get("project") == PLACEHOLDER:
         yield "The name of the project is that of the template: fill in [report] of the case."
-    if other:
-        # digests of inputs do not say which is the older
-        made = "Not stated, for its case, drawing or version of archfem is not that of the runs"
-        yield f"{made}: {', '.join(other)}. If the runs are older, run `archfem run` again."
 
 
 def _build_paragraphs(data: ReportData, doubtful: Sequence[str]) -> dict[str, list[str]]:
@@ -624,3 +625,4 @@ def _capacity_rows(data: ReportData) -> Iterator[tuple[str, Row]]:
     for times, of in () if "thickness" in data.statements else at_rest:
         outcome = f"stands; the factor is of {of}{say_loads_left_out(case)}"
         yield "", Row("at rest", "its own weight", outcome, format_ratio(times), {})
+    yield from (("", row) for row in _list_outdated(data))
