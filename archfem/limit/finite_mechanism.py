@@ -563,8 +563,9 @@ class PathFollower:
 
     def _holds(self, path: MechanismPath, place: int, tolerance: float = 1e-4) -> bool:
         """Return whether limit analysis at a place gives the factor of the path."""
-        if path.factors[place] <= 0.0:
-            return True  # the fall itself
+        released = path.end is PathEnd.RELEASED and place == len(path.factors) - 1
+        if path.factors[place] <= 0.0 or released:
+            return True  # the fall itself, or the end at which nothing is in equilibrium
         blocks = self.blocks.moved(path.displacements[place])
         try:
             mechanism = find_mechanism(blocks, self.joints, self.friction)
