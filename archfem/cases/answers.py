@@ -21,6 +21,7 @@ from archfem.errors import DidNotConverge, InvalidInput
 from archfem.limit.fill_range import FillRange
 from archfem.limit.rating import Rating
 from archfem.masonry.loads import AttachedLoad, name_side
+from archfem.masonry.materials import COURSE_LENGTH
 from archfem.masonry.out_of_plane import describe_transverse_push, find_transverse_push
 from archfem.masonry.structure import Structure, join_words
 from archfem.models.model import Doubt, read_doubts, write_doubts
@@ -28,6 +29,7 @@ from archfem.motion.hazard import DESIGN_PERIOD, MEASURES
 from archfem.motion.motion import Motion
 from archfem.statics.assessment_checks import (
     NOT_SHOWN,
+    UPPER_BOUND,
     AssessmentCheck,
     describe_difference,
     doubt_assumed,
@@ -89,6 +91,7 @@ class Ratios(NamedTuple):
     bounded: bool = False  # whether they are upper bounds, by which it fails and does not pass
     floor: float | None = None  # with e* = 1, whatever moves at the same push
     displaced: float | None = None  # of the values that are shown, of what passes at rest
+    untied: float | None = None  # without ties, where by it alone it is shown to pass
 
     @property
     def name(self) -> str:
@@ -187,8 +190,10 @@ class Statement(NamedTuple):
 
 def read_numbers(kind: type[Numbers], stated: Statement | None) -> list[Numbers]:
     """Return the numbers of a kind of the rows that have them."""
-    rows = stated.rows if stated else []
-    return [kind(**row.numbers) for row in rows if {*row.numbers} == {*kind.__annotations__}]
+    names = {*kind.__annotations__}
+    needed = names.difference(kind._field_defaults)  # type: ignore[attr-defined]
+    rows = [row.numbers for row in stated.rows] if stated else []
+    return [kind(**each) for each in rows if needed <= {*each} <= names]
 
 
 def cut_remedy(doubt: str) -> str:
@@ -356,7 +361,7 @@ def list_ratios(found: KinematicAssessment) -> list[tuple[AssessmentCheck, Ratio
         needed, linear = over.needed if over else "", check.unit != "m"
         bounded = check.bounded and not check.unshown
         numbers = needed, linear, moved, bodies, bounded, floor
-        ratios = Ratios(check.name, (), least, most, *numbers)
+        ratios = Ratios(check.name, (), least, most, *numbers, untied=check.untied)
         listed.append((check, ratios))
     return listed
 
@@ -374,19 +379,26 @@ def compare_checks(checks: Sequence[Ratios]) -> str:
         return ""
     least = min(last, key=lambda x: x.decisive)
     linear = min((x.decisive for x in checks if x.linear), default=0.0)
+    says = (
+        f"{'passes' if linear >= 1.0 else 'fails'} the linear check ({format_ratio(linear)}), and"
+    )
+    undecided = [x for x in last if x.unshown or x.bounded]
+    untied = min((x.untied or 0.0 for x in undecided), default=0.0)
+    if least in undecided and untied and not any(x.fails for x in last):
+        why = f", {least.range}, is {UPPER_BOUND}"
+        if least.unshown:
+            why = f" is {least.range}, as the path ends before alpha vanishes"
+        shown = f"passes by displacements ({format_ratio(untied)})"
+        return f"{says} without ties {shown}: with them the ratio{why}"
     if least.unshown:
         if failing := [x.decisive for x in last if x.fails]:
             return f"another mechanism or sense does not pass ({format_ratio(min(failing))})"
-        verb = "passes" if linear >= 1.0 else "fails"
-        return (
-            f"{verb} the linear check ({format_ratio(linear)}), and {NOT_SHOWN} by displacements "
-            f"({least.range}), as the path ends before alpha vanishes"
-        )
+        why = f"({least.range}), as the path ends before alpha vanishes"
+        return f"{says} {NOT_SHOWN} by displacements {why}"
     if least.bounded:  # which shows no passing
-        return (
-            f"passes the linear check ({format_ratio(linear)}), and is not shown to pass by "
-            f"displacements, as their ratio, {format_ratio(least.decisive)}, is an upper bound"
-        ) * (linear >= 1.0 <= least.decisive)
+        why = f"as their ratio, {format_ratio(least.decisive)}, is {UPPER_BOUND}"
+        text = f"{says} {NOT_SHOWN} by displacements, {why}"
+        return text * (linear >= 1.0 <= least.decisive)
     every = [x for x in checks if x.linear]
     ratios = [[(x.decisive, x.least) for x in each] for each in (last, every)]
     pairs = [tuple(map(min, zip(*each, strict=True))) for each in ratios if each]
@@ -429,6 +441,27 @@ def note_across(structure: Structure, found: Iterable[KinematicAssessment]) -> l
     weaker = find_transverse_push(structure)[0] < min(each.alpha_0 for each in found)
     text = describe_transverse_push(structure)  # of a column of a wall none
     return [f"{NOTE_MARK}{text}"] * (weaker and bool(text))
+
+
+def note_strip(case: Case, found: Mapping[str, KinematicAssessment]) -> list[str]:
+    """Return a note on a strip with courses of one length, if it is weaker than a whole wall."""
+    blocks = case.structure.blocks
+    plain = [x.material for x in blocks if not (x.fixed or x.material.stands_for)]
+    short = [x.material.stands_for == COURSE_LENGTH for x in blocks]
+    if not (plain and any(short)):
+        return []
+    solid = max(plain, key=lambda material: material.unit_weight)
+    filled = [
+        replace(x, material=solid) if own else x for x, own in zip(blocks, short, strict=True)
+    ]
+    strip, text = replace(case.structure, blocks=tuple(filled)), "does not stand"
+    with suppress(InvalidInput):
+        own = case.assessment.solve(strip, case.demand)
+        if find_margin(own.values()) >= 0.999 * find_margin(found.values()):
+            return []
+        text = f"is weaker: {describe_margin(own.values())}"
+    words = "a strip through the highest place, with no course shorter than the foot and its share"
+    return [f"{NOTE_MARK}{words} of the loads, {text}"]
 
 
 def doubt_ties(case: Case) -> list[Remark]:
@@ -569,6 +602,26 @@ def note_ties(case: Case) -> list[Remark]:
             notes += [f"{NOTE_MARK}pushed to the {name_side(sense)}, {text}"] * bool(text)
             notes += doubts
     return notes
+
+
+def assess_untied(
+    case: Case, found: Mapping[str, KinematicAssessment]
+) -> dict[str, KinematicAssessment]:
+    """Return assessments with the ratio without ties, where it alone shows a sense to pass."""
+    settings, given = case.assessment, dict(found)
+    loads = [load for load in settings.options.get("loads", ()) if not load.passive]
+    own = replace(settings, options={**settings.options, "loads": loads})
+    for key, x in found.items():
+        check, tied = x.checks[-1], bool(x.path and x.path.blocks.ties)
+        if tied and (check.unshown or (check.bounded and check.outcome != "fails")):
+            # without its ties it may not stand
+            with suppress(InvalidInput, DidNotConverge):
+                free = replace(own, directions=(x.direction,)).solve(case.structure, case.demand)
+                checks = [each.checks[-1] for each in free.values()]
+                if all(each.passes and each.unit == check.unit == "m" for each in checks):
+                    check = replace(check, untied=min(each.decisive for each in checks))
+                    given[key] = replace(x, displacement=check)
+    return given
 
 
 def note_sense(case: Case) -> list[str]:

@@ -238,7 +238,9 @@ def assess(options: argparse.Namespace) -> int:
     ]
     try:  # a search of many assessments, which may be cut short
         with keep_warnings():  # which are those of the assessment
-            ties = [] if options.parts else answers.note_ties(case)
+            found = found if options.parts else answers.assess_untied(case, found)
+            strip = [] if options.parts else answers.note_strip(case, found)
+            ties = [] if options.parts else [*strip, *answers.note_ties(case)]
     finally:
         every = _show_assessment(case, found, [*doubts, *ties], options.out)
     return doubt_code(every)

@@ -196,6 +196,8 @@ class AssessmentCheck:
         amplified: amplification and a_Z of a floor spectrum, in brackets; "" of others.
         at_least: whether the ratio is a lower bound, by which a check passes and does not fail: the
             path ends before α vanishes, and its end counts as d₀*.
+        untied: ratio without the ties, by which it passes where with them it is not shown to; None
+            of others. It is no bound of that with ties: what holds late may lengthen T more than d.
     """
 
     name: str
@@ -211,6 +213,7 @@ class AssessmentCheck:
     floor: float | None = None
     amplified: str = ""
     at_least: bool = False
+    untied: float | None = None
 
     @property
     def unshown(self) -> bool:
@@ -240,8 +243,10 @@ class AssessmentCheck:
 
     @property
     def words(self) -> str:
-        """The outcome in words, with an upper bound by which alone it passes."""
-        return self.outcome + f" by {UPPER_BOUND} alone" * (self.outcome == "passes") * self.bounded
+        """The outcome in words, with an upper bound by which alone it passes, and without ties."""
+        alone = f" by {UPPER_BOUND} alone" * (self.outcome == "passes") * self.bounded
+        untied = self.untied and f" (without ties it passes: {format_ratio(self.untied)})"
+        return f"{self.outcome}{alone}{untied or ''}"
 
     def doubt_split(self) -> list[Doubt]:
         """Return the doubt of a check that passes with the weights of single blocks alone."""

@@ -263,7 +263,7 @@ class KinematicAssessment(ResultDisplay):
                 lines.append(over_fill.describe_states(digits=3, name=" times the spectrum"))
                 own = (k for k, x in over_fill.values.items() if x == self.checks[-1].assumed)
                 lines += [f"all else is under one assumption: {key}" for key in [*own][:1]]
-        lines += [f"{NOTE_MARK}{note}" for note in [*self.notes, *self._split_note, *self._lower]]
+        lines += [f"{NOTE_MARK}{note}" for note in [*self.notes, *self._lower]]
         return "\n".join([*lines, *(f"{DOUBT_MARK}{doubt}" for doubt in self.doubts)])
 
     @property
@@ -282,18 +282,6 @@ class KinematicAssessment(ResultDisplay):
         moves = f"from alpha_0 = {self.above.alpha_0:.4g} on"
         ratios = "; ".join(f"{format_ratio(x.decisive)} by {x.name}, {x.words}" for x in lower)
         return [f"{self.above.mechanism_name}, {moves}, has a lower ratio: {ratios}"]
-
-    @property
-    def _split_note(self) -> list[str]:
-        """Note on the weights where a body has several blocks."""
-        ratios = [f"{x.bodies:.3g} by {x.name}" for x in self.checks if x.bodies is not None]
-        if not ratios or self.of_bodies is None:
-            return []
-        return [
-            "weights are at the centroids of blocks: one for each body that moves as one gives "
-            f"e* = {self.of_bodies.e_star:.3f}, and the spectrum may be as strong as "
-            f"{join_names(ratios)}"
-        ]
 
 
 @validate_arguments
@@ -728,7 +716,13 @@ class _Oscillator:
                 moved = replace(found.displacement, bodies=whole.displacement.ratio)
                 found = replace(found, displacement=moved)
         doubts = [y for x in found.checks for y in (*x.doubt_split(), *x.doubt_end(self.remedy))]
-        return replace(found, doubts=(*found.doubts, *doubts))
+        ratios = [f"{x.bodies:.3g} by {x.name}" for x in found.checks if x.bodies is not None]
+        split = (
+            "weights are at the centroids of blocks: one for each body that moves as one gives "
+            f"e* = {whole.e_star:.3f}, and the spectrum may be as strong as {join_names(ratios)}"
+        )
+        notes = (*found.notes, *[split] * bool(ratios))
+        return replace(found, doubts=(*found.doubts, *doubts), notes=notes)
 
     @property
     def remedy(self) -> str:

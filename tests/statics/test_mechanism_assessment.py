@@ -4,7 +4,8 @@ import re
 from dataclasses import replace
 from functools import partial
 from itertools import pairwise
-from math import atan2, cos, pi, sin, sqrt
+from math import atan2, cos, hypot, pi, sin, sqrt
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,11 +16,13 @@ from scipy.optimize import brentq
 import archfem as af
 from archfem.cases.answers import (
     Statement,
+    assess_untied,
     compare_checks,
     describe_margin,
     doubt_ties,
     find_margin,
     list_ratios,
+    note_strip,
     note_ties,
     state_assessments,
 )
@@ -689,6 +692,87 @@ def test_a_path_that_ends_early_has_a_lower_bound(held_top, verified):
     assert compare_checks([*ratios, other]) == "another mechanism or sense does not pass (0.9)"
     failing = [ratios[0]._replace(least=0.8, most=0.8), ratios[1]]
     assert compare_checks(failing).startswith(f"fails the linear check (0.8), and {NOT_SHOWN}")
+
+
+def test_a_tied_wall_that_is_not_shown_to_pass_says_that_it_passes_untied(verified):
+    """A block of 0.6 × 6 m; its tie stretches by more than a short bar bears."""
+    spectrum = {"code": "NTC-2018", "ag": 0.15, "f0": 2.5, "tc_star": 0.33, "site": "B"}
+    tie = {"block": "block 1", "point": [0.0, 3.8], "force": [-2e3, 0.0], "passive": True}
+    column = {"shape": "column", "breadth": 0.6, "heights": [6.0]}
+    assessment = {"spectrum": spectrum, "direction": 1, "loads": [tie]}
+    case = af.Case.of({"structure": column, "assessment": assessment})
+    found = case.assessment.solve(case.structure, None)
+    tied = found["right"].displacement
+    assert (tied.bounded, tied.passes) == (True, False)
+    found = assess_untied(case, found)
+    # about the toe; the arm of the centroid is hypot(0.3, 3)
+    capacity, arm = 0.4 * 0.3, hypot(0.3, 3.0)
+    alpha = (0.3 - capacity) / sqrt(arm**2 - (0.3 - capacity) ** 2)
+    period = 1.68 * pi * sqrt(1.35 * capacity / (G * alpha))
+    table = af.motion.Ntc2018(ag=0.15, f0=2.5, tc_star=0.33, site="B", damping=0.08)
+    demand = float(table.horizontal(period)) * af.units.STANDARD_GRAVITY * (period / 2 / pi) ** 2
+    check = found["right"].displacement
+    verified("tied block: ratio without the tie", capacity / demand, "moments", check.untied)
+    assert check.untied == pytest.approx(capacity / demand, rel=1e-3)  # steps of the curve
+    untied = f"{check.untied:.3g}"
+    assert f": passes by an upper bound alone (without ties it passes: {untied}), " in str(check)
+    linear = found["right"].linear.ratio
+    says = f"passes the linear check ({linear:.3g}), and without ties passes by displacements "
+    says += f"({untied}): with them the ratio, {check.ratio:.3g}, is an upper bound"
+    assert describe_margin(found.values()).endswith(f": {says}")
+    data, stated = ReportData(case, {}), state_assessments(found, [])
+    vars(data)["statements"] = {"assessment": Statement.read(stated.as_file("x")["x.json"])}
+    assert f"it {says}." in dict(list_facts(data))["verdict"]
+    # an end of the path before alpha vanishes, and a sense that fails
+    linear, moved = (x for _, x in list_ratios(found["right"]))
+    early = moved._replace(least=0.9, most=np.inf, bounded=False)
+    assert compare_checks([linear, early]).endswith(
+        "with them the ratio is at least 0.9, as the path ends before alpha vanishes"
+    )
+    failing = moved._replace(least=0.8, most=0.8, bounded=False, untied=None)
+    assert "without ties" not in compare_checks([linear, moved, failing])
+    # a wall that fails without its tie, as one of twice the spectrum
+    assessment["spectrum"] = spectrum | {"ag": 0.3}
+    weak = af.Case.of({"structure": column, "assessment": assessment})
+    found = weak.assessment.solve(weak.structure, None)
+    assert assess_untied(weak, found) == found
+
+
+def test_a_whole_gable_notes_that_its_strip_is_weaker(verified):
+    """A strip through the ridge is a prism, which turns from thickness over height on."""
+    gable = {"breadth": 5.2, "height": 6.2, "eaves": 3.8, "width": 0.6, "course": 0.25}
+    wall = af.Case.of({"structure": {"shape": "wall", "stone": 0.5, **gable}}).structure
+    spectrum = {"code": "NTC-2018", "ag": 0.15, "f0": 2.5, "tc_star": 0.33, "site": "B"}
+    column = {"shape": "column", "breadth": 0.6, "heights": [6.2]}
+    case = af.Case.of({"structure": column, "assessment": {"spectrum": spectrum}})
+    columns = af.masonry.columns_across(wall)
+    whole, strip, prism = (
+        SimpleNamespace(structure=x, assessment=case.assessment, demand=None)
+        for x in (columns["whole"], columns["strip"], case.structure)
+    )
+    found = case.assessment.solve(whole.structure, None)
+    (note,) = note_strip(whole, found)
+    pga = 0.15 * 1.2 * af.units.STANDARD_GRAVITY / G
+    ratio = 2.0 / 1.35 * (0.6 / 6.2) / pga
+    said = float(re.search(r"share of the loads, is weaker: least margin (\S+) \(", note)[1])
+    verified("gable: least ratio of a strip", ratio, "overturning of a prism", said)
+    assert said == pytest.approx(ratio, abs=5e-4)  # three figures
+    assert find_margin(found.values()) > 1.2 * ratio
+    # a strip, and a block, whose courses are all as long
+    assert note_strip(strip, found) == note_strip(prism, found) == []
+
+
+def test_a_ratio_without_ties_is_no_bound_of_that_with_them():
+    """Where spectral displacements grow as T the ratio does as √(d_u a*), which a tail lowers."""
+    d, a_0 = np.linspace(0.0, 0.05, 101), 1.5
+    free = a_0 * (1.0 - d / 0.05)
+    # from 0.9 d₀* on a tie holds a tenth of a₀*, up to 2 d₀*
+    far = np.append(d[:91], [0.1, 0.1])
+    tied = np.append(free[:91], [0.1 * a_0, 0.0])
+    rules = LIMIT_STATES["NTC-2018 SLV"]
+    untied, longer = (rules.check(SPECTRUM, 1.35, *x) for x in ((d, free), (far, tied)))
+    ratio = sqrt(0.8 * 0.2 / (0.4 * 0.6))
+    assert longer.moved / untied.moved == pytest.approx(ratio, rel=1e-6)
 
 
 def test_a_mechanism_of_stronger_ties_puts_the_ratio_of_given_ones_in_doubt(held_top):
