@@ -379,30 +379,26 @@ def compare_checks(checks: Sequence[Ratios]) -> str:
         return ""
     least = min(last, key=lambda x: x.decisive)
     linear = min((x.decisive for x in checks if x.linear), default=0.0)
-    says = (
-        f"{'passes' if linear >= 1.0 else 'fails'} the linear check ({format_ratio(linear)}), and"
-    )
     undecided = [x for x in last if x.unshown or x.bounded]
-    untied = min((x.untied or 0.0 for x in undecided), default=0.0)
-    if least in undecided and untied and not any(x.fails for x in last):
-        why = f", {least.range}, is {UPPER_BOUND}"
-        if least.unshown:
-            why = f" is {least.range}, as the path ends before alpha vanishes"
-        shown = f"passes by displacements ({format_ratio(untied)})"
-        return f"{says} without ties {shown}: with them the ratio{why}"
+    if least not in undecided:
+        every = [x for x in checks if x.linear]
+        ratios = [[(x.decisive, x.least) for x in each] for each in (last, every)]
+        pairs = [tuple(map(min, zip(*each, strict=True))) for each in ratios if each]
+        return describe_difference(*pairs)
+    failing = [x.decisive for x in last if x.fails]
+    if failing and least.unshown:
+        return f"another mechanism or sense does not pass ({format_ratio(min(failing))})"
+    why = f", as their ratio, {format_ratio(least.decisive)}, is {UPPER_BOUND}"
     if least.unshown:
-        if failing := [x.decisive for x in last if x.fails]:
-            return f"another mechanism or sense does not pass ({format_ratio(min(failing))})"
-        why = f"({least.range}), as the path ends before alpha vanishes"
-        return f"{says} {NOT_SHOWN} by displacements {why}"
-    if least.bounded:  # which shows no passing
-        why = f"as their ratio, {format_ratio(least.decisive)}, is {UPPER_BOUND}"
-        text = f"{says} {NOT_SHOWN} by displacements, {why}"
-        return text * (linear >= 1.0 <= least.decisive)
-    every = [x for x in checks if x.linear]
-    ratios = [[(x.decisive, x.least) for x in each] for each in (last, every)]
-    pairs = [tuple(map(min, zip(*each, strict=True))) for each in ratios if each]
-    return describe_difference(*pairs)
+        why = f" ({least.range}), as the path ends before alpha vanishes"
+    shown = f"{NOT_SHOWN} by displacements{why}"
+    if untied := 0.0 if failing else min(x.untied or 0.0 for x in undecided):
+        shown = (
+            f"passes by displacements without ties ({format_ratio(untied)}); with them it {shown}"
+        )
+    verb = "passes" if linear >= 1.0 else "fails"
+    said = least.unshown or bool(untied) or linear >= 1.0 <= least.decisive
+    return f"{verb} the linear check ({format_ratio(linear)}), and {shown}" * said
 
 
 def describe_margin(found: Iterable[KinematicAssessment]) -> str:
@@ -451,17 +447,14 @@ def note_strip(case: Case, found: Mapping[str, KinematicAssessment]) -> list[str
     if not (plain and any(short)):
         return []
     solid = max(plain, key=lambda material: material.unit_weight)
-    filled = [
-        replace(x, material=solid) if own else x for x, own in zip(blocks, short, strict=True)
-    ]
-    strip, text = replace(case.structure, blocks=tuple(filled)), "does not stand"
+    filled = [replace(x, material=solid) if y else x for x, y in zip(blocks, short, strict=True)]
     with suppress(InvalidInput):
-        own = case.assessment.solve(strip, case.demand)
-        if find_margin(own.values()) >= 0.999 * find_margin(found.values()):
-            return []
-        text = f"is weaker: {describe_margin(own.values())}"
-    words = "a strip through the highest place, with no course shorter than the foot and its share"
-    return [f"{NOTE_MARK}{words} of the loads, {text}"]
+        strip = replace(case.structure, blocks=tuple(filled))
+        own = case.assessment.solve(strip, case.demand).values()
+        words = "a strip through the highest place, with no course shorter than the foot and its "
+        words += f"share of the loads, is weaker: {describe_margin(own)}"
+        return [f"{NOTE_MARK}{words}"] * (find_margin(own) < 0.999 * find_margin(found.values()))
+    return []
 
 
 def doubt_ties(case: Case) -> list[Remark]:

@@ -208,9 +208,8 @@ class KinematicAssessment(ResultDisplay):
         units |= {"d_0_star": "m", "T_s": "s"} if np.isfinite(self.d_0_star) else {}
         rows = [(name, getattr(self, name), unit) for name, unit in units.items()]
         for check in self.checks:
-            rows.append((f"{check.name}: capacity", check.capacity, check.unit))
-            rows.append((f"{check.name}: demand", check.demand, check.unit))
-            rows.append((f"{check.name}: ratio", check.ratio, "-"))
+            own = {"capacity": check.unit, "demand": check.unit, "ratio": "-"}
+            rows += [(f"{check.name}: {key}", getattr(check, key), own[key]) for key in own]
         texts = [[name, f"{value:.4g}", unit] for name, value, unit in rows]
         if self.linear.over_fill is not None:
             for check in self.checks:
@@ -256,7 +255,11 @@ class KinematicAssessment(ResultDisplay):
             places = self.path.first_changes
             changes = [f"{text} at d* = {moved[k]:.3g} m" for text, k in places.items()]
             changed = f"along the path the mechanism changes: {join_names(changes, '; ')}"
-            lines += [*self._setbacks, *[changed] * bool(changes)]
+            if np.isfinite(self.strength) and self.hinges:
+                back = Ends.of(self.path.blocks.setback[[k for k, _ in self.hinges]])
+                crushed = f"joints crush at {self.strength / MPa:.3g} MPa: hinges are set back by"
+                lines.append(f"{crushed} {back:mm}")
+            lines += [changed] * bool(changes)
             lines += [self.path.ending] if self.displacement else []
             lines += map(str, self.checks)
             if (over_fill := self.checks[-1].over_fill) is not None:
@@ -265,14 +268,6 @@ class KinematicAssessment(ResultDisplay):
                 lines += [f"all else is under one assumption: {key}" for key in [*own][:1]]
         lines += [f"{NOTE_MARK}{note}" for note in [*self.notes, *self._lower]]
         return "\n".join([*lines, *(f"{DOUBT_MARK}{doubt}" for doubt in self.doubts)])
-
-    @property
-    def _setbacks(self) -> list[str]:
-        """Return how far hinges are from the edges of joints that crush."""
-        if not (self.path and np.isfinite(self.strength) and self.hinges):
-            return []
-        back = Ends.of(self.path.blocks.setback[[k for k, _ in self.hinges]])
-        return [f"joints crush at {self.strength / MPa:.3g} MPa: hinges are set back by {back:mm}"]
 
     @property
     def _lower(self) -> list[str]:

@@ -37,6 +37,9 @@ from archfem.view.style import Colour, Size
 # Share of the largest turn of a hinge from which one is drawn [-]
 LEAST_TURN = 0.05
 
+# Hinges of a mechanism that have the numbers of their joints beside them
+MAX_NAMED = 8
+
 
 @validate_arguments
 def draw_collapse(structure: Structure, found: Collapse) -> Figure:
@@ -351,7 +354,20 @@ def _draw_displaced_mechanism(axes: Axes, found: KinematicAssessment) -> None:
     _mark_hinges(axes, structure, found, label="hinge at rest", ms=6.5)
     _mark_sliding(axes, structure, found.sliding)
     _draw_ties(axes, path.blocks)
+    _name_blocks(axes, found)
     style.set_title(axes, f"alpha_0 = {found.alpha_0:.3f}, e* = {found.e_star:.2f}")
+
+
+def _name_blocks(axes: Axes, found: KinematicAssessment) -> None:
+    """Write the blocks beside a hinge that name the mechanism, on the side that it leaves."""
+    structure, way = found.structure, -found.direction
+    room = way * 0.6 / style.drawing_scale(structure)  # of a name [m]
+    for k in structure.pairs[[joint for joint, _ in found.hinges]].ravel():
+        if (block := structure.blocks[k]).name in found.mechanism_name:
+            place = way * (way * block.points[:, 0]).max(), block.centroid[1]
+            style.write_name(axes, block.name, place, (way, 0.0))
+            axes.update_datalim([(place[0] + room, place[1])])
+    axes.autoscale_view()
 
 
 def _draw_ties(axes: Axes, blocks: PlacedBlocks) -> None:
@@ -361,6 +377,8 @@ def _draw_ties(axes: Axes, blocks: PlacedBlocks) -> None:
         end = tie.point + size * np.array(tie.force) / np.hypot(*tie.force)
         ends = np.array([tie.point, end if tie.anchor_point is None else tie.anchor_point])
         axes.plot(*ends.T, color=Colour.LOAD, lw=1.4, marker=".", zorder=9, label=label)
+        name = blocks.structure.blocks[blocks.structure.block_number(tie.block)].name
+        style.write_name(axes, name, ends.mean(axis=0), (0.0, 1.0))
         label = ""
 
 
@@ -461,7 +479,14 @@ def _mark_hinges(
     turns = np.abs(np.diff(velocity[structure.pairs[[*numbers]], 2], axis=1))[:, 0]
     points = structure.ends[[*numbers], [int(side != "intrados") for side in sides]]
     look |= {"mfc": Colour.HINGE, "mec": "white", "mew": 0.8, "zorder": 6}
-    axes.plot(*points[turns >= LEAST_TURN * turns.max()].T, "o", **look)
+    clear = np.flatnonzero(turns >= LEAST_TURN * turns.max())
+    joints = [structure.joints[numbers[k]] for k in clear]
+    names = [style.short_name(joint.name, joint.part) for joint in joints]
+    if len(names) <= MAX_NAMED:
+        for name, joint, point in zip(names, joints, points[clear], strict=True):
+            way = point - joint.ends.mean(axis=0)
+            style.write_name(axes, name, point, way / np.hypot(*way))
+    axes.plot(*points[clear].T, "o", **look)
 
 
 def _mark_sliding(axes: Axes, structure: Structure, joints: Sequence[int]) -> None:

@@ -31,7 +31,7 @@ from archfem.joints.criteria import (
 )
 from archfem.masonry.structure import Structure
 from archfem.view import style
-from archfem.view.structure import MAX_NAME_LETTERS, short_name
+from archfem.view.structure import MAX_NAME_LETTERS
 from archfem.view.style import Colour, Size
 
 
@@ -254,7 +254,7 @@ def _make_panels(
         along = "height [m]" if panel.by_height else "joint [-]"
         style.style_axes(own, along, "eccentricity e = M / (N h) [-]" if first else "")
         _draw_faces(own, hinge)
-        _label_places(panel, [short_name(name, part) for name in names[part]], every[0])
+        _label_places(panel, [style.short_name(name, part) for name in names[part]], every[0])
         if len(parts) > 1:
             own.set_title(part, fontsize=Size.LABEL, color=Colour.TEXT)
             if not (panel.by_height or panel.is_wall):

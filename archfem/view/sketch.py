@@ -99,9 +99,7 @@ def _draw_layers(axes: Axes, closed: Sequence[Outline], scale: float) -> None:
         room = scale * 0.5 * float(abs(x @ np.roll(y, 1) - y @ np.roll(x, 1)) / (np.ptp(y) or 1.0))
         names = (outline.name, outline.name.removeprefix(outline.layer).strip(), str(number))
         fitting = (t for t in names if t and style.text_width(len(t), Size.NOTE) < room)
-        text = next(fitting, names[-1])
-        look = {"ha": "center", "va": "center", "zorder": 6, "path_effects": style.white_halo(1.5)}
-        style.annotate(axes, text, points.mean(axis=0), fontsize=Size.NOTE, **look)
+        style.write_name(axes, next(fitting, names[-1]), points.mean(axis=0))
 
 
 def _mark_faults(axes: Axes, faults: Sequence[Array], kind: str) -> None:

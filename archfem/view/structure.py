@@ -15,6 +15,7 @@ from matplotlib.text import Text
 from archfem._typing import Array
 from archfem._validation import validate_arguments
 from archfem.dynamics.history import History
+from archfem.dynamics.verdict import find_farthest
 from archfem.errors import InvalidInput
 from archfem.joints.criteria import Criteria, describe_assessed_joints, envelope, with_failure_flags
 from archfem.joints.resultants import check_instant
@@ -310,7 +311,7 @@ def list_numbers(structure: Structure) -> list[str]:
         for first, last in sides[len(sides) // 2 :][: not find_named_stones(structure)]
     ]
     for part in dict.fromkeys(joint.part for joint in shown):
-        names = [short_name(joint.name, part) for joint in shown if joint.part == part]
+        names = [style.short_name(joint.name, part) for joint in shown if joint.part == part]
         if max(map(len, names), default=0) > MAX_NAME_LETTERS:
             listed = ", ".join(f"{k} {name}" for k, name in enumerate(names))
             texts.append(f"{part or 'joints'}: {listed}")
@@ -333,12 +334,6 @@ def find_named_stones(structure: Structure) -> list[int]:
         if style.text_width(letters, Size.NOTE) < wide and high > Size.NOTE / 72.0:
             found.append(number)
     return found if len(found) > 0.5 * len(stones) else []
-
-
-def short_name(name: str, part: str) -> str:
-    """Return the name of a joint within its part: "5" for "main arch, joint 5"."""
-    own = name.removeprefix(f"{part}, ")
-    return own.removeprefix("joint ") or own
 
 
 @validate_arguments
@@ -392,9 +387,8 @@ def draw_names(structure: Structure) -> Figure:
     if not structure.heads.any():
         figure.draw_without_rendering()
         _keep_apart(sorted(axes.texts, key=lambda text: text.get_text() not in parts))
-    look: dict[str, Any] = {"ha": "center", "va": "center", "zorder": 8, "fontsize": Size.NOTE}
     for k in named:
-        style.annotate(axes, structure.blocks[k].name, structure.centroids[k], **look)
+        style.write_name(axes, structure.blocks[k].name, structure.centroids[k])
     return figure
 
 
@@ -437,9 +431,8 @@ def _number_stones(axes: Axes, structure: Structure, part: str, inch: float, sig
         numbers, points = np.array(numbers)[room].tolist(), points[room]
     fitting = float(points.min())
     every = max(1, int(np.ceil(Size.NOTE / fitting)))
-    look: dict[str, Any] = {"ha": "center", "va": "center", "zorder": 8, "fontsize": Size.NOTE}
     for number in numbers[::every]:
-        style.annotate(axes, f"{sign}{number}", structure.centroids[number], (0.0, 0.0), **look)
+        style.write_name(axes, f"{sign}{number}", structure.centroids[number])
 
 
 def _name_part(axes: Axes, joints: Sequence[Joint], inch: float, top: float) -> None:
@@ -453,7 +446,7 @@ def _name_part(axes: Axes, joints: Sequence[Joint], inch: float, top: float) -> 
     fitting = 0.65 * 72.0 * apart / inch
     every = max(1, int(np.ceil(Size.NOTE / fitting)))
     size = min(every * fitting, Size.LABEL)
-    names = [short_name(joint.name, joint.part) for joint in joints]
+    names = [style.short_name(joint.name, joint.part) for joint in joints]
     if max(map(len, names)) > MAX_NAME_LETTERS:  # they would be written over each other
         names = [str(k) for k in range(len(names))]
     for joint, name, way in list(zip(joints, names, outward, strict=True))[::every]:
@@ -559,6 +552,8 @@ def _draw_peak(axes: Axes, structure: Structure, run: History, joints: xr.Datase
     displaced = np.split(places + by * moved, np.flatnonzero(np.diff(block)) + 1)
     style.add_polygons(axes, outlines, "none", edge=Colour.UNDEFORMED, width=0.6, zorder=0)
     style.add_polygons(axes, displaced, block_colours(structure), gid="blocks")
+    for name in dict.fromkeys(find_farthest(run.dataset, structure)[0]):
+        style.write_name(axes, name, displaced[structure.block_number(name)].mean(axis=0))
     shift = by * positions.peak_joint_ends(structure, run)
     draw_marks(axes, joint_marks(structure, joints, shift=shift))
     scale = "" if by == 1.0 else f", displacements × {by:g}"

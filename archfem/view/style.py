@@ -235,9 +235,10 @@ def structure_axes(structure: Structure, axes: Axes | None = None) -> Axes:
     axes = structure_figure(structure).add_subplot() if axes is None else axes
     style_length_axes(axes)
     low, high = outline_bounds(structure)
-    # a tick label takes about 0.55 inch
+    # a tick label takes about 0.55 inch; of a slender structure there is one
     ticks = np.clip(drawing_scale(structure) * (high - low)[0] / 0.55, 1, 9)
-    axes.xaxis.set_major_locator(MaxNLocator(int(ticks), steps=[1, 2, 2.5, 5, 10]))
+    locator = MaxNLocator(int(ticks), steps=[1, 2, 2.5, 5, 10], min_n_ticks=1)
+    axes.xaxis.set_major_locator(locator)
     return axes
 
 
@@ -270,6 +271,21 @@ def annotate(
     """Write a text at an offset [points] from a point."""
     default = {"textcoords": "offset points", "fontsize": Size.LABEL, "color": Colour.TEXT}
     return axes.annotate(text, tuple(point), tuple(offset), **(default | style))
+
+
+def short_name(name: str, part: str) -> str:
+    """Return the name of a joint within its part: "5" for "main arch, joint 5"."""
+    own = name.removeprefix(f"{part}, ")
+    return own.removeprefix("joint ") or own
+
+
+def write_name(
+    axes: Axes, name: str, point: Array, way: Array | tuple[float, float] = (0.0, 0.0)
+) -> None:
+    """Write a name on a white halo at a point, or beside it in a direction (2,)."""
+    reach = (4.0 + Size.NOTE * (0.4 + 0.28 * abs(way[0]) * len(name))) * np.asarray(way)
+    look: dict[str, Any] = {"ha": "center", "va": "center", "zorder": 9, "fontsize": Size.NOTE}
+    annotate(axes, name, point, reach, path_effects=white_halo(1.6), **look)
 
 
 def add_polygons(

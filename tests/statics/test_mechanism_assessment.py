@@ -717,17 +717,20 @@ def test_a_tied_wall_that_is_not_shown_to_pass_says_that_it_passes_untied(verifi
     untied = f"{check.untied:.3g}"
     assert f": passes by an upper bound alone (without ties it passes: {untied}), " in str(check)
     linear = found["right"].linear.ratio
-    says = f"passes the linear check ({linear:.3g}), and without ties passes by displacements "
-    says += f"({untied}): with them the ratio, {check.ratio:.3g}, is an upper bound"
+    says = f"passes the linear check ({linear:.3g}), and passes by displacements without ties "
+    says += f"({untied}); with them it {NOT_SHOWN} by displacements, as their ratio, "
+    says += f"{check.ratio:.3g}, is an upper bound"
     assert describe_margin(found.values()).endswith(f": {says}")
     data, stated = ReportData(case, {}), state_assessments(found, [])
     vars(data)["statements"] = {"assessment": Statement.read(stated.as_file("x")["x.json"])}
-    assert f"it {says}." in dict(list_facts(data))["verdict"]
+    said = says.replace("; with", ". With")
+    assert f"it {said}." in dict(list_facts(data))["verdict"]
     # an end of the path before alpha vanishes, and a sense that fails
     linear, moved = (x for _, x in list_ratios(found["right"]))
     early = moved._replace(least=0.9, most=np.inf, bounded=False)
     assert compare_checks([linear, early]).endswith(
-        "with them the ratio is at least 0.9, as the path ends before alpha vanishes"
+        f"with them it {NOT_SHOWN} by displacements (at least 0.9), as the path ends before alpha "
+        "vanishes"
     )
     failing = moved._replace(least=0.8, most=0.8, bounded=False, untied=None)
     assert "without ties" not in compare_checks([linear, moved, failing])

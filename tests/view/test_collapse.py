@@ -132,6 +132,35 @@ def coarse_ring():
     return af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=7)
 
 
+def test_a_picture_of_a_slender_wall_names_what_its_result_names():
+    """The tie at block 3, block 1 at whose toe it turns, and joint 0; ticks are apart."""
+    wall = af.column(breadth=0.6, heights=[2.0, 2.0, 2.0])
+    tie = af.masonry.AttachedLoad("block 3", (0.0, 5.0), force=(-500.0, 0.0), passive=True)
+    spectrum = af.motion.Ntc2018(ag=0.15, f0=2.5, tc_star=0.33, site="B")
+    for direction, loads in ((1.0, [tie]), (-1.0, [])):
+        found = af.kinematic_assessment(wall, spectrum, direction=direction, loads=loads)
+        assert found.mechanism_name == "overturning about the toe of block 1"
+        figure = draw_kinematic_assessment(found)
+        figure.draw_without_rendering()
+        axes = figure.axes[0]
+        names = {text.get_text(): text for text in axes.texts}
+        assert {*names} == {"0", "block 1", *["block 3"] * len(loads)}
+        # the joint is beside its hinge, and the block on the side that the wall leaves
+        assert names["0"].xy == pytest.approx((0.3 * direction, 0.0))
+        assert names["block 1"].xy == pytest.approx((-0.3 * direction, 1.0))
+        low, high = axes.get_xlim()
+        ticks = [*axes.get_xticklabels(), *axes.get_yticklabels()]
+        inside = [low <= x.get_position()[0] <= high for x in axes.get_xticklabels()]
+        shown = [x.get_window_extent() for x in axes.get_xticklabels()]
+        shown = sorted(
+            (x for x, seen in zip(shown, inside, strict=True) if seen), key=lambda x: x.x0
+        )
+        assert shown
+        assert all(one.x1 < other.x0 for one, other in pairwise(shown))
+        boxes = [text.get_window_extent() for text in names.values()]
+        assert not any(x.get_window_extent().overlaps(box) for x in ticks for box in boxes)
+
+
 def test_an_assessment_shows_moved_blocks_curve_and_demand(coarse_ring):
     found = af.kinematic_assessment(
         coarse_ring,

@@ -96,6 +96,12 @@ def test_a_run_without_fields_is_drawn_at_its_largest_displacement():
     assert len(figure.axes) == 2
     title = " ".join(figure.axes[1].get_title().split())
     assert title.startswith(f"largest displacement, t = {peak_instant(run):.3f} s")
+    # the stones that the verdict names
+    most, left = (
+        float(run.dataset[f"{x}_displacement"].values.argmax()) for x in ("largest", "residual")
+    )
+    names = {text.get_text() for text in figure.axes[1].texts}
+    assert names == {f"block {most:.0f}", f"block {left:.0f}"}
     scene = Scene(stones, run)
     assert scene.initial_time == peak_instant(run) == scene.data["peak"]
     assert [len(part) for part in scene.moved] == [1, 1, 1]

@@ -13,8 +13,8 @@ from archfem.cases.analysis_keys import LimitAnalysis
 from archfem.cases.report.sections import _draw_assessed
 from archfem.cases.result_text import describe_collapse, describe_run
 from archfem.view import draw_envelope, draw_names, draw_structure
-from archfem.view.structure import draw_dimensions, list_numbers, short_name
-from archfem.view.style import limit_width
+from archfem.view.structure import draw_dimensions, list_numbers
+from archfem.view.style import limit_width, short_name
 
 
 def test_short_names():
