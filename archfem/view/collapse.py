@@ -387,18 +387,16 @@ def _draw_capacity_curve(axes: Axes, found: KinematicAssessment) -> None:
     check, curve = found.displacement, found.curve
     reduced = curve["a"].values / found.confidence_factor
     last = float(curve["d"][-1])
-    factor = f", FC = {found.confidence_factor:g}"
-    look = {"color": Colour.THRUST, "lw": 1.8, "label": f"capacity a*(d*){factor}"}
-    place = curve.attrs["holds"] + 1
+    label, place = f"capacity a*(d*), FC = {found.confidence_factor:g}", curve.attrs["holds"] + 1
+    look = {"color": Colour.THRUST, "lw": 1.8, "label": label}
     axes.plot(curve["d"][:place], reduced[:place], **look)
     if place < len(reduced):
         look |= {"ls": ":", "label": f"the same, {UPPER_BOUND}"}
         axes.plot(curve["d"][place - 1 :], reduced[place - 1 :], **look)
     periods = np.geomspace(0.02 * check.period, max(4.0, check.period), 160)  # as codes, to 4 s
     displacement, acceleration = found.demand(periods)
-    damping = f"{100.0 * found.limit_state.damping:.0f} %"
-    look = {"color": Colour.GREY, "lw": 1.2, "label": f"spectrum, {damping} damped"}
-    axes.plot(displacement, acceleration, **look)
+    label = f"spectrum, {100.0 * found.limit_state.damping:.0f} % damped"
+    axes.plot(displacement, acceleration, color=Colour.GREY, lw=1.2, label=label)
     slope = (2.0 * np.pi / check.period) ** 2
     top = 1.15 * max(reduced.max(), acceleration.max())
     reach = min(1.1 * last, top / slope)

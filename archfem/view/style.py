@@ -236,9 +236,8 @@ def structure_axes(structure: Structure, axes: Axes | None = None) -> Axes:
     style_length_axes(axes)
     low, high = outline_bounds(structure)
     # a tick label takes about 0.55 inch; of a slender structure there is one
-    ticks = np.clip(drawing_scale(structure) * (high - low)[0] / 0.55, 1, 9)
-    locator = MaxNLocator(int(ticks), steps=[1, 2, 2.5, 5, 10], min_n_ticks=1)
-    axes.xaxis.set_major_locator(locator)
+    most = int(np.clip(drawing_scale(structure) * (high - low)[0] / 0.55, 1, 9))
+    axes.xaxis.set_major_locator(MaxNLocator(most, steps=[1, 2, 2.5, 5, 10], min_n_ticks=1))
     return axes
 
 
@@ -279,9 +278,7 @@ def short_name(name: str, part: str) -> str:
     return own.removeprefix("joint ") or own
 
 
-def write_name(
-    axes: Axes, name: str, point: Array, way: Array | tuple[float, float] = (0.0, 0.0)
-) -> None:
+def write_name(axes: Axes, name: str, point: Any, way: Any = (0.0, 0.0)) -> None:
     """Write a name on a white halo at a point, or beside it in a direction (2,)."""
     reach = (4.0 + Size.NOTE * (0.4 + 0.28 * abs(way[0]) * len(name))) * np.asarray(way)
     look: dict[str, Any] = {"ha": "center", "va": "center", "zorder": 9, "fontsize": Size.NOTE}
