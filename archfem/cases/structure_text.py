@@ -13,7 +13,9 @@ from archfem.cases.case import Case
 from archfem.cases.defaults import describe_margins_at_rest, say_loads_left_out
 from archfem.errors import InvalidInput
 from archfem.limit.collapse import describe_crushing
+from archfem.limit.fill_strength import Fill, PlasticFill
 from archfem.limit.instability import explain_instability, find_factors_at_rest
+from archfem.limit.self_weight import check_options, say_strength
 from archfem.limit.thickness import minimum_thickness
 from archfem.masonry.ring_thickness import find_ring
 from archfem.masonry.standing import find_bodies
@@ -122,6 +124,18 @@ def _describe_bearing(structure: Structure) -> str:
     return f"\nleast bearing of a lintel: {format_mm(bearing)}, of '{name}'{short}{more}"
 
 
+def _state_depth(case: Case, fill: Fill | PlasticFill | None, at_rest: str) -> list[Row]:
+    """State the least depth of all joints at rest, by which a structure stands as given."""
+    given = case.structure, case.limit.strength
+    states = find_factors_at_rest(*given, fill)
+    if not states.get(""):
+        return []
+    hard = find_factors_at_rest(case.structure, np.inf, fill)[""]
+    depth = f"{1.0 / states['']:.3g} of what is built, {say_strength(*given, f'{1.0 / hard:.3g}')}"
+    ends, name = Ends.of(states.values()), f"{_DEPTH}{' with the fill' * (fill is not None)}"
+    return [Row(name, at_rest, depth, f"{ends:ratio}", {"most": ends[0]})]
+
+
 def describe_thickness(case: Case, part: str | None) -> tuple[list[Row], list[str]]:
     """Find a ring's least thickness, and of more than a ring the least depth of all joints.
 
@@ -133,30 +147,32 @@ def describe_thickness(case: Case, part: str | None) -> tuple[list[Row], list[st
     try:
         ring = find_ring(case.structure, part)
     except InvalidInput:
-        limit = case.limit
-        states = find_factors_at_rest(case.structure, limit.strength, limit.fill)
-        if part is not None or limit.fill is None or not states.get(""):
+        fill = case.limit.fill
+        if part is not None or fill is None or not (rows := _state_depth(case, fill, at_rest)):
             raise
-        ends, depth = Ends.of(states.values()), f"{1.0 / states['']:.3g} of what is built"
-        of = f"{_DEPTH} with the fill"
-        return [Row(of, at_rest, depth, f"{ends:ratio}", {"most": ends[0]})], [*margins, _BARE]
+        return rows, [*margins, _BARE]
     limit, build = case.limit, ring.with_thickness
     find = partial(minimum_thickness, build, strength=limit.strength, tolerance=1e-5)
     least = find(friction=limit.friction)
     words = f"{format_mm(least)} of {format_mm(ring.thickness)}, of the ring alone"
     factor = ring.thickness / least
+    given = case.structure, limit.strength
+    crushes = np.isfinite(check_options(case.structure, limit.friction, limit.strength))
+    hard = find(friction=limit.friction, strength=np.inf) if crushes else least
+    whole = _state_depth(case, None, at_rest)
+    is_whole = len(ring.stones) == len(case.structure.free)
+    weight = "with the weight of thinner stones"
+    beside = [f" ({row.factor} of less deep joints under the same weight)" for row in whole]
     lines = [
         f"least thickness at rest: {words} on fixed springings, by the mean depth of its joints as "
         "drawn, all stones scaled alike about the middle line",
-        f"geometric factor of safety of the ring: {factor:.3g}; "
-        f"{describe_crushing(limit.strength, case.structure)}",
+        "geometric factor of safety of the ring, "
+        f"{say_strength(*given, f'{ring.thickness / hard:.3g}')}: {factor:.3g}, {weight}"
+        f"{''.join(beside * is_whole)}; {describe_crushing(limit.strength, case.structure)}",
     ]
+    words += f" {weight}, {say_strength(*given, format_mm(hard))}"
     rows = [Row(RESULTS["thickness"], at_rest, words, f"{factor:.3g}", {"most": factor})]
-    whole = find_factors_at_rest(case.structure, limit.strength, None).get("")
-    is_whole = len(ring.stones) == len(case.structure.free)
-    if whole and not is_whole:
-        depth = f"{1.0 / whole:.3g} of what is built"
-        rows.append(Row(_DEPTH, at_rest, depth, f"{whole:.3g}", {"most": whole}))
+    rows += [] if is_whole else whole
     if limit.friction is not None:
         with suppress(InvalidInput):  # without sliding it may stand at any thickness
             rough = find(friction=None)

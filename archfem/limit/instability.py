@@ -24,6 +24,7 @@ from archfem.limit.self_weight import (
     check_options,
     is_balanced,
     refuse_bonds,
+    say_strength,
     self_weight_programme,
 )
 from archfem.masonry.block import Block, as_point, say_place
@@ -219,16 +220,17 @@ def describe_geometric_factor(
     factors = find_factors_at_rest(structure, strength, fill)
     if not factors:
         return ""
-    most = 1.0 / (_LITTLE_DEPTH if fill is None else _LITTLE_DEPTH_WITH_FILL)
-    said = {k: f"{x:.3g}{' or more' * (x >= most)}" if x else "none" for k, x in factors.items()}
+    said = {key: _say_factor(factor, fill) for key, factor in factors.items()}
     factor, first = factors[""], said.pop("")
+    hard = _say_factor(find_factors_at_rest(structure, np.inf, fill)[""], fill)
+    crushing = say_strength(structure, strength, hard)
     pieces = ", those of the fill too," * any(block.grain for block in structure.blocks)
     if factor:
         depth = f"all joints{pieces} {1.0 / factor:.3g} times as deep"
         first += f", as it stands with {depth} under the same weight"
     others = f"; {', '.join(f'{x} {key}' for key, x in said.items())}" * bool(said)
     of = " with the fill" * (fill is not None)
-    return f"geometric factor of safety at rest{of}: {first}{others}"
+    return f"geometric factor of safety at rest{of}, {crushing}: {first}{others}"
 
 
 def list_margins_at_rest(
@@ -240,9 +242,17 @@ def list_margins_at_rest(
     factors = find_factors_at_rest(structure, strength, fill)
     if 0.0 < (depth := min(factors.values(), default=0.0)) < 1.0 / _LITTLE_DEPTH:
         over = ", the least over what is assumed of its fill" * (len(factors) > 1)
-        yield depth, f"the depth of its joints{over}"
+        hard = min(find_factors_at_rest(structure, np.inf, fill).values())
+        crushing = say_strength(structure, strength, _say_factor(hard, fill))
+        yield depth, f"the depth of its joints under the same weight, {crushing}{over}"
     if (least := least_friction(structure)) and least > _LITTLE_FRICTION:
         yield float(structure.friction.max()) / least, "the friction of its joints"
+
+
+def _say_factor(factor: float, fill: Fill | PlasticFill | None) -> str:
+    """Say a factor of safety on the depth of joints, "none" for 0."""
+    most = 1.0 / (_LITTLE_DEPTH if fill is None else _LITTLE_DEPTH_WITH_FILL)
+    return f"{factor:.3g}{' or more' * (factor >= most)}" if factor else "none"
 
 
 def _say_friction(least: float) -> str:

@@ -14,6 +14,7 @@ from archfem.limit.linear_programme import Optimum, Programme, RigidBlocks
 from archfem.masonry.loads import Action
 from archfem.masonry.materials import STONE, check_strength
 from archfem.masonry.structure import Structure
+from archfem.units import MPa
 
 
 def refuse_bonds(structure: Structure) -> None:
@@ -38,6 +39,16 @@ def check_options(structure: Structure, friction: str | None, strength: float | 
         check_between(strength, "strength [Pa]", 0.0, remedy="leave it out for no limit")
         check_strength(strength, "strength", np.inf)
     return strength
+
+
+def say_strength(structure: Structure, strength: float | None, hard: str) -> str:
+    """Say at which strength joints crush [Pa], and what a result is where they do not."""
+    crushing = check_options(structure, "coulomb", strength) / MPa
+    return (
+        "without crushing"
+        if np.isinf(crushing)
+        else f"crushing at {crushing:.3g} MPa ({hard} without crushing)"
+    )
 
 
 def joint_strengths(structure: Structure, strength: float) -> Array:

@@ -413,7 +413,8 @@ def test_capacities_at_rest_stand_beside_those_of_demands():
         assert depth[:3] == (
             "at rest",
             "its own weight",
-            f"stands; the factor is of the depth of its joints{beside}",
+            "stands; the factor is of the depth of its joints under the same weight, without "
+            f"crushing{beside}",
         )
         assert float(depth[3]) == pytest.approx(0.36 / 3.0 / 0.1075, rel=0.02)
         # on no demand it is no margin

@@ -311,7 +311,7 @@ def test_lines_on_what_is_at_rest_say_which_loads_they_leave_out(tables, left_ou
         friction
         == f"as rigid blocks it stands from a coefficient of friction of 0.05 or less{left_out}"
     )
-    assert depth.startswith("geometric factor of safety at rest: 20 or more")
+    assert depth.startswith("geometric factor of safety at rest, without crushing: 20 or more")
     assert depth.endswith(f"under the same weight{left_out}")
 
 

@@ -15,6 +15,7 @@ from archfem.limit.instability import (
     describe_geometric_factor,
     explain_instability,
     least_friction,
+    list_margins_at_rest,
 )
 
 STONE = af.STONE
@@ -80,8 +81,21 @@ def test_the_geometric_factor_of_a_block_on_a_slope(slope, factor):
     assert ("20 or more" in describe_geometric_factor(stone, np.inf)) == (factor == 20.0)
     # where it crushes, half the depth is the eccentricity and half the stress block
     normal = STONE.unit_weight * 0.5 * np.cos(np.arctan(slope))
-    found = af.limit.geometric_factor(stone, 10.0 * normal)
-    assert found == pytest.approx(1.0 / (0.5 * slope + 0.1), rel=2e-3)
+    strength = 10.0 * normal
+    found = af.limit.geometric_factor(stone, strength)
+    crushed = 1.0 / (0.5 * slope + 0.1)
+    assert found == pytest.approx(crushed, rel=2e-3)
+    # with the strength each number has that without
+    hard = f"{factor:.3g}{' or more' * (factor == 20.0)} without crushing"
+    words = f"at rest, crushing at {strength / 1e6:.3g} MPa ({hard}): "
+    assert value(re.escape(words) + r"([\d.]+),", describe_geometric_factor(stone, strength)) == (
+        pytest.approx(crushed, rel=5e-3)  # three digits, and the bisection
+    )
+    assert "at rest, without crushing: " in describe_geometric_factor(stone, np.inf)
+    (depth, of), *_ = list_margins_at_rest(stone, strength)
+    assert depth == pytest.approx(crushed, rel=2e-3)
+    begin = "the depth of its joints under the same weight, crushing at "
+    assert of == f"{begin}{strength / 1e6:.3g} MPa ({hard})"
     with pytest.raises(af.errors.InvalidInput, match="strength"):
         af.limit.geometric_factor(stone, -1.0)
 
@@ -115,6 +129,23 @@ def test_the_geometric_factor_of_a_ring_is_that_of_its_thickness():
     ring = af.circular_arch(radius=1.0, thickness=0.2, embrace=180.0, voussoirs=10)
     least = af.minimum_thickness(af.masonry.find_ring(ring).with_thickness, tolerance=1e-4)
     assert af.limit.geometric_factor(ring) == pytest.approx(0.2 / least, rel=3e-3)
+
+
+def test_less_deep_joints_are_a_thinner_ring_of_heavier_stones():
+    """Where joints crush, the weight of thinner stones makes the factor on the thickness another.
+
+    Thinner stones as heavy in all as those built stand down to the least depth of joints, but for
+    their centroids, which are 0.3 % of it nearer to the middle line.
+    """
+    given = {"radius": 1.0, "thickness": 0.2, "embrace": 180.0, "voussoirs": 15}
+    strength, near = 2e5, 0.005
+    depth = af.limit.geometric_factor(af.circular_arch(**given), strength)
+    for share in (depth * (1.0 - near), depth * (1.0 + near)):
+        for weight, stands in ((share, share < depth), (1.0, True)):
+            heavier = replace(STONE, unit_weight=weight * STONE.unit_weight)
+            ring = af.masonry.find_ring(af.circular_arch(material=heavier, **given))
+            thinner = ring.with_thickness(0.2 / share)
+            assert af.stands(thinner, strength=strength) == stands
 
 
 @pytest.mark.parametrize("slope", [0.1947, 0.344])
