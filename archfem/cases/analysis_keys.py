@@ -14,9 +14,10 @@ from archfem.errors import Interrupted, InvalidInput
 from archfem.joints.criteria import Criteria
 from archfem.limit.collapse import Collapse, collapse_factor, describe_crushing
 from archfem.limit.fill_strength import Fill, PlasticFill
-from archfem.limit.rating import ASSUMED_STRENGTH, Rating, rate
+from archfem.limit.rating import Rating, rate
 from archfem.limit.self_weight import check_options, self_weight_programme
 from archfem.limit.vehicles import VEHICLES, VEHICLES_OF_CODES, Vehicle
+from archfem.limit.worst_places import ASSUMED_STRENGTH
 from archfem.masonry.loads import Action, AttachedLoad, BodyForce, PointLoad, Settlement, name_side
 from archfem.masonry.materials import check_strength
 from archfem.masonry.stiffness_ratio import find_yielding_blocks

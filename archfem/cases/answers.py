@@ -245,6 +245,7 @@ def state_scale(
 
 # All that is unfavourable in the variations of a rating, which may be left out
 ALL_AT_ONCE, NOT_COMPUTED = "all unfavourable at once", "not computed"
+AT_ONCE_BY_CS454 = f"{ALL_AT_ONCE}, by CS 454"
 
 
 def state_ratings(
@@ -262,10 +263,9 @@ def state_ratings(
             own = varied is not None and varied.head[0] == f"{found.label} with"
             if varied and own and each.passes and "CS 454" not in code:  # on one axle, no multiple
                 flips = _say_flips(each.factor / found.factor, varied)
-            lost = [] if np.isnan(each.factor) else each.list_losses()
-            words_of = [f"{x:.4g} {of}" if x else f"it does not stand {of}" for x, of in lost]
-            at += "".join(f"; {x}" for x in (*words_of, flips) if x)
-            least, state = each.least, ", ".join(of for _, of in lost)
+            stands = not np.isnan(each.factor)
+            at += "".join(f"; {x}" for x in (*(each.say_losses() if stands else []), flips) if x)
+            least, state = each.least, ", ".join(of for _, of in each.list_losses() if stands)
             if varied and own:
                 least, state = _compare_at_once(each, code, found.factor, varied, state)
             factor = "-" if np.isnan(each.factor) else format_ratio(each.factor, 4)
@@ -277,7 +277,7 @@ def state_ratings(
     if not np.isnan(first.factor):
         outcome, *others = first.clauses
         outcome = f"rating for {first.vehicle.name}: {first.said_factor}, {outcome}"
-        sentences = [outcome, *others, f"worst {first.place}"]
+        sentences = [outcome, f"worst {first.place}", *others]
     if len(rated) > 1:
         least, code = first.least_by_codes
         words = f", {least:.4g} {code}" * bool(code)
@@ -295,10 +295,12 @@ def _compare_at_once(
 
     `given` is the factor of the varied vehicle. With an impact on one axle that is no share of it.
     """
-    (cell,) = [cell for name, cell in varied.rows if name == ALL_AT_ONCE] or ["-"]
-    if "CS 454" in code or cell in ("-", NOT_COMPUTED):
+    by_axle = "CS 454" in code and len(rated.by_cs454) > 0
+    cell = dict(varied.rows).get(AT_ONCE_BY_CS454 if by_axle else ALL_AT_ONCE, "-")
+    if cell in ("-", NOT_COMPUTED):
         return rated.least, ", ".join(filter(None, [state, f"{ALL_AT_ONCE} {NOT_COMPUTED}"]))
-    factor = rated.factor / given * float(cell.replace("does not stand", "0"))
+    share = 1.0 if by_axle else rated.factor / given
+    factor = share * float(cell.replace("does not stand", "0"))
     return (factor, ALL_AT_ONCE) if factor < rated.least else (rated.least, state)
 
 
@@ -307,7 +309,7 @@ def _say_flips(share: float, varied: ResultTable) -> str:
     factors = {
         name: share * float(cell.replace("does not stand", "0"))
         for name, cell in varied.rows
-        if cell not in ("-", NOT_COMPUTED)
+        if cell not in ("-", NOT_COMPUTED) and name != AT_ONCE_BY_CS454
     }
     fails = [f"{name} ({x:.3g})" for name, x in factors.items() if x < 1.0]
     return f"fails with {join_words(fails)}" * bool(fails)

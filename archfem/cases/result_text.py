@@ -26,6 +26,7 @@ from archfem.errors import filter_log
 from archfem.joints.criteria import assessed_joints, envelope, first_time, longest_duration
 from archfem.limit.collapse import Collapse, Outcome, describe_fill
 from archfem.limit.fill_strength import Fill, PlasticFill, as_pressure
+from archfem.limit.instability import describe_geometric_factor
 from archfem.limit.mechanism_count import Mechanism, duration_text
 from archfem.limit.rating import Rating
 from archfem.masonry.backfill import describe_held_ends
@@ -382,7 +383,8 @@ def tabulate_ratings(ratings: Iterable[Rating]) -> ResultTable:
         cells = ["-" if np.isnan(value) else f"{value:.4g}" for value in numbers]
         values = {"live": found.live, "impact": found.impact}
         by = ("none" if key in found.missing else f"{x:g}" for key, x in values.items())
-        outcome = f"{found.outcome}, {found.place}"
+        first, *others = found.clauses
+        outcome = "; ".join([f"{first}, {found.place}", *others])
         least, code = found.least_by_codes
         cells += [f"{least:.4g} {code.partition(' (')[0]}".strip()] * by_codes
         rows.append([found.vehicle.name, " × ".join(by), *cells, outcome])
@@ -406,12 +408,22 @@ def describe_ratings(
         common = [line for line in lines[0] if all(line in other for other in lines)]
         lines = [[line for line in own if line not in common] for own in lines]
         lines.append(["of all vehicles:", *common])
-    texts = [*tables, *("\n".join(each) for each in lines), defaults.describe_fill_defaults(case)]
+    at_rest = "" if np.isnan(rated[0][0].factor) else _describe_standing(case)
+    of_case = [at_rest, defaults.describe_fill_defaults(case)]
+    texts = [*tables, *("\n".join(each) for each in lines), *of_case]
     files["rating.txt"] = "\n\n".join(filter(None, texts))
     if varied is None:
         return files["rating.txt"], files
     files["rating_variations.csv"] = varied.csv
     return f"{files['rating.txt']}\n\n{varied.text}", files
+
+
+def _describe_standing(case: Case) -> str:
+    """Say that a bridge stands under its own weight, with its factor of safety."""
+    limit, left_out = case.limit, defaults.say_loads_left_out(case)
+    depth = describe_geometric_factor(case.structure, limit.strength, limit.fill)
+    without = ", without parapets" * bool(case.parapets)
+    return f"it stands under its own weight{left_out}{without}{f': {depth}' * bool(depth)}"
 
 
 def note_lower_crowns(structure: Structure, fill: Fill | PlasticFill | None) -> list[str]:

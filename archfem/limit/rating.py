@@ -11,14 +11,13 @@ from archfem._typing import Array, Metres, NewtonsPerMetre, Pascals
 from archfem._validation import validate_arguments
 from archfem.errors import InvalidInput
 from archfem.limit.collapse import describe_crushing, describe_fill
-from archfem.limit.fill_range import say_part, vary_pressure
+from archfem.limit.fill_range import say_part
 from archfem.limit.fill_strength import Fill, PlasticFill, as_pressure, has_backing, place_backing
-from archfem.limit.self_weight import check_options
-from archfem.limit.thickness import find_geometric_factor
+from archfem.limit.self_weight import check_options, say_strength
+from archfem.limit.thickness import find_geometric_factors
 from archfem.limit.vehicles import (
     BY_CS454,
     DRIVING_DIRECTIONS,
-    VEHICLES,
     MovingLoad,
     Vehicle,
     axles_on_rings,
@@ -32,8 +31,10 @@ from archfem.limit.vehicles import (
     vehicle_positions,
 )
 from archfem.limit.worst_places import (
+    ASSUMED_STRENGTH,
     CRUSHING_PREFIX,
     find_least_factors,
+    further_searches,
     refine_worst_places,
     spread_over_bridge,
 )
@@ -48,11 +49,7 @@ from archfem.masonry.structure import (
     join_words,
     structure_of,
 )
-from archfem.units import MPa, kN
-
-# Strength of masonry where none is given [Pa]: squared stones in lime mortar have 3 to 10 MPa (from
-# memory)
-ASSUMED_STRENGTH = 5e6
+from archfem.units import Ends, MPa, kN
 
 # Factors of a rating that its outcome is made of, in other states of fill and stones
 _PRESSURES = ("without_pressure", "full_pressure", "without_backing", "without_either")
@@ -105,6 +102,11 @@ class Rating(ResultDisplay):
         fill: strength of the fill, or None.
         missing: "live" and "impact" where neither the vehicle nor its user gave them.
         parapets: weight of the parapets along the bridge, without factor [N/m].
+        friction: as given to `rate`.
+        geometric_hard: `geometric` of stones that do not crush [-].
+        places: driving direction and x of the vehicle's middle [m] at the worst place of each least
+            factor, by the names above, of those of `crushing` behind "crushing "; of the factor
+            itself in `moving` alone.
     """
 
     structure: Structure
@@ -129,6 +131,9 @@ class Rating(ResultDisplay):
     fill: Fill | PlasticFill | None = None
     missing: Sequence[str] = ()
     parapets: float = 0.0
+    friction: str | None = "coulomb"
+    geometric_hard: float = np.nan
+    places: Mapping[str, tuple[str, float]] = field(default_factory=dict)
 
     @property
     def factor(self) -> float:
@@ -199,22 +204,32 @@ class Rating(ResultDisplay):
         """Of which state of the fill a number alone is, in words."""
         return ", with the fill as given" if self.fill is not None else ""
 
-    def _list_states(self) -> dict[tuple[str, ...], float]:
-        """Return the least factor without each set of the assumed parts of fill and stones [-].
-
-        It is NaN where the bridge then does not stand.
-        """
-        own = self.by_pressure if isinstance(self.fill, PlasticFill) else self.factor
-        known = {key: getattr(self, key) for key in _PRESSURES} | {"factor": own}
+    def _list_states(self) -> dict[tuple[str, ...], str]:
+        """Return the name of the state without each set of the assumed parts of fill and stones."""
         names: dict[tuple[str, ...], str] = {(): "factor"}
         if self.fill is not None:
             names[_PRESSURE,] = "without_pressure"
         if has_backing(self.fill):
             names |= {(_BACKING,): "without_backing", (_PRESSURE, _BACKING): "without_either"}
-        states = {parts: known[name] for parts, name in names.items()}
-        if self.crushing:
-            states |= {(*x, _HARD_STONES): self.crushing[key] for x, key in names.items()}
-        return states
+        hard = {(*x, _HARD_STONES): f"{CRUSHING_PREFIX}{key}" for x, key in names.items()}
+        own = "by_pressure" if isinstance(self.fill, PlasticFill) else "factor"
+        return {**names, (): own, **(hard if self.crushing else {})}
+
+    def _factor_in(self, state: str) -> float:
+        """Return the least factor in a state; NaN where the bridge then does not stand [-]."""
+        crushing = self.crushing.get(state.removeprefix(CRUSHING_PREFIX), np.nan)
+        return float(crushing if state.startswith(CRUSHING_PREFIX) else getattr(self, state))
+
+    def _say_factor(self, state: str) -> str:
+        """Return the least factor in a state, and where axles then stand over the rings."""
+        if np.isnan(factor := self._factor_in(state)):
+            return "the bridge does not stand"
+        axles = parse_axles(self.vehicle.axles, self.vehicle.spacings)
+        own = {"factor": (self.moving.direction, self.moving.position)}
+        place = {**own, **self.places}.get(state)
+        at = axles_on_rings(self.structure, axles, *place, self.fill) if place else []
+        where = f" ({'axles' if len(at) > 1 else 'axle'} at x = {_name_places(at)} m)" * bool(at)
+        return f"{factor:.4g}{where}"
 
     @property
     def needed(self) -> str:
@@ -223,7 +238,8 @@ class Rating(ResultDisplay):
             return "the fill as a plastic body"
         cuts, states = list[tuple[str, ...]](), self._list_states()
         for parts in sorted(states, key=len):
-            if not states[parts] >= 1.0 and not any({*cut} <= {*parts} for cut in cuts):
+            fails = not self._factor_in(states[parts]) >= 1.0
+            if fails and not any({*cut} <= {*parts} for cut in cuts):
                 cuts.append(parts)
         single = [cut[0] for cut in cuts if len(cut) == 1]
         several = [" or ".join(cut) for cut in cuts if len(cut) > 1]
@@ -233,8 +249,8 @@ class Rating(ResultDisplay):
     def _ends(self) -> list[float]:
         """Factors over all that is assumed of fill and stones, or this one [-]."""
         full = [] if np.isnan(self.full_pressure) else [self.full_pressure]
-        assumed = [*self._list_states().values()] if full or self.crushing else []
-        return [self.factor, *assumed, *full]
+        states = self._list_states().values() if full or self.crushing else ()
+        return [self.factor, *map(self._factor_in, states), *full]
 
     @property
     def least(self) -> float:
@@ -246,9 +262,18 @@ class Rating(ResultDisplay):
 
         It is 0 where the bridge then does not stand [-].
         """
-        states, parts, losses = self._list_states(), tuple[str, ...](), list[tuple[float, str]]()
+        each = ((self._factor_in(state), words) for state, words in self._list_cut_states())
+        return [(float(np.nan_to_num(x, posinf=np.inf)), words) for x, words in each]
+
+    def say_losses(self) -> list[str]:
+        """Return `list_losses` in words, each with the worst place of its own."""
+        return [f"{self._say_factor(state)} {words}" for state, words in self._list_cut_states()]
+
+    def _list_cut_states(self) -> Iterator[tuple[str, str]]:
+        """Yield the states in which what is assumed falls away, part by part, and the parts."""
+        states, parts = self._list_states(), tuple[str, ...]()
         if isinstance(self.fill, PlasticFill):
-            losses.append((self.by_pressure, "with the fill as weight and pressure"))
+            yield "by_pressure", "with the fill as weight and pressure"
         also = "also " * (self.fill is not None)
         for part, words in (
             (_PRESSURE, "without the pressure of the fill"),
@@ -257,8 +282,7 @@ class Rating(ResultDisplay):
         ):
             if (*parts, part) in states:
                 parts = *parts, part
-                losses.append((states[parts], words))
-        return [(float(np.nan_to_num(x, posinf=np.inf)), words) for x, words in losses]
+                yield states[parts], words
 
     def say_range(self) -> str:
         """Return the least and the greatest factor over all that is assumed, in words."""
@@ -335,10 +359,10 @@ class Rating(ResultDisplay):
         source = vehicle.source if own else f"{vehicle.source} ({vehicle.grade})"
         factors = self.moving.factors["factor"].min("position")
         least = (f"{way} {float(factors.sel(direction=way)):.4g}" for way in DRIVING_DIRECTIONS)
-        also, beside = "", ""
-        if self.area_load:
-            also = " and on the distributed load × live"
-            beside = f", and {self.area_load / 1e3:g} kN/m² of road where it is adverse"
+        hard, geometric = (self._geometric_text(x) for x in (self.geometric_hard, self.geometric))
+        crushing = say_strength(self.structure, self.strength, hard)
+        also = " and on the distributed load × live" * bool(self.area_load)
+        beside = f", and {self.area_load / 1e3:g} kN/m² of road where it is adverse" * bool(also)
         favourable = "EN 1990:2002, Table A2.4(B), favourable; from memory"
         of_fill = filter(None, [describe_fill(self.fill, self.structure)])
         resistance = [self._describe_crushing(), *of_fill]
@@ -350,12 +374,13 @@ class Rating(ResultDisplay):
             *self.describe_codes(),
             *self.describe_pressure(),
             *self.describe_backing(),
+            self._describe_basis(),
             f"least factor driving {', '.join(least)}",
             f"{self.moving}",
             *describe_axles(self.structure, self._axles_at, self.width),
             *self._describe_hinges(),
             f"every x is that of the case and the picture; {describe_spans(self.structure)}",
-            f"geometric factor of safety at that place{self._as_given}: {self._geometric_text()}",
+            f"geometric factor of safety at that place{self._as_given}, {crushing}: {geometric}",
             "the geometric factor is Heyman's criterion, often 2 or more (from memory), which no "
             "code has",
             f"{vehicle.name}: axles {len(vehicle.axles)}, {sum(vehicle.axles) / 1e3:.4g} kN"
@@ -369,31 +394,38 @@ class Rating(ResultDisplay):
         ]
         return "\n".join(lines)
 
+    def _describe_basis(self) -> str:
+        """Return the line on width, fill, friction and strength of the factor."""
+        law = "plastic" if isinstance(self.fill, PlasticFill) else "pressure"
+        of_fill = f", fill of law {law} and {self.fill.friction_angle:g}°" if self.fill else ""
+        friction = Ends.of(self.structure.friction[self.structure.judged])
+        sliding = f"friction {friction:g}{' without dilatancy' * (self.friction != 'coulomb')}"
+        law = f"{of_fill}, {sliding if self.friction else 'no sliding'}"
+        crushing = say_strength(self.structure, self.strength)
+        return f"computed with {self.width:.3g} m of width{law}, {crushing}"
+
     def describe_pressure(self) -> list[str]:
         """Return the line on the range of the factor over the pressure of the fill, if any."""
         fill = as_pressure(self.fill)
         if np.isnan(self.full_pressure) or fill is None:
             return []
-        least, begin, factor = f"{self.without_pressure:.4g}", "over the pressure", self.factor
+        least, begin, own = self._say_factor("without_pressure"), "over the pressure", "factor"
         if np.isnan(self.without_pressure):
             least = "none, as the bridge does not stand,"
         if isinstance(self.fill, PlasticFill):
-            begin, factor = "not as a plastic body, but by the pressure", self.by_pressure
+            begin, own = "not as a plastic body, but by the pressure", "by_pressure"
         part = f"{say_part(fill.active)} of the active and up to {say_part(fill.mobilisation)} of"
-        most = f"{self.full_pressure:.4g} with all of it"
+        most = f"{self._say_factor('full_pressure')} with all of it"
         return [
             f"{begin} of the fill, each at its worst place: {least} with neither active nor "
-            f"passive, {factor:.4g} with {part} the passive one, {most}"
+            f"passive, {self._say_factor(own)} with {part} the passive one, {most}"
         ]
 
     def describe_backing(self) -> list[str]:
         """Return the line on what the backing adds, if there is some."""
         if not has_backing(self.fill):
             return []
-        with_pressure, neither = (
-            "the bridge does not stand" if np.isnan(factor) else f"{factor:.4g}"
-            for factor in (self.without_backing, self.without_either)
-        )
+        with_pressure, neither = map(self._say_factor, ("without_backing", "without_either"))
         return [
             f"without the backing but with the pressure, each at its worst place: {with_pressure}; "
             f"without either: {neither}"
@@ -410,8 +442,8 @@ class Rating(ResultDisplay):
         if not self.crushing:
             return ""
         first, *others = self.crushing.values()
-        words = f"the least factor is {first:.4g}"
-        words = "the bridge does not stand" if np.isnan(first) else words
+        words = self._say_factor(f"{CRUSHING_PREFIX}factor")
+        words = "the least factor is " * (not np.isnan(first)) + words
         law = " with the fill as weight and pressure" * isinstance(self.fill, PlasticFill)
         ends = f" ({_say_ends([first, *others])} over what is assumed of the fill)" * bool(others)
         return f"at {ASSUMED_STRENGTH / MPa:g} MPa {words}{law}{ends}"
@@ -452,6 +484,7 @@ class Rating(ResultDisplay):
         """Return this with the factors, in each state, of another code on the same vehicle."""
         moving = replace(self.moving, worst=replace(self.moving.worst, factor=of["factor"]))
         states: dict[str, Any] = {each: of.get(each, np.nan) for each in ("by_rule", *_STATES)}
+        states["places"] = of.get("places", self.places)
         return replace(self, moving=moving, missing=(), crushing=of["crushing"], **states)
 
     def describe_codes(self) -> list[str]:
@@ -494,16 +527,16 @@ class Rating(ResultDisplay):
         worst = int(np.argmax([forces.get(x, 0.0) / load for x, load in self._axles_at.items()]))
         return f" on the worst axle alone, here number {worst + 1} from the front"
 
-    def _geometric_text(self) -> str:
-        """Return the geometric factor of safety, in words where it is below 1."""
+    def _geometric_text(self, factor: float) -> str:
+        """Return a geometric factor of safety, in words where it is below 1."""
         if self.moving.worst.fill_motion is not None:
             return "not searched with a plastic fill"
-        if np.isnan(self.geometric):
+        if np.isnan(factor):
             carried = f", but slide at {self.deepest:.4g} of it" if self.deepest > 0.0 else ""
             return f"none, joints of any depth do not carry the vehicle there{carried}"
-        text = f"{self.geometric:.3g}"
-        if self.geometric < 1.0:
-            text += f", below 1: joints are too thin by {100.0 * (1.0 - self.geometric):.2g} %"
+        text = f"{factor:.3g}"
+        if factor < 1.0:
+            text += f", below 1: joints are too thin by {100.0 * (1.0 - factor):.2g} %"
         return text
 
 
@@ -610,16 +643,16 @@ def rate(  # noqa: PLR0913  (factors of the check, and the strength of the bridg
     least = min(width, rule), max(area_load, driven.area_load)
     is_by_rule = np.allclose(least, (width, area_load), rtol=1e-9, atol=0.0)
     by_rule = np.nan if is_by_rule else drive(*least, [moving.position]).worst.factor
-    unknown = np.nan, np.nan
-    geometric, deepest = unknown if is_plastic else find_geometric_factor(weighted, moving, options)
-    more = dict[str, Any](deepest=deepest, fill=fill, missing=missing, parapets=parapets)
-    for key, each, by, states in _further_searches(driven, rows, live, area_load, options, crushes):
+    more = dict[str, Any](fill=fill, friction=friction, missing=missing, parapets=parapets)
+    none = {"geometric": np.nan}
+    more |= none if is_plastic else find_geometric_factors(weighted, moving, options)
+    for key, each, by, states in further_searches(driven, rows, live, area_load, options, crushes):
         loads = spread_over_bridge(weighted, each, width, axles)
         known = None if key or is_plastic else moving
         found = find_least_factors(weighted, positions, loads, by * area_load, states, known)
         more |= {key: found} if key else found
     factors = live, impact, dead, width, area_load
-    return Rating(structure, driven, *factors, moving, geometric, by_rule, strength, **more)
+    return Rating(structure, driven, *factors, moving, by_rule=by_rule, strength=strength, **more)
 
 
 def rate_again(found: Rating, structure: Structure, width: float | None, **options: Any) -> float:
@@ -665,38 +698,3 @@ def _scale_weights(structure: Structure, factor: float) -> Structure:
 def _places_along(structure: Structure, vehicle: Array, steps: int = 100) -> Sequence[float]:
     """Return places from where the vehicle drives onto the structure to where it leaves [m]."""
     return tuple(vehicle_positions(structure, vehicle, None, steps).tolist())
-
-
-def _further_searches(
-    driven: Vehicle,
-    rows: Sequence[Array],
-    live: float,
-    area_load: float,
-    options: dict[str, Any],
-    crushes: bool,
-) -> Iterator[tuple[str, Sequence[Array], float, dict[str, dict[str, Any]]]]:
-    """Yield name, rows of weights, partial factor and states of further least factors."""
-    if states := _other_states(options, crushes):
-        yield "", rows, live, states
-    is_multiple = len(driven.axles) == 1 and not area_load
-    if driven.grade == "given" and not (is_multiple or isinstance(options["fill"], PlasticFill)):
-        code = VEHICLES["CS454-single"]
-        other = replace(driven, impact_on=code.impact_on).factored(*code.factors)
-        yield "by_cs454", other, code.factors[0], {"factor": options} | states
-
-
-def _other_states(options: dict[str, Any], crushes: bool) -> dict[str, dict[str, Any]]:
-    """Return the options with other pressures of a fill, without backing, all with crushing too.
-
-    Stones of which it was said that they do not crush do not.
-    """
-    fill = as_pressure(options["fill"])
-    fills = vary_pressure(fill) if fill is not None else {}
-    states = {name: options | {"fill": other} for name, other in fills.items()}
-    if fill is not options["fill"]:
-        states["by_pressure"] = options | {"fill": fill}
-    if np.isinf(options["strength"]) and crushes:
-        soft = options | {"strength": ASSUMED_STRENGTH}
-        crushed = {"factor": fill, **fills}
-        states |= {f"{CRUSHING_PREFIX}{x}": soft | {"fill": other} for x, other in crushed.items()}
-    return states

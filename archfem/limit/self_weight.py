@@ -41,14 +41,11 @@ def check_options(structure: Structure, friction: str | None, strength: float | 
     return strength
 
 
-def say_strength(structure: Structure, strength: float | None, hard: str) -> str:
+def say_strength(structure: Structure, strength: float | None, hard: str = "") -> str:
     """Say at which strength joints crush [Pa], and what a result is where they do not."""
     crushing = check_options(structure, "coulomb", strength) / MPa
-    return (
-        "without crushing"
-        if np.isinf(crushing)
-        else f"crushing at {crushing:.3g} MPa ({hard} without crushing)"
-    )
+    beside = f" ({hard} without crushing)" * bool(hard)
+    return "without crushing" if np.isinf(crushing) else f"crushing at {crushing:.3g} MPa{beside}"
 
 
 def joint_strengths(structure: Structure, strength: float) -> Array:

@@ -177,3 +177,12 @@ def find_geometric_factor(
         if high < tolerance:
             return np.inf, np.nan
     return 1.0 / high, np.nan
+
+
+def find_geometric_factors(
+    structure: Structure, moving: MovingLoad, options: dict[str, Any]
+) -> dict[str, float]:
+    """Return both of `find_geometric_factor`, and the first without crushing, as of a rating."""
+    each = (options, options | {"strength": np.inf})
+    (own, deepest), (hard, _) = (find_geometric_factor(structure, moving, x) for x in each)
+    return {"geometric": own, "deepest": deepest, "geometric_hard": hard}

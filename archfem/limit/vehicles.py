@@ -269,6 +269,7 @@ class MovingLoad(ResultDisplay):
             other: the same load at other places.
         """
         everywhere = xr.concat([self.factors, other.factors], "position").sortby("position")
+        everywhere = everywhere.drop_duplicates("position")
         worse = min(self, other, key=lambda each: each.worst.factor)
         return replace(worse, factors=everywhere)
 
@@ -625,7 +626,8 @@ def find_worst_rows(
             share = min(share, factors[k] / max(guide[k], 1e-100))
     # and back with the mechanisms of all places
     while (above := known.bound(loads)[0]).min() < (1.0 - 1e-5) * factors.min():
-        k = int(above.argmin())
+        # of places that mirror each other the first one, whatever the rounding
+        k = int(np.argmax(above <= (1.0 + 1e-5) * above.min()))
         factor, sets[k] = known.lay(loads[k], factors[k], sets[k] if solved[k] else None)
         factors[k], solved[k] = min(factor, above[k]), True  # the bound ends it in any case
     order = (k for k in factors.argsort(kind="stable") if solved[k])
@@ -731,6 +733,12 @@ def find_vehicle(vehicle: str | Vehicle) -> Vehicle:
             "as af.limit.Vehicle(name, axles, spacings)"
         )
     return known[vehicle.lower()]
+
+
+def with_cs454(vehicle: Vehicle) -> Vehicle:
+    """Return a vehicle of one's own with the factors of CS 454."""
+    code = VEHICLES["CS454-single"]
+    return replace(vehicle, live=code.live, impact=code.impact, impact_on=code.impact_on)
 
 
 VEHICLES: Mapping[str, Vehicle] = _read_vehicles()

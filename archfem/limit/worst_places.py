@@ -1,7 +1,7 @@
 """Worst places of a vehicle on a bridge, and its least factors in states of fill and stones."""
 
-from collections.abc import Mapping, Sequence
-from itertools import islice
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import islice, product
 from typing import Any
 
 import numpy as np
@@ -9,21 +9,34 @@ import numpy as np
 from archfem._display import track_progress
 from archfem._typing import Array
 from archfem.limit.backfill import BlocksWithFill
-from archfem.limit.fill_range import WEAKER_FILLS
-from archfem.limit.fill_strength import Fill
+from archfem.limit.fill_range import WEAKER_FILLS, vary_pressure
+from archfem.limit.fill_strength import Fill, PlasticFill, as_pressure
 from archfem.limit.linear_programme import Programme
 from archfem.limit.self_weight import is_balanced, self_weight_programme
 from archfem.limit.vehicles import (
     DRIVING_DIRECTIONS,
     AxleRow,
     MovingLoad,
+    Vehicle,
     axles_on_structure,
     collapse_factors,
     cut_road,
     find_worst_rows,
+    with_cs454,
 )
 from archfem.masonry.loads import PointLoad
 from archfem.masonry.structure import Structure
+
+# Strength of masonry where none is given [Pa]: squared stones in lime mortar have 3 to 10 MPa (from
+# memory)
+ASSUMED_STRENGTH = 5e6
+
+# Vehicle by its number, driving direction and x of its middle [m]
+_Place = tuple[int, str, float]
+
+# Multiple of the least factor up to which the search between places looks beside a place: between
+# two it is at most 8 % less than at both, of fill 0.05 m deep on four spans in steps of 0.3 m
+_NEARLY_LEAST = 1.1
 
 # Prefix of the states in which stones crush at the assumed strength
 CRUSHING_PREFIX = "crushing "
@@ -48,49 +61,51 @@ def refine_worst_places(
     options: dict[str, Any],
     moving: MovingLoad,
 ) -> list[float]:
-    """Return the worst place of a vehicle on a fill in each direction, beside that known [m]."""
+    """Return the worst place of a vehicle on a fill in each direction, between those known [m]."""
     stones, dead = self_weight_programme(structure, **options)
     strips = {strip: stones.load([strip]) for strip in cut_road(structure, area_load)}
     worst = dict[float, None]()
     for way in DRIVING_DIRECTIONS:
         factors = moving.factors["factor"].sel(direction=way)
-        # of places that mirror each other the first one, whatever the rounding
-        first = int(np.argmax(factors.values <= (1.0 + 1e-6) * factors.values.min()))
-        known = [(vehicle, way, float(factors["position"][first])) for vehicle in vehicles]
-        found = [_search_between(structure, places, x, stones, dead, strips) for x in known]
-        worst[min(found, key=lambda each: each[0])[1]] = None
+        least = factors.values <= _NEARLY_LEAST * min(factors.values.min(), 1e9)
+        at = factors["position"].values[least].tolist()
+        if near := [(k, way, x) for k in range(len(vehicles)) for x in at]:
+            place, _ = _search_between(structure, places, vehicles, near, stones, dead, strips)
+            worst[place[-1]] = None
     return sorted(worst)
 
 
 def _search_between(
     structure: Structure,
     places: Sequence[float],
-    worst: tuple[Array, str, float],
+    vehicles: Sequence[Array],
+    near: Sequence[_Place],
     stones: BlocksWithFill,
     dead: Programme,
     strips: Mapping[PointLoad, Array],
-) -> tuple[float, float, dict[AxleRow, Array]]:
-    """Return the least factor between the places beside one, its place, and its rows of axles.
+) -> tuple[_Place, dict[AxleRow, Array]]:
+    """Return the worst place beside places of nearly the least factor, and its rows of axles.
 
     A fill spreads the axles, so that the factor is continuous there, and smooth but where the
     mechanism changes. Mechanisms of some places bound the factors at all others from above.
     """
-    vehicle, way, place = worst
-    known = np.unique(places)
-    k = int(np.abs(known - place).argmin())
-    low, high = known[max(k - 1, 0)], known[min(k + 1, len(known) - 1)]
-    least, rows = np.inf, dict[AxleRow, Array]()
+    known, rows = np.unique(places), dict[AxleRow, Array]()
+    fine = 0.1 * float(np.median(np.diff(known))) if len(known) > 1 else 0.0
     for _ in range(2):  # to a tenth of the step between places, then to a hundredth
-        fine = np.append(place, np.linspace(low, high, 21))
-        at = {axles_on_structure(structure, vehicle, way, x): float(x) for x in fine[::-1]}
+        tried = {
+            (k, way, round(float(np.clip(x + by * fine, known[0], known[-1])), 9)): by == 0
+            for by in (*range(-10, 0), *range(1, 11), 0)
+            for k, way, x in near
+        }
+        # of places that mirror each other the first one, whatever the rounding
+        order = sorted(tried, key=lambda place: (DRIVING_DIRECTIONS.index(place[1]), place))
+        at = {axles_on_structure(structure, vehicles[x[0]], *x[1:]): x for x in order}
         loads = {row: stones.load(row) for row in at if row}
-        guide = np.where(np.array([at[row] for row in loads]) == place, 0.0, np.inf)
+        guide = np.array([0.0 if tried[at[row]] else np.inf for row in loads])
         rows, factors = find_worst_rows(dead, loads, strips, guide)
-        k = int(factors.argmin())
-        least, place = float(factors[k]), at[[*loads][k]]
-        step = 0.05 * (high - low)
-        low, high = place - step, place + step
-    return least, place, rows
+        first = int(np.argmax(factors <= (1.0 + 1e-6) * factors.min()))
+        near, fine = [at[[*loads][first]]], 0.1 * fine
+    return near[0], rows
 
 
 def find_least_factors(
@@ -103,11 +118,12 @@ def find_least_factors(
 ) -> dict[str, Any]:
     """Return the least factor in each state; none where the structure does not stand in it.
 
-    Those of states with crushing are in a table of their own, undefined (NaN) where it does not.
-    Factors of the same vehicle as it is rated, if it is given, are those of the state "factor".
+    Those of states with crushing are in a table of their own, undefined (NaN) where it does not;
+    another has driving direction and place of each. Factors of the same vehicle as it is rated, if
+    it is given, are those of the state "factor".
     """
-    at = [(vehicle, way, x) for vehicle in vehicles for way in DRIVING_DIRECTIONS for x in places]
-    rows = [axles_on_structure(structure, *each) for each in at]
+    at = list(product(range(len(vehicles)), DRIVING_DIRECTIONS, places))
+    rows = [axles_on_structure(structure, vehicles[x[0]], *x[1:]) for x in at]
     place_of = dict(zip(rows, at, strict=True))
     # the fans of loads do not depend on pressure, backing and strength
     stones, _ = self_weight_programme(structure, **next(iter(states.values())))
@@ -117,7 +133,7 @@ def find_least_factors(
         own = dict(zip(rows, np.tile(moving.factors_at(places), len(vehicles)), strict=True))
         guides["factor"] = np.array([own[row] for row in axles])
     strips = {strip: stones.load([strip]) for strip in cut_road(structure, area_load)}
-    factors = dict[str, Any]()
+    factors, spots = dict[str, Any](), dict[str, tuple[str, float]]()
     for name in track_progress("other states", [name for name in _GUIDES if name in states]):
         given = states[name]
         stones, dead = self_weight_programme(structure, **given)
@@ -128,10 +144,50 @@ def find_least_factors(
         several = given["friction"] == "nonassociated"
         worst, guides[name] = find_worst_rows(dead, axles, strips, guide)
         if isinstance(given["fill"], Fill) and worst and not several:
-            place = place_of[[*axles][int(guides[name].argmin())]]
-            worst = _search_between(structure, places, place, stones, dead, strips)[-1]
-        worst = dict(islice(worst.items(), 3 if several else 1))
-        factors[name] = min(collapse_factors(stones, dead, worst, given).values())
+            low = guides[name] <= _NEARLY_LEAST * min(guides[name].min(), 1e9)
+            near = [place_of[row] for row, is_low in zip(axles, low, strict=True) if is_low]
+            place, worst = _search_between(structure, places, vehicles, near, stones, dead, strips)
+            at_row = dict.fromkeys(islice(worst, 1), place)
+        else:  # rows have adverse strips behind their axles
+            first = islice(worst, 3 if several else 1)
+            at_row = {x: next(place_of[a] for a in axles if x[: len(a)] == a) for x in first}
+        found = collapse_factors(stones, dead, {row: worst[row] for row in at_row}, given)
+        row = min(found, key=found.__getitem__)
+        factors[name], spots[name] = found[row], at_row[row][1:]
     crushed = [name for name in states if name.startswith(CRUSHING_PREFIX)]
     table = {name.removeprefix(CRUSHING_PREFIX): factors.pop(name, np.nan) for name in crushed}
-    return factors | {"crushing": table}
+    return factors | {"crushing": table, "places": spots}
+
+
+def further_searches(
+    driven: Vehicle,
+    rows: Sequence[Array],
+    live: float,
+    area_load: float,
+    options: dict[str, Any],
+    crushes: bool,
+) -> Iterator[tuple[str, Sequence[Array], float, dict[str, dict[str, Any]]]]:
+    """Yield name, rows of weights, partial factor and states of further least factors."""
+    if states := _other_states(options, crushes):
+        yield "", rows, live, states
+    is_multiple = len(driven.axles) == 1 and not area_load
+    if driven.grade == "given" and not (is_multiple or isinstance(options["fill"], PlasticFill)):
+        factors = (other := with_cs454(driven)).factors
+        yield "by_cs454", other.factored(*factors), factors[0], {"factor": options} | states
+
+
+def _other_states(options: dict[str, Any], crushes: bool) -> dict[str, dict[str, Any]]:
+    """Return the options with other pressures of a fill, without backing, all with crushing too.
+
+    Stones of which it was said that they do not crush do not.
+    """
+    fill = as_pressure(options["fill"])
+    fills = vary_pressure(fill) if fill is not None else {}
+    states = {name: options | {"fill": other} for name, other in fills.items()}
+    if fill is not options["fill"]:
+        states["by_pressure"] = options | {"fill": fill}
+    if np.isinf(options["strength"]) and crushes:
+        soft = options | {"strength": ASSUMED_STRENGTH}
+        crushed = {"factor": fill, **fills}
+        states |= {f"{CRUSHING_PREFIX}{x}": soft | {"fill": other} for x, other in crushed.items()}
+    return states

@@ -18,7 +18,7 @@ import xarray as xr
 from scipy.stats import qmc
 
 from archfem._validation import check_integer, validate_arguments
-from archfem.cases.answers import ALL_AT_ONCE, NOT_COMPUTED
+from archfem.cases.answers import ALL_AT_ONCE, AT_ONCE_BY_CS454, NOT_COMPUTED
 from archfem.cases.case import Case
 from archfem.cases.defaults import list_default_keys
 from archfem.cases.result_text import ResultTable
@@ -42,7 +42,9 @@ from archfem.dynamics.schemes import Conserving, EffectiveDamping, Viscous, inte
 from archfem.dynamics.verdict_range import VerdictRange
 from archfem.errors import DidNotConverge, InvalidInput, InvalidStructure, logger
 from archfem.limit.fill_strength import PlasticFill, has_backing
-from archfem.limit.rating import ASSUMED_STRENGTH, Rating, rate_again
+from archfem.limit.rating import Rating, rate_again
+from archfem.limit.vehicles import with_cs454
+from archfem.limit.worst_places import ASSUMED_STRENGTH
 from archfem.masonry.joint_closing import with_finish
 from archfem.masonry.structure import Structure, join_words, with_contacts
 from archfem.models.model import Doubt, write_doubts
@@ -456,8 +458,9 @@ def vary_rating(
         listed.append(("strength", name, {"limit.strength": ASSUMED_STRENGTH}))
     known |= _rate_changed(case, found, changes, folder)
     if known.keys() >= changes.keys():
-        known |= _rate_changed(case, found, {ALL_AT_ONCE: _merge_worst(listed, known)}, folder)
-    late = [name for name in (*changes, ALL_AT_ONCE) if name not in known]
+        known |= _rate_at_once(case, found, _merge_worst(listed, known), folder)
+    of_all = [ALL_AT_ONCE, *[AT_ONCE_BY_CS454] * bool(found.by_cs454)]
+    late = [name for name in (*changes, *of_all) if name not in known]
     order = sorted(known, key=lambda name: np.nan_to_num(known[name], nan=inf))
     rows = [[name, f"{known[name]:.4g}".replace("nan", "-")] for name in order]
     rows += [[name, NOT_COMPUTED] for name in late]
@@ -470,6 +473,20 @@ def vary_rating(
     name = found.vehicle.name
     words = _say_spreads(name, listed, known, len(late))
     return ResultTable([f"{found.label} with", "factor"], rows), words, len(late)
+
+
+def _rate_at_once(
+    case: Case, found: Rating, worst: dict[str, Any], folder: str | Path | None
+) -> dict[str, float]:
+    """Return the factor with the worst of each property at once, and that by CS 454."""
+    known = _rate_changed(case, found, {ALL_AT_ONCE: worst}, folder)
+    if known and found.by_cs454:
+        other = with_cs454(found.vehicle)
+        (live, impact), axle = other.factors, {"rating.vehicle.impact_on": other.impact_on}
+        worst = worst | {"rating.live": live, "rating.impact": impact, **axle}
+        driven = replace(found, vehicle=other, live=live, impact=impact)
+        known |= _rate_changed(case, driven, {AT_ONCE_BY_CS454: worst}, folder)
+    return known
 
 
 def _merge_worst(listed: Sequence[Change], known: Mapping[str, float]) -> dict[str, Any]:
@@ -493,7 +510,7 @@ def _say_spreads(
 ) -> list[str]:
     """Return the range of single changes, all at once, and all quantities by their effect."""
     given = known["the values of the case"]
-    single = {k: x for k, x in known.items() if k != ALL_AT_ONCE and np.isfinite(x)}
+    single = {k: x for k, x in known.items() if ALL_AT_ONCE not in k and np.isfinite(x)}
     least, most = min(single, key=single.__getitem__), max(single, key=single.__getitem__)
     missing = f"; {late} variations were not computed" if late else ""
     at_once = f"; {ALL_AT_ONCE} {known[ALL_AT_ONCE]:.4g}" if ALL_AT_ONCE in known else ""

@@ -986,7 +986,7 @@ def test_a_rating_that_is_stopped_at_once_keeps_nothing(tmp_path, monkeypatch, c
     def stop(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("archfem.limit.rating.find_geometric_factor", stop)
+    monkeypatch.setattr("archfem.limit.rating.find_geometric_factors", stop)
     with open(tmp_path / "errors", "w") as errors:
         monkeypatch.setattr("sys.stderr", errors)
         command = ["rate", str(path), "--out", str(out), "--vehicle", "LM2", "--vehicle", "LM1"]

@@ -1,6 +1,7 @@
 """Ratings with one changed property at a time: against whole ratings of changed cases."""
 
 import re
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -58,6 +59,7 @@ def test_each_row_is_the_rating_of_a_changed_case(tmp_path):
     assert left == 0
     cells = dict(rows.rows)
     assert cells.pop("piers a tenth narrower") == "-"  # on which the rings do not fit
+    by_cs454 = float(cells.pop("all unfavourable at once, by CS 454"))
     factors = {name: float(cell) for name, cell in cells.items()}
     thin = ["structure.arches.thickness=0.36", "structure.arches.right.thickness=0.405"]
     rough = [f'contacts."{each} to stone".friction=0.5' for each in ("stone", "soil")]
@@ -93,6 +95,11 @@ def test_each_row_is_the_rating_of_a_changed_case(tmp_path):
     whole = rate_case(other.structure, other.rating, other.limit)
     assert factors[least_of_all] == pytest.approx(whole.factor, rel=PRINTED)
     assert next(iter(cells)) == least_of_all
+    code = af.limit.VEHICLES["CS454-single"]
+    cart = {**case.rating, "live": code.live, "impact": code.impact, "width": 1.62}
+    cart["vehicle"] = replace(case.rating["vehicle"], impact_on=code.impact_on)
+    whole = rate_case(other.structure, cart, other.limit)
+    assert by_cs454 == pytest.approx(whole.factor, rel=PRINTED)
     assert [*factors.values()] == sorted(factors.values())
     assert words[1].startswith("measure first, for cart: ")
 
@@ -329,6 +336,7 @@ def test_free_abutments_that_change_nothing_say_by_which_size(tmp_path, monkeypa
     case = af.Case.read(tmp_path / "case.toml")
     given = {"factor": 4.0, "without_pressure": 3.0, "full_pressure": 5.0, "strength": np.inf}
     words = {"vehicle": SimpleNamespace(name="cart"), "label": "cart", "crushing": {}}
+    words["by_cs454"] = {}
     found = SimpleNamespace(
         structure=case.structure, fill=case.limit.fill, width=2.5, **given, **words
     )
