@@ -575,9 +575,10 @@ def rate(  # noqa: PLR0913  (factors of the check, and the strength of the bridg
     steps beside all places of at most 1.1 times the least factor are searched to a hundredth.
     Without fill places follow where an axle stands at an end of a stone, beside the least factors
     of these. Its axles spread through a fill along the bridge; across it they spread evenly over
-    `width`. The distributed load of its code grows with them, where it is adverse (`moving_load`). The geometric factor of safety is
-    Heyman's: all joints are narrowed about their middles, at unchanged weights and with the vehicle
-    at its worst place, until it is carried no longer; or deepened until it is carried.
+    `width`. The distributed load of its code grows with them, where it is adverse (`moving_load`). The
+    geometric factor of safety is Heyman's: all joints are narrowed about their middles, at
+    unchanged weights and with the vehicle at its worst place, until it is carried no longer; or
+    deepened until it is carried.
 
     Args:
         structure: the bridge, or an `archfem.Analysis` of it.
