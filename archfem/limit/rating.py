@@ -571,14 +571,14 @@ def rate(  # noqa: PLR0913  (factors of the check, and the strength of the bridg
     """Rate a bridge for a vehicle: the multiple of it, with partial factors, at collapse.
 
     The vehicle drives over the bridge in both directions (`moving_load`), from on to off in steps
-    of 1/100 of the bridge's length, or 1/20 with a plastic fill. With a `Fill` the
-    steps beside all places of at most 1.1 times the least factor are searched to a hundredth.
-    Without fill places follow where an axle stands at an end of a stone, beside the least factors
-    of these. Its axles spread through a fill along the bridge; across it they spread evenly over
-    `width`. The distributed load of its code grows with them, where it is adverse (`moving_load`). The
-    geometric factor of safety is Heyman's: all joints are narrowed about their middles, at
-    unchanged weights and with the vehicle at its worst place, until it is carried no longer; or
-    deepened until it is carried.
+    of 1/100 of the bridge's length, or 1/20 with a plastic fill. With a `Fill` the steps beside all
+    places of at most 1.1 times the least factor are searched to a hundredth. Without fill places
+    follow where an axle stands at an end of a stone, beside the least factors of these. Its axles
+    spread through a fill along the bridge; across it they spread evenly over `width`. The
+    distributed load of its code grows with them, where it is adverse (`moving_load`). The geometric
+    factor of safety is Heyman's: all joints are narrowed about their middles, at unchanged weights
+    and with the vehicle at its worst place, until it is carried no longer; or deepened until it is
+    carried.
 
     Args:
         structure: the bridge, or an `archfem.Analysis` of it.
