@@ -642,7 +642,7 @@ def test_other_states_of_the_fill_have_worst_places_of_their_own(area_load, monk
         there = af.limit.moving_load(bridge, 1e5, positions=[x], **given).worst
         assert getattr(found, name) == pytest.approx(there.factor, rel=1e-4)  # of mirror images
         assert f"{getattr(found, name):.4g} (axle at x = {x:.2f} m)" in str(found)
-    assert abs(found.places["full_pressure"][1] - found.moving.position) > 1.0
+    assert area_load or abs(found.places["full_pressure"][1] - found.moving.position) > 1.0
     x = found.places["crushing factor"][1]
     assert (
         f"at 5 MPa the least factor is {found.crushing['factor']:.4g} (axle at x = {x:.2f} m)"
