@@ -15,14 +15,7 @@ from typing import Any
 import netCDF4
 import xarray as xr
 
-from archfem._files import (
-    FORMAT,
-    atomic_write,
-    check_format,
-    check_listed,
-    read_bytes,
-    refuse_listed,
-)
+from archfem import _files
 from archfem.errors import InvalidInput
 
 # Precedes the digest at the end of a file.
@@ -39,12 +32,12 @@ def write_dataset(
     dataset: xr.Dataset, path: Path, what: str, encoding: Mapping[Any, Any] = MappingProxyType({})
 ) -> Path:
     """Write a dataset, a file of a kind, atomically: a killed run leaves the old or the new one."""
-    refuse_listed(path)
+    _files.refuse_listed(path)
     file = netCDF4.Dataset(path.name, "w", memory=1)
     try:
         store = xr.backends.NetCDF4DataStore(file)  # type: ignore[no-untyped-call]
         large = [name for name, values in dataset.items() if values.ndim > 1]
-        small = dataset.drop_vars(large).assign_attrs({FORMAT_ATTRIBUTE: f"{what} {FORMAT}"})
+        small = dataset.drop_vars(large).assign_attrs({FORMAT_ATTRIBUTE: f"{what} {_files.FORMAT}"})
         for name, text in dataset.attrs.items():
             if isinstance(text, str) and len(text.encode()) > MAX_ATTRIBUTE_SIZE:
                 small[f"{LONG_ATTRIBUTE}{name}"] = small.attrs.pop(name)
@@ -59,7 +52,7 @@ def write_dataset(
                 file[name].set_var_chunk_cache(1)  # compresses it now, and frees its values
     finally:
         content = file.close()  # a view of memory, which is not copied
-    with atomic_write(path) as draft, draft.open("wb") as target:
+    with _files.atomic_write(path) as draft, draft.open("wb") as target:
         target.write(content)
         target.write(CHECKSUM_MARK + _digest(content))
     return path
@@ -68,7 +61,7 @@ def write_dataset(
 def read_dataset(path: str | Path, what: str) -> xr.Dataset:
     """Read a NetCDF file of a kind and verify checksum and format; in a folder also its list."""
     # a history has no other limit of size than the disk's
-    content = read_bytes(path, what, max_bytes=2**40)
+    content = _files.read_bytes(path, what, max_bytes=2**40)
     end = content.rfind(CHECKSUM_MARK)
     damaged = InvalidInput(
         f"{path} is damaged: it is not what was written there; delete it and run again"
@@ -76,7 +69,7 @@ def read_dataset(path: str | Path, what: str) -> xr.Dataset:
     # no part of it is copied: a history may be large
     if end >= 0 and content[end + len(CHECKSUM_MARK) :] != _digest(memoryview(content)[:end]):
         raise damaged
-    check_listed(Path(path), content)
+    _files.check_listed(Path(path), content)
     try:
         file = netCDF4.Dataset(Path(path).name, memory=content)
         _check_sizes(file, len(content))
@@ -93,7 +86,7 @@ def read_dataset(path: str | Path, what: str) -> xr.Dataset:
     found = str(dataset.attrs.pop(FORMAT_ATTRIBUTE, "none"))
     if found != "none" and end < 0:
         raise damaged
-    check_format(path, what, found)
+    _files.check_format(path, what, found)
     return dataset
 
 

@@ -24,19 +24,10 @@ STANDARD_GRAVITY = 9.80665
 
 
 # SI unit and factor of common units, read without the registry of units, which loads for a second
-COMMON_UNITS = {
-    "m": ("m", 1.0),
-    "mm": ("m", 1e-3),
-    "s": ("s", 1.0),
-    "ms": ("s", 1e-3),
-    "m/s**2": ("m/s**2", 1.0),
-    "Pa": ("Pa", 1.0),
-    "MPa": ("Pa", 1e6),
-    "GPa": ("Pa", 1e9),
-    "MPa/mm": ("Pa/m", 1e9),
-    "GPa/m": ("Pa/m", 1e9),
-    **dict.fromkeys(("degree", "degrees", "deg", "°"), ("degree", 1.0)),
-}
+COMMON_UNITS = {unit: (unit, 1.0) for unit in ("m", "s", "m/s**2", "Pa")}
+COMMON_UNITS |= {"mm": ("m", 1e-3), "ms": ("s", 1e-3), "MPa": ("Pa", 1e6), "GPa": ("Pa", 1e9)}
+COMMON_UNITS |= dict.fromkeys(("MPa/mm", "GPa/m"), ("Pa/m", 1e9))
+COMMON_UNITS |= dict.fromkeys(("degree", "degrees", "deg", "°"), ("degree", 1.0))
 
 
 @cache
@@ -204,11 +195,8 @@ def _check_text(text: str, unit: str, key: str) -> None:
         )
     powers = [match[1] for match in power_pattern.finditer(text)]
     # no unit of mechanics has a power above 12
-    if (
-        superscript_pattern.search(text)
-        or None in powers
-        or prod(int(power) for power in powers) > 12
-    ):
+    is_high = None in powers or prod(map(int, powers)) > 12
+    if is_high or superscript_pattern.search(text):
         raise InvalidInput(f"{key} = {text!r} has a power no unit has: write a number in {unit}")
 
 

@@ -41,8 +41,7 @@ LAYOUTS = {7: "d297c2080c977e71"}
 @pytest.fixture
 def older(monkeypatch):
     """Until it is undone, what is written is of an older version."""
-    for module in ("_netcdf", "_files"):
-        monkeypatch.setattr(f"archfem.{module}.FORMAT", 0)
+    monkeypatch.setattr(_files, "FORMAT", 0)
     return monkeypatch
 
 
@@ -81,8 +80,7 @@ def test_commands_refuse_results_of_another_version(
     groups = {name: group._asdict() for name, group in _files.read_file_list(folder).items()}
     run = af.History.read(folder / HISTORY_FILE)
     with monkeypatch.context() as older:
-        for module in ("_netcdf", "_files"):
-            older.setattr(f"archfem.{module}.FORMAT", 0)
+        older.setattr(_files, "FORMAT", 0)
         _files.write_sealed_json(folder / "archfem.json", groups)
         _files.write_sealed_json(tmp_path / "study.json", {"points": []})
         run.save(alone)

@@ -45,7 +45,7 @@ def test_a_file_is_read_once(written, monkeypatch):
     dataset, path = written
     content = path.read_bytes()
     monkeypatch.setattr(
-        "archfem._netcdf.read_bytes", lambda path, what, max_bytes: path.unlink() or content
+        "archfem._files.read_bytes", lambda path, what, max_bytes: path.unlink() or content
     )
     assert read_dataset(path, "history file").identical(dataset)
 

@@ -24,13 +24,10 @@ from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import Structure, join_names
 from archfem.motion.design_spectra import DesignSpectrum
 from archfem.motion.motion import Motion
+from archfem.statics import mechanism_assessment
 from archfem.statics.assessment_checks import LimitState
 from archfem.statics.equilibrium import Equilibrium
-from archfem.statics.mechanism_assessment import (
-    KinematicAssessment,
-    assess_parts,
-    kinematic_assessment,
-)
+from archfem.statics.mechanism_assessment import KinematicAssessment, kinematic_assessment
 from archfem.statics.pushover import Pushover, Stop, pushover
 from archfem.units import G, MPa, describe_if_in_g, kN
 
@@ -383,7 +380,7 @@ class AssessmentSettings:
                 # without dilatancy the whole alone is searched
                 if "friction" in self.of_limit:
                     del options["friction"]
-                each = assess_parts(structure, spectrum, **options)
+                each = mechanism_assessment.assess_parts(structure, spectrum, **options)
                 found |= {f"{name or 'part'}, {side}": result for name, result in each.items()}
             else:
                 found[side] = last = kinematic_assessment(structure, spectrum, **options)

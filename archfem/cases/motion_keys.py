@@ -13,12 +13,8 @@ from archfem._typing import Array
 from archfem._validation import check_choice, declared_keys
 from archfem.cases.toml_file import Table, check_table, format_tables, read_object
 from archfem.errors import InvalidInput
-from archfem.motion.design_spectra import (
-    DesignSpectrum,
-    FloorSpectrum,
-    build_registered_spectrum,
-    registered_spectra,
-)
+from archfem.motion import design_spectra
+from archfem.motion.design_spectra import DesignSpectrum, FloorSpectrum
 from archfem.motion.matching import DEFAULT_BAND
 from archfem.motion.motion import Motion
 from archfem.motion.record_selection import RecordSelection
@@ -143,10 +139,10 @@ def build_target_spectrum(settings: Table) -> DesignSpectrum | None:
 
 def build_spectrum(table: Table, section: str) -> DesignSpectrum:
     """Return the design spectrum of a table with its code, whose accelerations are in g."""
-    values = dict(table)
-    code = check_choice(values.pop("code", None), f"{section}.code", registered_spectra)
-    spectrum = registered_spectra[code]
-    own, every = declared_keys(spectrum), map(declared_keys, registered_spectra.values())
+    values, known = dict(table), design_spectra.registered_spectra
+    code = check_choice(values.pop("code", None), f"{section}.code", known)
+    spectrum = known[code]
+    own, every = declared_keys(spectrum), map(declared_keys, known.values())
     if others := sorted(set().union(*every).intersection(values).difference(own)):
         raise InvalidInput(
             f"unknown key '{section}.{others[0]}': it is of another code than {code}, whose keys "
@@ -164,7 +160,7 @@ def build_spectrum(table: Table, section: str) -> DesignSpectrum:
         stated = {key: re.search(rf"^ +{key}: ([^;:\n]+)", text, re.M) for key in missing}
         listed = [f"'{key}'" + (f", {x[1].rstrip('.')}" if x else "") for key, x in stated.items()]
         raise InvalidInput(f"{section} of {code}: give also {'; '.join(listed)}")
-    return build_registered_spectrum(code, values)
+    return design_spectra.build_registered_spectrum(code, values)
 
 
 def build_pairs(settings: Table, folder: Path = Path()) -> tuple[Motion, ...]:

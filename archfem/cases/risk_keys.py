@@ -13,18 +13,10 @@ from archfem.errors import InvalidInput
 from archfem.motion.hazard import MEASURES, Hazard
 from archfem.units import in_unit
 
-HAZARD_KEYS: dict[str, Any] = {
-    "return_periods": ["1"],
-    "rates": ["1"],
-    "intensities": list,  # in the unit of the measure, or with their own
-    "factor": "1",
-    "exponent": "1",
-    "file": str,
-    "site": int,
-    "measure": str,
-    "period": "s",
-    "source": str,  # where the curve is from
-}
+# Intensities are in the unit of the measure, or have their own; the source is that of the curve
+HAZARD_KEYS: dict[str, Any] = {"return_periods": ["1"], "rates": ["1"], "intensities": list}
+HAZARD_KEYS |= {"factor": "1", "exponent": "1", "file": str, "site": int, "measure": str}
+HAZARD_KEYS |= {"period": "s", "source": str}
 RISK_KEYS: dict[str, Any] = {"hazard": dict, "samples": int, "precision": "1", "seed": int}
 RISK_KEYS |= {"alternatives": dict}
 ALTERNATIVE_KEYS: dict[str, Any] = {"weight": "1", "set": [str]}
@@ -61,9 +53,7 @@ def parse_hazard(table: Any, folder: Path) -> Hazard:
     """Return a hazard curve from its table."""
     values = check_table(table, HAZARD_KEYS, "risk.hazard")
     source = values.pop("source", "")
-    options: dict[str, Any] = {
-        key: values.pop(key) for key in ("measure", "period") if key in values
-    }
+    options: Any = {key: values.pop(key) for key in ("measure", "period") if key in values}
     if set(values) <= {"file", "site"} and "file" in values:
         if options:
             raise InvalidInput("risk.hazard: a file names its measure and period: leave them out")

@@ -25,16 +25,11 @@ from archfem.cases.provenance import hash_file, list_input_files
 from archfem.cases.toml_file import Table, check_table, format_key
 from archfem.errors import ArchfemError, InvalidInput
 from archfem.joints.own_law import JointLaw, build_registered_law, registered_laws
+from archfem.masonry import joint_closing
 from archfem.masonry.assembly import assembled
 from archfem.masonry.backfill import jointed_fill
 from archfem.masonry.block import Block
-from archfem.masonry.joint_closing import (
-    CONDITIONS,
-    FINISHED_KEYS,
-    find_finish,
-    usual_law,
-    with_finish,
-)
+from archfem.masonry.joint_closing import FINISHED_KEYS, find_finish
 from archfem.masonry.materials import CONTACT_PRESETS, MATERIAL_PRESETS, STONE, Contact, Material
 from archfem.masonry.shapes import bridges, rings, walls
 from archfem.masonry.shapes.bridge_parts import Arch, Backfill, Paving, Pier, Sidewall
@@ -132,7 +127,7 @@ def build_structure(settings: Table, folder: Path = Path()) -> Structure:
     for name, table in settings.get("contacts", {}).items():
         if "finish" in table:
             contact = _resolve_preset(settings, "contacts", name)
-            structure = with_finish(structure, table["finish"], contact)
+            structure = joint_closing.with_finish(structure, table["finish"], contact)
     for section, name, used in list_unused_tables(settings, structure):
         if name not in PRESETS[section]:
             word, path = section[:-1], f"{section}.{format_key(name)}"
@@ -389,13 +384,13 @@ def find_table(settings: Table, item: Material | Contact) -> DescribedItem:
 
 def _read_finish(table: dict[str, Any], section: str) -> dict[str, Any]:
     """Take the finish from the table of a contact, and return its law for usual stone."""
-    finish = check_choice(table.pop("finish"), f"{section}.finish", CONDITIONS)
+    finish = check_choice(table.pop("finish"), f"{section}.finish", joint_closing.CONDITIONS)
     if both := sorted({*FINISHED_KEYS, "law"}.intersection(table)):
         raise InvalidInput(
             f"{section} has a finish and {join_names(both)}, which follows from it: leave out one "
             f"(remove = ['{section}.finish'] leaves out that of a base)"
         )
-    return {key: getattr(usual_law(finish), key) for key in FINISHED_KEYS}
+    return {key: getattr(joint_closing.usual_law(finish), key) for key in FINISHED_KEYS}
 
 
 def _joint_law(table: Table, section: str) -> JointLaw:

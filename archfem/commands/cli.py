@@ -1,7 +1,6 @@
 """Argument parser and exit codes of the command line, such as `archfem run CASE.toml --out DIR`."""
 
 import argparse
-import gc
 import logging
 import os
 import signal
@@ -49,8 +48,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         The exit code of `exit_code`, or 143 if SIGTERM ended the command; the process exits with 2
         if the arguments are not understood.
     """
-    # Modules and models live to the end: to look for garbage among them takes 6 % of a short run.
-    gc.set_threshold(50_000, 20, 20)
     parser = _build_parser()
     if not (sys.argv[1:] if arguments is None else arguments):
         parser.exit(2, parser.format_help())

@@ -19,19 +19,10 @@ from archfem.cases.run import HISTORY_FILE, load_finished_run
 from archfem.commands.cli import ExitCode
 from archfem.commands.run import Command, keep_attempt, name_group, write_results
 from archfem.commands.tools import doubt_code
-from archfem.dynamics.collapse_state import (
-    DISLOCATION,
-    FALLEN_STATES,
-    CollapseState,
-    shallowest_part,
-)
+from archfem.dynamics import collapse_state, motion_scaling
+from archfem.dynamics.collapse_state import FALLEN_STATES, CollapseState
 from archfem.dynamics.history import Ending, History
-from archfem.dynamics.motion_scaling import (
-    OWN_STEP,
-    CollapseScale,
-    collapse_scale,
-    mechanism_scales,
-)
+from archfem.dynamics.motion_scaling import OWN_STEP, CollapseScale
 from archfem.dynamics.scale_search import KeptRuns, MechanismScales, ScaledRun
 from archfem.dynamics.walls_across import check_across
 from archfem.errors import InvalidInput
@@ -69,11 +60,10 @@ def _for_each_pair(command: Command) -> Command:
 
 @_for_each_pair
 @keep_attempt("verdict_range")
-def verdict(options: argparse.Namespace) -> int:
+def verdict(case: Case, options: argparse.Namespace) -> int:
     """Run a case over joint rules, stiffness, friction and damping: how often does it fall?"""
     from archfem.studies.variations import verdict_range
 
-    case = Case.read(options.case, options.changes)
     motion = _choose_motion(case, options)
     print(case.title)
     # of its own, in which other pairs may be varied at the same time
@@ -124,16 +114,16 @@ def _choose_motion(case: Case, options: argparse.Namespace) -> Motion:
 
 @_for_each_pair
 @keep_attempt("scale")
-def scale(options: argparse.Namespace) -> int:
+def scale(case: Case, options: argparse.Namespace) -> int:
     """Scale the motion of a case until it falls, or forms a mechanism in small displacements."""
-    case = Case.read(options.case, options.changes)
     kept, begun = (_read_kept(case, options, name) for name in ("scale.txt", KEPT_RUNS))
     if kept and options.pair and begun is None and not kept.startswith("no answer"):
         print(f"{case.title}\n{kept}")
         return ExitCode.DOUBTFUL if f"\n{DOUBT_MARK}" in kept else 0
     motion = _choose_motion(case, options)
     found: CollapseScale | MechanismScales
-    search = collapse_scale if case.analysis.displacements == "large" else mechanism_scales
+    is_large = case.analysis.displacements == "large"
+    search = motion_scaling.collapse_scale if is_large else motion_scaling.mechanism_scales
     made = _unpack_runs(begun or "[]")
     if made:
         write_progress_line("scale", f"{len(made)} runs of the interrupted search are kept")
@@ -151,7 +141,7 @@ def scale(options: argparse.Namespace) -> int:
         from archfem.view.verdicts import draw_scale
 
         lines[1:1] = filter(None, [found.mechanism])
-        limit = DISLOCATION * shallowest_part(case.structure)[0]
+        limit = collapse_state.DISLOCATION * collapse_state.shallowest_part(case.structure)[0]
         if any(run.fall for run in found.kept_runs.values()):
             files["scale.png"] = draw_scale(found, limit)
     files["scale.txt"] = text = "\n".join(lines)

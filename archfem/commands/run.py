@@ -18,19 +18,11 @@ from archfem._files import create_result_folder
 from archfem._optional import can_film
 from archfem.cases import answers, defaults, result_text, structure_text
 from archfem.cases import result_folder as results
+from archfem.cases import run as case_run
 from archfem.cases.analysis_keys import name_vehicles, parse_rating, rate_case
 from archfem.cases.answers import RESULTS, state_ratings
 from archfem.cases.case import Case, sign
-from archfem.cases.run import (
-    CASE_FILE,
-    RATING_FILE,
-    DeadLoadResult,
-    Result,
-    Run,
-    carry_out,
-    case_files,
-    replace_run,
-)
+from archfem.cases.run import CASE_FILE, RATING_FILE, DeadLoadResult, Result, Run, replace_run
 from archfem.cases.structure_keys import read_survey
 from archfem.cases.toml_file import format_tables, parse_change
 from archfem.commands.tools import doubt_code, print_motions, show_both_senses
@@ -52,6 +44,7 @@ from archfem.view.motions import draw_suite
 from archfem.view.style import Files, write_files
 
 Command = Callable[[argparse.Namespace], int]
+CaseCommand = Callable[[Case, argparse.Namespace], int]
 
 # Modules that import pyvista or studies, which are slow, are imported where they are needed.
 
@@ -70,7 +63,7 @@ def run(options: argparse.Namespace) -> int:
     failure = None
     # All else is printed after the verdict, which is known last.
     with _print_at_end(folder, "run", case.title) as verdict, replace_run(case, folder) as draft:
-        computed = carry_out(case, draft)
+        computed = case_run.carry_out(case, draft)
         if options.workers > 1 and case.suite is not None:
             from archfem.studies.study import compute_pairs
 
@@ -133,7 +126,7 @@ def write_results(
             files: Files = {str(place / key): content for key, content in draw().items()}
             # a run has the case of the folder, in which [report] may have changed
             if run is None or run.inputs == inputs:
-                files = {**case_files(case), **files}
+                files = {**case_run.case_files(case), **files}
             write(files, draft)
 
 
@@ -152,16 +145,16 @@ def _name_published_files(text: str, folder: Path, command: str) -> str:
     return "".join(x for x in lines if x[:6] != "wrote " or Path(x[6:].strip()).exists())
 
 
-def keep_attempt(name: str) -> Callable[[Command], Command]:
-    """Let a command that finds no answer leave the reason in its folder, which a report states."""
+def keep_attempt(name: str) -> Callable[[CaseCommand], Command]:
+    """Let a command read its case, and leave the reason in its folder where it finds no answer."""
 
-    def decorate(command: Command) -> Command:
+    def decorate(command: CaseCommand) -> Command:
         @wraps(command)
         def attempt(options: argparse.Namespace) -> int:
+            case = Case.read(options.case, options.changes)
             try:
-                return command(options)
+                return command(case, options)
             except DidNotConverge as error:
-                case = Case.read(options.case, options.changes)
                 text, pair = f"no answer: {error}", getattr(options, "pair", None)
                 demand = f"'{pair}'" if pair else "-"
                 stated = answers.state_outcome(RESULTS[name], text, demand=demand)
@@ -192,9 +185,8 @@ def modes(options: argparse.Namespace) -> int:
 
 
 @keep_attempt("limit")
-def limit(options: argparse.Namespace) -> int:
+def limit(case: Case, options: argparse.Namespace) -> int:
     """Find the collapse factor of the loads in [limit], and the mechanism."""
-    case = Case.read(options.case, options.changes)
 
     def show(found: Collapse, text: str, *others: Any) -> None:
         given = case.structure, case.limit.strength, case.limit.fill
@@ -223,9 +215,8 @@ def thickness(options: argparse.Namespace) -> int:
 
 
 @keep_attempt("assessment")
-def assess(options: argparse.Namespace) -> int:
+def assess(case: Case, options: argparse.Namespace) -> int:
     """Assess the collapse mechanisms of a case against a design spectrum, in both directions."""
-    case = Case.read(options.case, options.changes)
     with result_text.record_doubts(case.structure) as doubts:
         try:
             found = case.assessment.solve(case.structure, case.demand, options.parts)
@@ -282,13 +273,12 @@ def _show_assessment(
 
 
 @keep_attempt("rating")
-def rate(options: argparse.Namespace) -> int:
+def rate(case: Case, options: argparse.Namespace) -> int:
     """Rate the bridge of a case for vehicles, by the joints and the fill of its [limit]."""
     keys = ("live", "impact", "dead", "width", "area_load")
     # as in --set, so that a length may have a unit
     values = {key: getattr(options, key) for key in keys}
     given = dict(parse_change(f"{k}={x}") for k, x in values.items() if x is not None)
-    case = Case.read(options.case, options.changes)
     rating = {**case.settings.get("rating", {}), **given}
     tables = name_vehicles(options.vehicles, rating)
     rated = _rate_each(case, tables)
@@ -378,12 +368,12 @@ def mesh(options: argparse.Namespace) -> None:
 
 
 @keep_attempt("accuracy")
-def accuracy(options: argparse.Namespace) -> int:
+def accuracy(case: Case, options: argparse.Namespace) -> int:
     """Run a case over fidelities, meshes, quadratures and steps: table and picture."""
     from archfem.studies.convergence import case_accuracy
     from archfem.view.studies import draw_accuracy
 
-    case, folder = Case.read(options.case, options.changes), create_result_folder(options.out)
+    folder = create_result_folder(options.out)
     compared = case_accuracy(case, _files.path_inside(folder, "settings"), workers=options.workers)
     text = result_text.describe_accuracy(compared)
     files: Files = {"accuracy.txt": text, "accuracy.png": draw_accuracy(compared)}
@@ -392,11 +382,10 @@ def accuracy(options: argparse.Namespace) -> int:
 
 
 @keep_attempt("risk")
-def risk(options: argparse.Namespace) -> int:
+def risk(case: Case, options: argparse.Namespace) -> int:
     """Compute the annual rate at which the structure of a case falls, by its [risk]."""
     from archfem.studies.collapse_risk import collapse_risk
 
-    case = Case.read(options.case, options.changes)
     if case.risk is None:
         raise InvalidInput(f"{options.case} has no [risk]: give it a hazard, and a [suite]")
     folder = create_result_folder(options.out)

@@ -561,18 +561,15 @@ def _doubt_ties(structure: Structure, most: int = 3) -> Iterator[Doubt]:
             )
 
 
-def _doubt_depth(structure: Structure) -> list[Doubt]:
+def _doubt_depth(structure: Structure) -> Iterator[Doubt]:
     """Doubt a ring whose joints are far deeper than those of built ones."""
     rings = np.array([joint.role == "ring" for joint in structure.joints], dtype=bool)
     depths = structure.depths[rings & structure.judged]
-    if not len(depths) or (depth := float(np.median(depths))) <= MAX_USUAL_DEPTH:
-        return []
-    return [
-        Doubt(
+    if len(depths) and (depth := float(np.median(depths))) > MAX_USUAL_DEPTH:
+        yield Doubt(
             f"joints of the ring are typically {depth:.3g} m deep, as of hardly any arch",
             "check the unit of the lengths; `unit` in [structure] replaces that of a drawing",
         )
-    ]
 
 
 def _doubt_undivided(structure: Structure) -> Iterator[Doubt]:

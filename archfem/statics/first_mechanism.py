@@ -11,17 +11,10 @@ import numpy as np
 
 from archfem._typing import Array
 from archfem.errors import InvalidInput
+from archfem.limit import displaced_blocks
 from archfem.limit.backfill import BlocksWithFill, FillProfile
 from archfem.limit.collapse import collapse_factor
-from archfem.limit.displaced_blocks import (
-    FillPressure,
-    KinematicChain,
-    PlacedBlocks,
-    classify_motion,
-    find_mechanism,
-    find_thrusts,
-    find_tie_shares,
-)
+from archfem.limit.displaced_blocks import FillPressure, KinematicChain, PlacedBlocks
 from archfem.limit.finite_mechanism import MechanismPath
 from archfem.limit.linear_programme import NoEquilibrium
 from archfem.limit.mechanism_kinematics import find_rigid_regions
@@ -162,9 +155,9 @@ def find_first_mechanism(
     try:
         placed = _crush_edges(placed, joints, coefficient, strength)
         opposite = replace(placed, loads=weights, direction=-placed.direction)
-        mechanism = find_mechanism(placed, joints, coefficient)
+        mechanism = displaced_blocks.find_mechanism(placed, joints, coefficient)
         # The least factor in the other direction is below zero where it stands only if pushed.
-        others = [find_mechanism(opposite, joints, coefficient)]
+        others = [displaced_blocks.find_mechanism(opposite, joints, coefficient)]
     except NoEquilibrium as error:
         raise refusal from error
     if any(found is not None and found.factor <= 1e-9 for found in (mechanism, *others)):
@@ -180,7 +173,7 @@ def _crush_edges(
     forces = joint_strengths(structure, strength) * structure.width * structure.depths
     shares = np.zeros(len(forces))  # N / (w f h), of the state with the hinges before
     for number in range(MAX_ROUNDS if np.isfinite(strength) else 0):
-        before, shares = shares, find_thrusts(placed, joints, coefficient) / forces
+        before, shares = shares, displaced_blocks.find_thrusts(placed, joints, coefficient) / forces
         if number > 5:  # where many states are optimal, each round may find another one
             shares = np.maximum(shares, before)
         if (np.abs(shares - before) <= 1e-4).all():
@@ -220,7 +213,7 @@ def search_flat(
         words = "a search without dilatancy found none: hold a motion"
         return first, replace(dilates, remedy=words)
     contacts, doubt = placed.touching(joints), None
-    flat = np.zeros(len(contacts))
+    moves = found.motion, np.zeros(len(contacts)), contacts, found.factor  # nothing dilates
     if found.solutions is not None and found.solutions.may_be_less:
         doubt = Doubt(
             "alpha_0 is {}, the least that a search without dilatancy found, and a weaker "
@@ -228,7 +221,7 @@ def search_flat(
             "hold such a push by [motion] held",
             (UPPER_BOUND, 0.9 * found.factor),
         )
-    return classify_motion(placed, joints, found.motion, flat, contacts, found.factor), doubt
+    return displaced_blocks.classify_motion(placed, joints, *moves), doubt
 
 
 def describe_ties(
@@ -237,7 +230,7 @@ def describe_ties(
     """Describe the forces of the ties at a factor; empty without ties."""
     if not placed.ties:
         return ""
-    shares, needs = find_tie_shares(placed, joints, coefficient, factor), []
+    shares, needs = displaced_blocks.find_tie_shares(placed, joints, coefficient, factor), []
     for share, tie in zip(shares, placed.ties, strict=True):
         size = tie.size / kN
         need = f"{share * size:.4g}" if share > 1e-4 else "none"

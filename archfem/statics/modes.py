@@ -7,7 +7,6 @@ of ω² below σ: this detects negative stiffness, and modes that were missed.
 References: Lehoucq, Sorensen and Yang, ARPACK users' guide (1998).
 """
 
-import hashlib
 from dataclasses import dataclass
 from functools import cached_property
 from numbers import Integral
@@ -20,15 +19,12 @@ from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, SuperLU, ei
 
 from archfem._display import ResultDisplay
 from archfem._files import align_columns
-from archfem._recent import RecentResults
 from archfem._threads import single_threaded
 from archfem._typing import Array, Flags
 from archfem._validation import check_type
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.models.model import Model
 from archfem.statics.equilibrium import Equilibrium, Start, Subject, resolve_start
-
-_recent_modes = RecentResults[tuple[Array, Array]](6)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -134,7 +130,7 @@ def modes(model: Model | Subject, count: int, start: Start = None) -> Modes:
             f"{count} modes of a model with {model.size} coordinates: ask for 1 to {model.size}"
         )
     try:
-        squares, shapes = _find_cached_modes(_tangent_at(model, state), model.mass, count)
+        squares, shapes = find_lowest_modes(_tangent_at(model, state), model.mass, count)
     except DidNotConverge as error:
         if not isinstance(state, Equilibrium):
             raise DidNotConverge(f"no modes with all joints closed: {error}") from error
@@ -144,17 +140,6 @@ def modes(model: Model | Subject, count: int, start: Start = None) -> Modes:
     masses = np.sum(influence * splu(model.mass.tocsc()).solve(influence), axis=0)
     signs = _shape_signs(shapes, shapes.T @ influence, masses)
     return Modes(model, np.sqrt(squares) / (2.0 * np.pi), shapes * signs, masses)
-
-
-def _find_cached_modes(
-    stiffness: sparse.csr_matrix, mass: sparse.csr_matrix, count: int
-) -> tuple[Array, Array]:
-    """Return the lowest ω² and their shapes, from the cache where all bits of K and M agree."""
-    digest = hashlib.sha256(str((count, stiffness.shape)).encode())
-    for matrix in (stiffness, mass):
-        for part in (matrix.indptr, matrix.indices, matrix.data):
-            digest.update(part.tobytes())
-    return _recent_modes.look_up(digest.digest(), lambda: find_lowest_modes(stiffness, mass, count))
 
 
 def find_lowest_modes(

@@ -419,7 +419,7 @@ def test_assessment_slides_as_the_limit_analysis_but_for_its_own_keys(monkeypatc
         assert not found.of_limit
     given = []
     monkeypatch.setattr(
-        "archfem.cases.analysis_keys.assess_parts",
+        "archfem.statics.mechanism_assessment.assess_parts",
         lambda *_, **options: given.append(options) or {},
     )
     parse_assessment({}, limit).solve(None, af.Eurocode8(ag=0.2, ground="B"), parts=True)

@@ -421,13 +421,13 @@ def searched(tmp_path, undrawn, monkeypatch):
     pulse = 2.5 * np.sin(np.pi * np.linspace(0.0, 1.0, 41))
     np.savetxt(tmp_path / "tap.txt", [*pulse, *np.zeros(60)])
     (tmp_path / "block.toml").write_text(PAIRS, encoding="utf-8")
-    names, compute = [], margin.collapse_scale
+    names, compute = [], motion_scaling.collapse_scale
 
     def search(analysis, motion, made=None):
         names.append(motion.name)
         return compute(analysis, motion, precision=1.0, made=made)
 
-    monkeypatch.setattr(margin, "collapse_scale", search)
+    monkeypatch.setattr(motion_scaling, "collapse_scale", search)
     return ["scale", str(tmp_path / "block.toml"), "--out", str(tmp_path / "out")], names
 
 

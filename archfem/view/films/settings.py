@@ -13,6 +13,7 @@ from archfem._validation import check_between, check_choice
 from archfem.dynamics.history import History
 from archfem.errors import InvalidInput
 from archfem.models.model import Cells, Model, check_coordinate_count
+from archfem.statics.stress import principal_values
 from archfem.units import MPa, mm
 from archfem.view.joint_marks import round_magnification, support_outlines
 from archfem.view.positions import FallingBlocks
@@ -69,8 +70,7 @@ def colour_values(cells: Cells, q: Array, colour: str) -> Array:
     if colour == "displacement":
         return np.linalg.norm(cells.displacement(q), axis=1) / mm
     assert cells.stress is not None, "checked by check_options"
-    xx, yy, xy = (cells.stress @ q).reshape(-1, 3).T / MPa
-    return 0.5 * (xx + yy) - np.hypot(0.5 * (xx - yy), xy)
+    return principal_values(*(cells.stress @ q).reshape(-1, 3).T / MPa)[1]
 
 
 def fit_scale(cells: Cells, fields: Array, colour: str) -> Scale:
