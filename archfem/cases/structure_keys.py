@@ -159,12 +159,12 @@ def _build_shape(settings: Table, folder: Path) -> Structure:
     """Build the structure of a case by its shape."""
     table, functions = settings.get("structure", {}), list_shapes()
     name = check_choice(table.get("shape"), "structure.shape", functions)
-    if name == "blocks":
-        return _read_blocks(settings)
     values = check_table(table, shape_keys(name), "structure")
-    fill = values.pop("fill", {})
     for key in ("shape", "standing"):
         values.pop(key, None)
+    if name == "blocks":
+        return _read_blocks(values, settings)
+    fill = values.pop("fill", {})
     values = _resolve_names(functions[name], values, settings)
     values = _shape_parts(name, values, settings)
     if name == "outlines":
@@ -185,13 +185,10 @@ def keys_of_part(declaration: Callable[..., Any]) -> dict[str, Any]:
     return declared_keys(declaration, named=(Material, Contact))
 
 
-def _read_blocks(settings: Table) -> Structure:
+def _read_blocks(values: dict[str, Any], settings: Table) -> Structure:
     """Return a structure whose blocks and joints are listed; without joints these are found."""
-    values = check_table(settings["structure"], shape_keys("blocks"), "structure")
     shared = {"material": values.pop("material", "stone")}
     contact = values.pop("contact", "stone to stone")
-    for key in ("shape", "standing"):
-        values.pop(key, None)
     blocks = [
         _read_part(Block, {**shared, **part}, f"structure.blocks[{k}]", settings)
         for k, part in enumerate(values.pop("blocks", ()))

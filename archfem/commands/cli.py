@@ -174,9 +174,8 @@ def _add_case_command(
 def _add_case_commands(commands: Any) -> None:
     """Add the commands that take a case file."""
     add = partial(_add_case_command, commands)
-    add("run", "dead load, time histories, tables and pictures")(
-        "--workers", type=int, default=1, help="processes for pairs of a suite (1)"
-    )
+    add_to = add("run", "dead load, time histories, tables and pictures")
+    add_to("--workers", type=int, default=1, help="processes for pairs of a suite (1)")
     add("check", "read a case, build its model and find its dead load", "", module="tools")
     about = "frequencies, masses and shapes of vibrations about dead load"
     add("modes", about)("--count", type=int, default=6, help="how many modes (6)")
@@ -189,9 +188,8 @@ def _add_case_commands(commands: Any) -> None:
     add_to = add("assess", about, "folder for text and pictures (none)", required=False)
     add_to("--parts", action="store_true", help="each part by itself")
     _add_rating(add)
-    add("mesh", "write the mesh of a case as a gmsh file", "")(
-        "--out", required=True, metavar="FILE.msh", help="the mesh file"
-    )
+    add_to = add("mesh", "write the mesh of a case as a gmsh file", "")
+    add_to("--out", required=True, metavar="FILE.msh", help="the mesh file")
     about = "does it fall, whatever its uncertain properties are?"
     of_margin = partial(add, required=False, module="margin")
     add_to = of_margin("verdict", about, "folder that keeps all runs (none)")

@@ -12,15 +12,9 @@ from typing import Any
 
 from archfem._typing import NumberOrWord
 from archfem._validation import declared_keys, is_number
-from archfem.cases import (
-    analysis_keys,
-    analysis_tables,
-    case,
-    motion_keys,
-    risk_keys,
-    structure_keys,
-    verdict_keys,
-)
+from archfem.cases import analysis_keys, analysis_tables, case, motion_keys, structure_keys
+from archfem.cases.risk_keys import ALTERNATIVE_KEYS, HAZARD_KEYS
+from archfem.cases.verdict_keys import RANGES
 from archfem.dynamics import schemes
 from archfem.dynamics.analysis import Analysis
 from archfem.dynamics.events import EVENTS
@@ -197,9 +191,9 @@ def _other_values() -> dict[str, Schema]:
         "vehicle": _one_or_several(vehicle),
         "loads": _list(_table_of(AttachedLoad)),
         "limit_state": _any([{"type": "string"}, _table_of(LimitState)]),
-        "hazard": _table(risk_keys.HAZARD_KEYS, measure=_choice(*MEASURES)),
-        "alternatives": _by_name(_table(risk_keys.ALTERNATIVE_KEYS)),
-        "vary": _object({name: _range_of(*labels) for name, labels in verdict_keys.RANGES.items()}),
+        "hazard": _table(HAZARD_KEYS, measure=_choice(*MEASURES)),
+        "alternatives": _by_name(_table(ALTERNATIVE_KEYS)),
+        "vary": _object({name: _range_of(*labels) for name, labels in RANGES.items()}),
         "stages": _any([_choice("none", "usual"), _list(_table_of(Stage))]),
     }
 

@@ -39,13 +39,8 @@ from archfem.joints.contact_law import exceeds_limit
 from archfem.joints.operator import JointOperator
 from archfem.models.linear_blocks import LinearBlockModel
 from archfem.models.model import Model
-from archfem.statics.newton import (
-    CONVEX_SEARCHES,
-    MAX_ROUND_OFF_RESIDUAL,
-    EquilibriumSolver,
-    Solution,
-    load_magnitude,
-)
+from archfem.statics import newton
+from archfem.statics.newton import CONVEX_SEARCHES, EquilibriumSolver, Solution, load_magnitude
 
 # Equilibria under one load, between which joints may slide or break
 MAX_IRREVERSIBLE_ITERATIONS = 1000
@@ -174,7 +169,7 @@ def _relaxation_tolerance(solver: EquilibriumSolver, model: Model, q: Array, sca
     """Return the accepted residual: the tolerance, or the round-off of large motions [N]."""
     rounding = 8.0 * np.finfo(float).eps * np.linalg.norm(abs(model.tangent(q)) @ abs(q))
     tolerance = max(solver.settings.tolerance * scale, float(rounding))
-    return min(tolerance, MAX_ROUND_OFF_RESIDUAL * scale)
+    return min(tolerance, newton.MAX_ROUND_OFF_RESIDUAL * scale)
 
 
 def has_irreversible_joints(model: Model) -> bool:

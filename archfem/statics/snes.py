@@ -101,16 +101,11 @@ class PetscNewton:
         snes.setJacobian(self._load_tangent, self._matrix)
         snes.setConvergenceTest(self._test_convergence)
         prefix = next(_prefixes)
-        settings = {
-            "snes_linesearch_type": search,
-            "snes_linesearch_max_it": "40",
-            "snes_max_it": str(max_iterations),
-            "ksp_type": "preonly",
-            **({} if "pc_type" in self._options else LU),
-            **self._options,
-        }
+        settings = {"snes_linesearch_type": search, "snes_linesearch_max_it": "40"}
+        settings |= {"snes_max_it": str(max_iterations), "ksp_type": "preonly"}
+        factors = {} if "pc_type" in self._options else LU
         snes.setOptionsPrefix(prefix)
-        with _set_options(prefix, settings):
+        with _set_options(prefix, {**settings, **factors, **self._options}):
             snes.setFromOptions()
             self._record_read(prefix)
         return snes
@@ -137,9 +132,7 @@ class PetscNewton:
     def _evaluate(self, snes: PETSc.SNES, q: PETSc.Vec, result: PETSc.Vec) -> None:
         result.array[:] = self._call(self._equations.residual, q)  # type: ignore[union-attr]
 
-    def _test_convergence(
-        self, snes: PETSc.SNES, iteration: int, norms: tuple[float, float, float]
-    ) -> int:
+    def _test_convergence(self, snes: PETSc.SNES, iteration: int, norms: tuple[float, ...]) -> int:
         reasons = PETSc.SNES.ConvergedReason
         if not np.isfinite(norms[2]):
             return _NAN_REASON

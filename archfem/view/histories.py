@@ -19,16 +19,8 @@ from archfem._typing import Array, Flags
 from archfem._validation import validate_arguments
 from archfem.dynamics.history import History
 from archfem.errors import InvalidInput
-from archfem.joints.criteria import (
-    HEAD_COORDINATE,
-    Criteria,
-    assessed_joints,
-    describe_assessed_joints,
-    envelope,
-    part_roles,
-    sliding_limits,
-    step_lengths,
-)
+from archfem.joints import criteria
+from archfem.joints.criteria import Criteria, assessed_joints, describe_assessed_joints
 from archfem.masonry.structure import Structure
 from archfem.view import style
 from archfem.view.structure import MAX_NAME_LETTERS
@@ -148,7 +140,7 @@ def _draw_band(
     axes: Axes, places: Array, joints: xr.Dataset, look: dict[str, Any], *, shade: float
 ) -> None:
     """Draw the least and the largest eccentricity of joints, dotted if the band is not shaded."""
-    span = envelope(joints)
+    span = criteria.envelope(joints)
     look = {"lw": 1.1, "marker": "o", "ms": 2.2} | look
     if shade > 0.0:
         low, high = span["lowest"], span["highest"]
@@ -216,8 +208,8 @@ def _heights_differ(states: Iterable[xr.Dataset], part: str) -> bool:
 def _is_wall(joints: xr.Dataset, part: str) -> bool:
     """Return whether a part is a wall in bond, whose joints have heights."""
     own = _joints_of_part(joints, part)
-    has_coordinates = {HEAD_COORDINATE, "height"} <= {*own.coords}
-    return has_coordinates and bool(own[HEAD_COORDINATE].any())
+    has_coordinates = {criteria.HEAD_COORDINATE, "height"} <= {*own.coords}
+    return has_coordinates and bool(own[criteria.HEAD_COORDINATE].any())
 
 
 def _make_panels(
@@ -233,8 +225,8 @@ def _make_panels(
     every = [joints for several in states.values() for joints in several]
     for joints in every:
         assessed = assessed_joints(joints)
-        roles |= part_roles(assessed)
-        for part in part_roles(assessed):
+        roles |= criteria.part_roles(assessed)
+        for part in criteria.part_roles(assessed):
             own = _joints_of_part(assessed, part)["name"].values.astype(str).tolist()
             names[part] = max(names.get(part, []), own, key=len)
     parts = sorted(names, key=lambda part: roles[part] != "ring")
@@ -433,12 +425,12 @@ def _draw_eccentricity(axes: Axes, joint: xr.Dataset, label: str) -> None:
 def _draw_friction(axes: Axes, joint: xr.Dataset) -> None:
     """Draw mobilised friction with the sign of the shear force, between its limits."""
     style.style_axes(axes, "", "V / N [-]")
-    criteria = Criteria.of(joint)
-    limit = float(criteria.coefficients(joint["friction_limit"].values))
+    own = Criteria.of(joint)
+    limit = float(own.coefficients(joint["friction_limit"].values))
     ratio = np.sign(joint["V"].values) * joint["friction"].values
     if np.isfinite(limit):  # else the joint cannot slide
         # cohesion raises the limits above the coefficient
-        limits = np.nan_to_num(sliding_limits(joint, criteria), nan=limit)
+        limits = np.nan_to_num(criteria.sliding_limits(joint, own), nan=limit)
         _draw_friction_limits(axes, joint["time"].values, ratio, limits)
         look: dict[str, Any] = {"va": "bottom", "xycoords": ("axes fraction", "data")}
         look |= {"ha": "right", "color": Colour.SLIDING}
@@ -484,7 +476,8 @@ def most_stressed_joints(run: History) -> list[int]:
     e = abs(own["eccentricity"]).max("time").fillna(0.5).values
     first = int(np.argmax(e))
     use = (own["friction"] / own["friction_limit"]).max("time").fillna(0.0).values
-    slid = (own["slide"].transpose("time", "joint").values * step_lengths(run.time)[:, None]).sum(0)
+    steps = criteria.step_lengths(run.time)[:, None]
+    slid = (own["slide"].transpose("time", "joint").values * steps).sum(0)
     order = np.lexsort([-e, -np.where(np.isfinite(use), use, 0.0), -np.round(slid, 9)])
     twin = _mirror_images(run.structure, numbers, first)
     others = [k for k in order if k != first and not twin[k]] or [k for k in order if k != first]

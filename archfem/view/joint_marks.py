@@ -63,9 +63,8 @@ class Marker:
         carried = (1.0 - share) * shift[:, 0] + share * shift[:, 1]
         side = np.where(shown, hinge, 0)
         hinged = np.flatnonzero(side)
-        slips = [
-            self._slip_arrows(int(k), ends[k], shear[k]) for k in np.flatnonzero(shown & slide)
-        ]
+        sliding = np.flatnonzero(shown & slide).tolist()
+        slips = [self._slip_arrows(k, ends[k], shear[k]) for k in sliding]
         thrust = carried + self.points(e)
         links = thrust[self._pairs]
         return Marks(
@@ -189,6 +188,5 @@ def joints_of_state(
         )
     observer, moved = model.observer(), model.large_displacements
     faces = observer.faces(observer.read(q)) if moved else None
-    return joint_dataset(
-        model.structure, model.resultants(q), criteria=criteria, faces=faces, moved=moved
-    )
+    given = model.structure, model.resultants(q)
+    return joint_dataset(*given, criteria=criteria, faces=faces, moved=moved)

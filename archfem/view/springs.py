@@ -121,9 +121,7 @@ def _spring_lines(model: Model, chosen: Numbers, shifts: Array) -> Array:
     cells, structure = model.cells, model.structure
     ends = np.repeat(_spring_places(model, chosen)[:, None], 2, axis=1)
     for number, joint in enumerate(_joint_points(model).joint[chosen]):
-        for side, block in enumerate(
-            (structure.joints[joint].lower, structure.joints[joint].higher)
-        ):
+        for side, block in enumerate(structure.pairs[joint]):
             own = np.flatnonzero(cells.block == block)
             if len(own):  # supports have no cells, and stay in place
                 away = np.linalg.norm(cells.places[own] - ends[number, side], axis=1)

@@ -167,10 +167,8 @@ def _draw_crosses(axes: Axes, cells: Cells, stress: Array, blocks: Numbers) -> N
     direction = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
     arm = 0.5 * spacing * np.abs(share)[..., None] * direction
     ends = np.stack([middle - arm, middle + arm], axis=2)
-    for sign, colour, name in (
-        (-1.0, Colour.TEXT, "compression"),
-        (1.0, Colour.MECHANISM, "tension"),
-    ):
+    pressed, pulled = (-1.0, Colour.TEXT, "compression"), (1.0, Colour.MECHANISM, "tension")
+    for sign, colour, name in (pressed, pulled):
         # shorter arms, relative to the longest, are left out
         lines = ends[sign * share > 0.08]
         if len(lines):
@@ -184,12 +182,11 @@ def _group_cells(corners: Array, centre: Array, spacing: float, size: int = 4) -
     # principal axes of the block: the grid follows an inclined voussoir
     axes = np.linalg.svd(corners - middle, full_matrices=False)[2]
     along, local = (corners - middle) @ axes.T, (centre - middle) @ axes.T
-    low, high = along.min(axis=0), along.max(axis=0)
-    spacing = max(spacing, np.sqrt(size * np.prod(high - low) / len(centre)))
-    counts = np.maximum(1, np.round((high - low) / spacing)).astype(int)
-    steps = [
-        a + (np.arange(n) + 0.5) * (b - a) / n for a, b, n in zip(low, high, counts, strict=True)
-    ]
+    low, extent = along.min(axis=0), np.ptp(along, axis=0)
+    spacing = max(spacing, np.sqrt(size * np.prod(extent) / len(centre)))
+    counts = np.maximum(1, np.round(extent / spacing)).astype(int)
+    sides = zip(low, extent, counts, strict=True)
+    steps = [start + (np.arange(n) + 0.5) * length / n for start, length, n in sides]
     groups = []
     for place in np.stack(np.meshgrid(*steps), axis=-1).reshape(-1, 2):
         distance = np.linalg.norm(local - place, axis=1)

@@ -172,14 +172,12 @@ def set_title(axes: Axes, text: str) -> None:
         width *= ratios[list(place.colspan)].sum() / ratios.sum()
     width -= 0.3  # labels of the axis at the left shift the panel
     text, letters = " ".join(text.split()), max(int(width / text_width(1, Size.TITLE)), 12)
-    lines = fill(text, letters, initial_indent=indent, break_long_words=False)
-    # capitals are 0.2 of the font size wider than other letters
-    room = letters
-    while letters > 12 and any(
-        len(line) + 0.35 * sum(map(str.isupper, line)) > room for line in lines.splitlines()
-    ):
-        letters -= 1
-        lines = fill(text, letters, initial_indent=indent, break_long_words=False)
+    for narrower in range(letters, 11, -1):
+        lines = fill(text, narrower, initial_indent=indent, break_long_words=False)
+        # capitals are 0.2 of the font size wider than other letters
+        wide = [len(line) + 0.35 * sum(map(str.isupper, line)) for line in lines.splitlines()]
+        if max(wide, default=0.0) <= letters:
+            break
     lines = lines.removeprefix(indent)
     axes.set_title(lines, fontsize=Size.TITLE, color=Colour.TEXT, parse_math=False)
 

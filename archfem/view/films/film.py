@@ -19,15 +19,9 @@ from archfem.models.model import Model
 from archfem.statics.equilibrium import Equilibrium
 from archfem.statics.modes import Modes
 from archfem.view import joint_marks
+from archfem.view.films import frames
 from archfem.view.films.encoder import Image, film_path, write_film
-from archfem.view.films.frames import (
-    Frame,
-    Window,
-    frame_of_state,
-    frame_timing,
-    frames_of_fall,
-    frames_of_run,
-)
+from archfem.view.films.frames import Frame, Window
 from archfem.view.films.renderer import FrameLayout, FramePainter
 from archfem.view.films.settings import Setup, check_film, check_options
 from archfem.view.positions import FallingBlocks, fields_at, recorded_fields
@@ -93,7 +87,7 @@ def film(  # noqa: PLR0913  (a film has many settings)
     falls = FallingBlocks.of(model.structure, run)
     known = recorded_fields(run)[0]
     known = known if falls is None else np.append(known, falls.times[1:])
-    timing = frame_timing(run, known, fps, seconds, window)
+    timing = frames.frame_timing(run, known, fps, seconds, window)
     held = _times_before_fall(timing.times, falls)
     setup = Setup.of(model, fields_at(run, held), colour, magnification).with_falls(falls)
     if mechanism is not None and mechanism.moved.blocks:
@@ -103,11 +97,11 @@ def film(  # noqa: PLR0913  (a film has many settings)
     if page:
         from archfem.view.films.viewer import write_scenes
 
-        frames = _frames(setup, run, _thin(timing.times, setup))
-        return write_scenes(target, setup, run, frames)
+        shown = _frames(setup, run, _thin(timing.times, setup))
+        return write_scenes(target, setup, run, shown)
     layout = FrameLayout(setup, size, run.joints, run, painter)
-    frames = _frames(setup, run, timing.times)
-    bar = tqdm(frames, total=len(timing.times), unit="frame", disable=None, leave=False)
+    drawn = _frames(setup, run, timing.times)
+    bar = tqdm(drawn, total=len(timing.times), unit="frame", disable=None, leave=False)
     pairs = zip(bar, timing.speeds, strict=True)
     images = (layout.compose(frame, float(speed)) for frame, speed in pairs)
     return write_film(target, images, timing.fps)
@@ -128,9 +122,9 @@ def _times_before_fall(times: Array, falls: FallingBlocks | None) -> Array:
 def _frames(setup: Setup, run: History, times: Array) -> Iterator[Frame]:
     """Yield the frames of a run, and of the fall that may follow."""
     held = _times_before_fall(times, setup.falls)
-    yield from frames_of_run(setup, run, held, fields_at(run, held))
+    yield from frames.frames_of_run(setup, run, held, fields_at(run, held))
     if setup.falls is not None:
-        yield from frames_of_fall(setup, setup.falls, times[len(held) :])
+        yield from frames.frames_of_fall(setup, setup.falls, times[len(held) :])
 
 
 @validate_arguments
@@ -167,7 +161,7 @@ def picture(
     model, q = joint_marks.model_and_coordinates(model, q)
     joints = joint_marks.joints_of_state(model, q, joints, criteria)
     setup = Setup.of(model, q[None], colour, magnification)
-    image = FrameLayout(setup, size, joints).compose(frame_of_state(setup, q, joints))
+    image = FrameLayout(setup, size, joints).compose(frames.frame_of_state(setup, q, joints))
     return image[..., :3].copy()
 
 
@@ -206,14 +200,14 @@ def film_modes(
 
 
 def _draw_swings(
-    figure: Figure, panels: Sequence[ModePanel], swings: int, frames: int = 32
+    figure: Figure, panels: Sequence[ModePanel], swings: int, count: int = 32
 ) -> Iterator[Image]:
     """Yield the images of several oscillations, cropped to even numbers of pixels."""
     figure.set_dpi(100.0)
     canvas = FigureCanvasAgg(figure)
     canvas.draw()
     figure.set_layout_engine("none")  # only blocks move, so that the layout need not be repeated
-    for turn in np.tile(np.arange(frames) / frames, swings):
+    for turn in np.tile(np.arange(count) / count, swings):
         for panel in panels:
             panel.show_phase(float(np.sin(2.0 * np.pi * turn)))
         canvas.draw()

@@ -228,12 +228,11 @@ class Viewer:
         self.plotter = self._scene.plotter
         self._scene.add_colour_bar()
         times = recorded_fields(run)[0]
-        self.at(float(times[0]))
+        first, last = times[0], times[-1]
+        self.at(float(first))
         style = {"title": "time [s]", "title_height": 0.02, "color": Colour.EDGE}
-        ends = {"pointa": (0.2, 0.92), "pointb": (0.8, 0.92)}
-        self.plotter.add_slider_widget(
-            self.at, (times[0], times[-1]), value=times[0], **style, **ends
-        )
+        place = {"pointa": (0.2, 0.92), "pointb": (0.8, 0.92), "value": first}
+        self.plotter.add_slider_widget(self.at, (first, last), **style, **place)
 
     def show(self, **options: Any) -> Any:
         """Open the viewer.
