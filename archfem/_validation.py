@@ -185,14 +185,11 @@ def is_number(value: Any) -> bool:
 
 def check_integer(value: Any, name: str, *, minimum: int = 1, maximum: int = 2**62) -> int:
     """Return an integer within bounds as an int."""
+    given = f"{name} = {short_repr(value)}"
     if not isinstance(value, Integral) or isinstance(value, bool) or value < minimum:
-        raise InvalidInput(
-            f"{name} = {short_repr(value)} is not a whole number of at least {minimum}"
-        )
+        raise InvalidInput(f"{given} is not a whole number of at least {minimum}")
     if int(value) > maximum:
-        raise InvalidInput(
-            f"{name} = {short_repr(value)} is above {maximum}, the most there is room for"
-        )
+        raise InvalidInput(f"{given} is above {maximum}, the most there is room for")
     return int(value)
 
 

@@ -40,18 +40,10 @@ from archfem.masonry.structure import Joint, Structure, join_joint_names, join_n
 from archfem.models.construction import PartialStructure
 from archfem.models.linear_blocks import LinearBlockModel
 from archfem.models.model import Doubt, Model, check_model
+from archfem.statics import relaxation
 from archfem.statics.fill_checks import doubt_pieces, doubt_whole_fill, stands_as_rigid_blocks
 from archfem.statics.newton import EquilibriumSolver, Newton
-from archfem.statics.relaxation import (
-    MovesOn,
-    Search,
-    SearchSequence,
-    linear_predictor,
-    relax,
-    solve_irreversible,
-    solve_local,
-    solve_or_relax,
-)
+from archfem.statics.relaxation import linear_predictor, relax, solve_irreversible, solve_or_relax
 from archfem.units import GPa, MPa, format_mm, mm
 
 # Median depth of a ring's joints above which a wrong unit is likely [m]: of arches that span more
@@ -303,7 +295,7 @@ def _describe_moving_pieces(model: Model, newton: Newton | None) -> str:
         return ""
     try:
         relax(_create_solver(model, newton), model, self_weight(model), np.zeros(model.size))
-    except MovesOn as moves_on:
+    except relaxation.MovesOn as moves_on:
         observer = model.observer()
         before, after = (observer.faces(observer.read(q)) for q in moves_on.steps)
         motion = [new - old for new, old in zip(after, before, strict=True)]
@@ -370,7 +362,7 @@ def equilibrium_under(model: Model, load: Array, newton: Newton | None = None) -
 
 
 def _load_from_rest(
-    model: Model, load: Array, newton: Newton | None, first_search: Search
+    model: Model, load: Array, newton: Newton | None, first_search: relaxation.Search
 ) -> Equilibrium:
     """Find the equilibrium under a load; the first search tries the whole of it."""
     solver = _create_solver(model, newton)
@@ -409,7 +401,7 @@ def _move_supports(
 
     # where full Newton steps do not converge the motion is halved: a search far from the start may
     # end in an equilibrium that the loading path does not reach
-    searches = solve_local, solve_local, solve_or_relax
+    searches = relaxation.solve_local, relaxation.solve_local, solve_or_relax
     return _increment_load(solver, state, at, "settlement", searches)
 
 
@@ -444,7 +436,7 @@ def _increment_load(
     state: Equilibrium,
     at: Callable[[float], tuple[Model, Array]],
     what: str,
-    searches: SearchSequence = (solve_or_relax, solve_irreversible, solve_irreversible),
+    searches: relaxation.SearchSequence = (solve_or_relax, solve_irreversible, solve_irreversible),
 ) -> Equilibrium:
     """Follow an equilibrium while a load or motion grows; `at(factor)` returns model and load."""
     # by default the structure may relax, once, to all of a load

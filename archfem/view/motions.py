@@ -74,7 +74,7 @@ def draw_spectra(motions: Sequence[Motion], *, damping: float = 0.05) -> Figure:
         for index, motion in enumerate(motions):
             if name in motion.components:
                 values = response_spectrum(motion, SPECTRUM_PERIODS, damping, component=name)
-                _draw_spectrum(axis, values, index, motion.name, width=1.0)
+                _draw_spectrum(axis, values, index, motion.name)
         alone = name == "horizontal" and any(len(motion.components) == 1 for motion in motions)
         _label_panel(axis, "horizontal or only component" if alone else name)
     style.add_legend_below(figure)
@@ -145,7 +145,7 @@ def draw_suite(suite: Suite, target: DesignSpectrum | None = None) -> Figure:
     for axis, name in zip(axes, names, strict=True):
         values = suite.spectra(SPECTRUM_PERIODS, component=name)
         for index, (pair, row) in enumerate(zip(suite.pairs, values, strict=True)):
-            _draw_spectrum(axis, row, index, pair.name, width=1.0)
+            _draw_spectrum(axis, row, index, pair.name)
         mean = values.mean(axis=0) / STANDARD_GRAVITY
         axis.plot(SPECTRUM_PERIODS, mean, Colour.TEXT, lw=1.8, label="mean")
         if target is not None:
@@ -193,12 +193,12 @@ def draw_selection(found: RecordSelection) -> Figure:
     return figure
 
 
-def _draw_spectrum(axes: Axes, values: Array, index: int, name: str, *, width: float) -> None:
+def _draw_spectrum(axes: Axes, values: Array, index: int, name: str) -> None:
     """Draw one of several spectra [m/s²], with its own colour and dashes."""
     # colours repeat after a cycle, with other dashes; the last one, black, is that of the mean
     colours = Colour.LINES[:-1]
     cycle, place = divmod(index, len(colours))
-    look = {"color": colours[place], "ls": ("-", "--", ":", "-.")[cycle % 4], "lw": width}
+    look = {"color": colours[place], "ls": ("-", "--", ":", "-.")[cycle % 4], "lw": 1.0}
     axes.plot(SPECTRUM_PERIODS, values / STANDARD_GRAVITY, label=name, **look)
 
 
