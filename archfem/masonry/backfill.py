@@ -15,9 +15,10 @@ Bolander and Saito, Engineering Fracture Mechanics 61 (1998) 569-591, for Vorono
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from math import radians, sqrt, tan
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+import shapely
 
 from archfem._typing import Angle, Array, Metres, Pascals
 from archfem._validation import check_between, check_number, validate_arguments
@@ -29,9 +30,6 @@ from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import CONTACT_TOLERANCE, Joint, Structure
 from archfem.units import in_degrees
 
-if TYPE_CHECKING:
-    from shapely import Polygon
-
 # Area of a whole piece, over the square of its longest side [-]
 TILE_AREA = sqrt(3.0) / 8.0
 
@@ -39,7 +37,7 @@ TILE_AREA = sqrt(3.0) / 8.0
 class _Piece(NamedTuple):
     """Part of a tile inside the outline, and the incentre of the whole tile."""
 
-    polygon: "Polygon"
+    polygon: shapely.Polygon
     centre: Array  # (2,) [m]
 
 
@@ -149,8 +147,6 @@ def _incentre(corners: Array) -> Array:
 
 def cut_block(block: Block, size: float) -> list[_Piece]:
     """Cut a block into pieces; slivers are merged with their main neighbour."""
-    import shapely
-
     outline = block.drawn()
     body = shapely.Polygon(outline)
     low, high = outline.min(axis=0), outline.max(axis=0)
@@ -166,8 +162,6 @@ def cut_block(block: Block, size: float) -> list[_Piece]:
 
 def _merge_slivers(pieces: list[_Piece], min_area: float, grid: float) -> list[_Piece]:
     """Merge pieces below an area [m²] with the neighbour of the longest common edge."""
-    import shapely
-
     alone: list[_Piece] = []
     while pieces:
         smallest = min(pieces, key=lambda piece: piece.polygon.area)

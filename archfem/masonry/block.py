@@ -9,6 +9,7 @@ from math import hypot, sqrt
 from typing import Any
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 
 from archfem._typing import Array, Metres, Numbers
@@ -62,8 +63,6 @@ def triangulate_polygon(points: Array, tolerance: float = 0.0) -> Numbers:
 
     Vertices are left out that are nearer than a tolerance [m] to the outline of the others.
     """
-    import shapely
-
     outline = shapely.Polygon(points).simplify(tolerance)
     triangles = shapely.constrained_delaunay_triangles(outline)
     # a ring of a triangle repeats its first vertex
@@ -209,8 +208,6 @@ class Block:
                 f"points {first + 1} and {(first + 1) % count + 1} of its {count}: leave one out"
             )
         if self.area <= 0.0:
-            import shapely
-
             simple = shapely.LinearRing(self.outline).is_simple
             remedy = "anticlockwise" if simple else "without edges that cross"
             raise InvalidStructure(
@@ -273,8 +270,6 @@ class Block:
         Args:
             other: the block, or the point (x, y) [m].
         """
-        import shapely
-
         own = shapely.Polygon(self.drawn())
         if isinstance(other, Block):
             return float(shapely.distance(own, shapely.Polygon(other.drawn())))
@@ -354,8 +349,6 @@ def say_place(point: Point) -> str:
 
 def check_simple(outline: Array, name: str, place: Callable[[Point], str] = say_place) -> None:
     """Refuse an outline that crosses or touches itself."""
-    import shapely
-
     polygon = shapely.Polygon(outline)
     if not polygon.is_valid:
         x, y = shapely.is_valid_reason(polygon).rstrip("]").partition("[")[2].split()
@@ -414,8 +407,6 @@ def say_others(rank: str, found: Sequence[Fault], place: Callable[[Point], str])
 
 def find_neighbours(outlines: Sequence[Array], near: float) -> tuple[Numbers, Numbers]:
     """Return the numbers of outlines within a distance of each other, each pair twice (2, n)."""
-    import shapely
-
     polygons = np.array([shapely.Polygon(points) for points in outlines])
     one, other = shapely.STRtree(polygons).query(polygons, predicate="dwithin", distance=near)
     return one, other
@@ -425,8 +416,6 @@ def find_overlaps(
     outlines: Sequence[Array], body: Numbers | None
 ) -> tuple[Numbers, NDArray[np.object_], Array, Array]:
     """Return pairs (n, 2) of different bodies that meet, overlaps, areas, mean depths [m², m]."""
-    import shapely
-
     polygons = np.array([shapely.Polygon(points) for points in outlines])
     pairs = shapely.STRtree(polygons).query(polygons, predicate="intersects").T
     numbers = np.arange(len(polygons)) if body is None else body

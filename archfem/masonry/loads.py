@@ -6,6 +6,7 @@ from math import hypot
 from typing import Any
 
 import numpy as np
+import shapely
 
 from archfem._typing import Array, Metres, Newtons
 from archfem._validation import check_between, check_integer, check_number, check_numbers
@@ -108,8 +109,6 @@ class PointLoad:
 
     def _place_at_height(self, structure: Structure, point: Array) -> tuple[int, Array]:
         """Return the highest block that has a point (2,) [m], and the point."""
-        import shapely
-
         outlines = np.array([shapely.Polygon(structure.blocks[n].drawn()) for n in structure.free])
         away = shapely.distance(outlines, shapely.Point(point))
         if away.min() > 1e-3 * structure.size:  # chords for arcs, and coordinates in print

@@ -9,6 +9,7 @@ from itertools import compress, pairwise
 from typing import Any
 
 import numpy as np
+import shapely
 
 from archfem._typing import Array, Metres
 from archfem._validation import check_between, validate_arguments
@@ -201,8 +202,6 @@ def _find_piers(wall: Structure, foot: float) -> Iterator[tuple[float, float, Ar
     A pier carries the wall up to the middle of the openings beside it, but what is below their
     heads.
     """
-    import shapely
-
     far = 1e4  # beyond any wall
     stones = np.array([shapely.Polygon(wall.blocks[number].drawn()) for number in wall.free])
     low, _, high, _ = shapely.total_bounds(stones).tolist()
@@ -228,8 +227,6 @@ def find_openings(
 
     They are holes between the stones and the level of the foot, by default that of the stones.
     """
-    import shapely
-
     if not wall.heads.any():
         return []
     polygons = np.array([shapely.Polygon(block.drawn()) for block in wall.blocks])

@@ -16,6 +16,7 @@ from itertools import combinations, product
 from typing import Any, ClassVar, Protocol, TypeVar
 
 import numpy as np
+import shapely
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
@@ -302,8 +303,6 @@ def find_undivided(
 
 def _measure_hollow(block: Block, one: Array, other: Array) -> tuple[float, float]:
     """Return the distance of two joints and the hollow of a stone between, relative to depths."""
-    import shapely
-
     span = float(np.linalg.norm((other - one).mean(axis=0)) / np.linalg.norm(one[1] - one[0]))
     # the ends of an inner face are nearest to one another
     start, end = min(product(one, other), key=lambda pair: float(np.linalg.norm(pair[1] - pair[0])))

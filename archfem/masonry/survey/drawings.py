@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import shapely
 
 from archfem._files import atomic_write, check_file, read_text
 from archfem._optional import require_package
@@ -335,8 +336,6 @@ def _read_dxf(
 
 def _find_texts(outlines: Sequence[Outline], texts: Sequence[tuple[str, Array]]) -> list[list[str]]:
     """Return the texts inside each outline: each in the smallest one of those around it."""
-    import shapely
-
     shapes = np.array([shapely.Polygon(each.points) for each in outlines])
     # an outline that crosses itself has its text, if it is within its hull
     shapes = np.where(shapely.is_valid(shapes), shapes, shapely.convex_hull(shapes))
@@ -595,7 +594,6 @@ def write_dxf(
 ) -> Path:
     """Write outlines with names, and optional lines, as a DXF drawing."""
     import ezdxf
-    import shapely
 
     drawing = ezdxf.new("R2010", units=ezdxf.units.M)  # type: ignore[attr-defined]
     space = drawing.modelspace()

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import shapely
 
 from archfem._typing import Array
 from archfem.errors import Fault, InvalidInput, InvalidStructure
@@ -37,8 +38,6 @@ def find_faults(closed: Sequence[Outline], snap: float, error: str) -> dict[str,
     Overlaps and gaps are those that close_gaps names, and apart from them overlaps that snap
     closes. Where all fits, stones that the error names are not joined.
     """
-    import shapely
-
     if not closed:
         return {}
     factor, names = closed[0].frame.factor, [each.name for each in closed]
@@ -82,8 +81,6 @@ def find_faults(closed: Sequence[Outline], snap: float, error: str) -> dict[str,
 
 def _trace_gap(pair: Sequence[Any], whole: Any, place: Array, widest: float) -> Array:
     """Return the outline of the gap at a place between two stones, or the place (n, 2)."""
-    import shapely
-
     # what is narrower than the reach to both sides closes where the outline grows and shrinks
     grown = shapely.buffer(
         shapely.union_all(pair), 0.5 * widest, join_style="mitre", mitre_limit=10.0
@@ -98,8 +95,6 @@ def _trace_gap(pair: Sequence[Any], whole: Any, place: Array, widest: float) -> 
 
 def _trace(shapes: Any, mean: float) -> list[Array]:
     """Return the outlines of what is deeper in the mean than a length."""
-    import shapely
-
     parts = shapely.get_parts(shapely.get_parts(shapes))
     parts = parts[shapely.area(parts) > 0.0]
     deep = 2.0 * shapely.area(parts) / shapely.length(parts) > mean
@@ -108,8 +103,6 @@ def _trace(shapes: Any, mean: float) -> list[Array]:
 
 def _find_unjoined(stone: Any, polygons: Any, near: float) -> list[Array]:
     """Return the faces nearest to a stone among those that snap does not join to it."""
-    import shapely
-
     away = shapely.distance(stone, polygons)
     least = away[away > near].min(initial=np.inf)
     if least > 0.1 * stone.length:

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import shapely
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
@@ -191,8 +192,6 @@ def _describe_ignored(
     """Describe what ignored layers of a DXF file hold beside outlines: see `Survey`."""
     if path.suffix.lower() != ".dxf" or not ignored:
         return {}
-    import shapely
-
     words = dict[str, str]()
     stones = shapely.make_valid(np.array([shapely.Polygon(each.drawn) for each in outlines]))
     others = [each for each in load_dxf(path, Counter())[0] if each.kind not in POLYLINES]
@@ -221,8 +220,6 @@ def _find_lost(
     """Yield outlines on ignored layers of a DXF file that lie between stones: see `Survey`."""
     if path.suffix.lower() != ".dxf" or not any(ignored.values()):
         return
-    import shapely
-
     stones = shapely.make_valid(np.array([shapely.Polygon(each.points) for each in outlines]))
     whole, usual = shapely.union_all(stones), float(np.median(shapely.area(stones)))
     near = shapely.buffer(whole, AMBIGUOUS_GAP_RATIO * snap)
@@ -612,8 +609,6 @@ def _check_gaps(
     places: Array, boundaries: Boundaries, outlines: list[Outline], widest: float
 ) -> None:
     """Refuse blocks with a gap between their faces that is no wider than a length."""
-    import shapely
-
     near = CONTACT_TOLERANCE * float(np.linalg.norm(np.ptp(places, axis=0)))
     polygons = [shapely.Polygon(places[boundary]) for boundary in boundaries]
     tree = shapely.STRtree(polygons)
