@@ -9,7 +9,6 @@ Joints have memory: the irreversible slip of each point, and the damage of bonds
 from the displacements since the memory was updated.
 """
 
-from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -21,7 +20,7 @@ from scipy import sparse
 
 from archfem._typing import Array
 from archfem.joints.contact_law import ContactLaw, clip_to_friction, shear_tangent
-from archfem.joints.normal_law import Bonds, CrackedLaw, Facets, NormalLaw, dilatancy_opening
+from archfem.joints.normal_law import Bonds, CrackedLaw, NormalLaw, dilatancy_opening
 from archfem.joints.quadrature import JointPoints
 
 Flags = NDArray[np.bool_]
@@ -482,29 +481,6 @@ class JointOperator:
         if self.slides:
             pattern = pattern + slip[first].T @ opening[second]
         return pattern.tocsr()
-
-    def with_plane_joints(self, plane: Sequence[bool]) -> "JointOperator":
-        """Return a joint operator with one facet instead of several on joints with plane faces.
-
-        Only for `Facets`: the first and the last point of the joint become the facet's ends.
-
-        Args:
-            plane: whether the faces of each joint stay plane (n_joints,).
-        """
-        points = self.points
-        first = np.searchsorted(points.joint, np.arange(points.joint_count))
-        last = np.append(first[1:], len(points.joint)) - 1
-        rows, weight = [], points.weight.copy()
-        for joint, is_plane in enumerate(plane):
-            of_joint = np.arange(first[joint], last[joint] + 1)
-            if is_plane:
-                weight[of_joint[[0, -1]]] = points.weight[of_joint].sum() / 2.0
-                of_joint = of_joint[[0, -1]]
-            rows.append(of_joint)
-        selected = np.concatenate(rows)
-        offset = None if self.gap_offset is None else self.gap_offset[:, selected]
-        law = Facets(points.selected(selected, weight[selected]))
-        return JointOperator(law, self.opening[selected], self.slip[selected], offset)
 
 
 def _ones(matrix: sparse.csr_matrix) -> sparse.csr_matrix:

@@ -299,14 +299,8 @@ def _refuse_difference(
 class OwnLawOperator(JointOperator):
     """Joint operator whose points have laws of the user."""
 
-    point_laws: PointLaws | None = None
+    laws: PointLaws = field(kw_only=True)
     history: Array | None = None  # memory of the laws (m, p); None for zero
-
-    @property
-    def laws(self) -> PointLaws:
-        """The laws of the points."""
-        assert self.point_laws is not None
-        return self.point_laws
 
     @property
     def variables(self) -> Array:
@@ -389,7 +383,7 @@ def make_operator(
     law = choose_law(rule, points)
     if not points.has_own_laws:
         return JointOperator(law, opening, slip)
-    return OwnLawOperator(law, opening, slip, point_laws=PointLaws.of(structure, points))
+    return OwnLawOperator(law, opening, slip, laws=PointLaws.of(structure, points))
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,6 +1,6 @@
 """Quadrature of the tractions along a joint: rules on facets, and the points on all joints."""
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -155,13 +155,6 @@ class JointPoints:
             _spread_if_any([contact.damage_rates[1] for contact in contacts], joint),
             structure.has_own_laws,
         )
-
-    def selected(self, rows: Numbers, weight: Array) -> "JointPoints":
-        """Return some of the points with other weights."""
-        values = {field.name: getattr(self, field.name) for field in fields(self)}
-        of_points: Any = {key: v[rows] for key, v in values.items() if isinstance(v, np.ndarray)}
-        contact = self.contact.mapped(lambda values: values[rows])
-        return replace(self, **of_points | {"weight": weight, "contact": contact})
 
     @property
     def is_plain(self) -> bool:

@@ -242,17 +242,6 @@ class AttachedLoad:
             )
 
 
-@dataclass(frozen=True)
-class BlockLoad(PointLoad):
-    """A point load (x, y) on a block that is named, wherever the point is."""
-
-    block: str = ""
-
-    def place(self, structure: Structure) -> tuple[int, Array]:
-        """Return the number of the block and the loaded point (2,) [m]."""
-        return structure.block_number(self.block), np.array([self.x, self.y])
-
-
 Action = BodyForce | PointLoad
 
 

@@ -19,19 +19,14 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from archfem._typing import Array, Numbers
-from archfem.joints.normal_law import Facets
-from archfem.joints.operator import JointOperator
 from archfem.masonry.structure import Structure, rigid_motion_matrix
 from archfem.models.linear_blocks import LinearBlockModel
 
 
 def project_model(
-    model: LinearBlockModel,
-    basis: sparse.csr_matrix,
-    fidelity: str,
-    operator: JointOperator | None = None,
+    model: LinearBlockModel, basis: sparse.csr_matrix, fidelity: str
 ) -> LinearBlockModel:
-    """Return a model in the coordinates of a basis, on request with another joint operator."""
+    """Return a model in the coordinates of a basis."""
     cells, transposed = model.cells, basis.T.tocsr()
     stress = None if cells.stress is None else cells.stress @ basis
     return LinearBlockModel(
@@ -40,7 +35,7 @@ def project_model(
         mass=transposed @ (model.mass @ basis),
         block_stiffness=transposed @ (model.block_stiffness @ basis),
         mass_influence=basis.T @ model.mass_influence,
-        operator=(operator or model.operator).projected(basis),
+        operator=model.operator.projected(basis),
         cells=replace(cells, shape_functions=cells.shape_functions @ basis, stress=stress),
     ).with_support_motion(model.support_motion)
 
@@ -51,20 +46,16 @@ def condense_blocks(
     """Reduce the blocks of a model with all nodes, each to its own fidelity."""
     joints = _joint_nodes(model)
     bases, order = [], []
-    plane = {number for number, block in enumerate(model.structure.blocks) if block.fixed}
     for number in model.structure.free:
         nodes = np.flatnonzero(model.cells.block == number)
         faces = [face for joint in joints if len(face := np.intersect1d(joint, nodes))]
         block_fidelity = fidelities[number]
         if block_fidelity == "faces" and _has_bending_faces(model.structure, number):
             block_fidelity = "condensed"
-        if block_fidelity in ("rigid", "faces"):
-            plane.add(number)
         bases.append(_block_basis(model, nodes, faces, block_fidelity))
         order.append(_dofs(nodes))
     stacked = sparse.block_diag(bases, format="csr")
-    basis = stacked[np.argsort(np.concatenate(order))]
-    return project_model(model, basis, fidelity, _merge_plane_facets(model, plane))
+    return project_model(model, stacked[np.argsort(np.concatenate(order))], fidelity)
 
 
 def _has_bending_faces(structure: Structure, number: int) -> bool:
@@ -152,16 +143,3 @@ def _condense_inner_nodes(
         solved = splu(stiffness[:, _dofs(inner)].tocsc()).solve(coupled)
         basis[_dofs(np.searchsorted(nodes, inner))] = -solved
     return basis.tocsr()
-
-
-def _merge_plane_facets(model: LinearBlockModel, plane: set[int]) -> JointOperator:
-    """Return joints with a single facet where plane faces can neither slide nor bond."""
-    # each end of a facet slides separately and has a bond of its own: joints that can slide, or are
-    # bonded, need several
-    if not isinstance(model.operator.law, Facets):
-        return model.operator
-    merged = [
-        set(joint.blocks) <= plane and not joint.contact.slides and joint.contact.tension == 0.0
-        for joint in model.structure.joints
-    ]
-    return model.operator.with_plane_joints(merged)

@@ -249,22 +249,13 @@ class Eurocode8(CodeSpectrum):
         [0.345, 0.8625, 0.2588]
     """
 
-    # EN 1998-1:2004, tables 3.2 to 3.4: soil factor S and the periods T_B, T_C, T_D [s].
+    # EN 1998-1:2004, tables 3.2 to 3.4: soil factor S and T_B, T_C, T_D [s], of type 1 and type 2
     _ground_types: ClassVar = {
-        1: {
-            "A": (1.0, 0.15, 0.4, 2.0),
-            "B": (1.2, 0.15, 0.5, 2.0),
-            "C": (1.15, 0.20, 0.6, 2.0),
-            "D": (1.35, 0.20, 0.8, 2.0),
-            "E": (1.4, 0.15, 0.5, 2.0),
-        },
-        2: {
-            "A": (1.0, 0.05, 0.25, 1.2),
-            "B": (1.35, 0.05, 0.25, 1.2),
-            "C": (1.5, 0.10, 0.25, 1.2),
-            "D": (1.8, 0.10, 0.30, 1.2),
-            "E": (1.6, 0.05, 0.25, 1.2),
-        },
+        "A": ((1.0, 0.15, 0.4, 2.0), (1.0, 0.05, 0.25, 1.2)),
+        "B": ((1.2, 0.15, 0.5, 2.0), (1.35, 0.05, 0.25, 1.2)),
+        "C": ((1.15, 0.20, 0.6, 2.0), (1.5, 0.10, 0.25, 1.2)),
+        "D": ((1.35, 0.20, 0.8, 2.0), (1.8, 0.10, 0.30, 1.2)),
+        "E": ((1.4, 0.15, 0.5, 2.0), (1.6, 0.05, 0.25, 1.2)),
     }
 
     ag: float
@@ -275,7 +266,7 @@ class Eurocode8(CodeSpectrum):
     def __post_init__(self) -> None:
         _check_ground(self.ag, "design ground acceleration [g]")
         check_fields(self)
-        if self.type not in self._ground_types or self.ground not in self._ground_types[1]:
+        if self.type not in (1, 2) or self.ground not in self._ground_types:
             raise InvalidInput(
                 f"Eurocode 8 type {self.type!r} on ground {self.ground!r}: expected type 1 or 2 on "
                 "ground A, B, C, D or E (S1 and S2 need a site study)"
@@ -283,7 +274,7 @@ class Eurocode8(CodeSpectrum):
         check_oscillators(np.zeros(1), self.damping)
 
     def _branches(self) -> tuple[SpectrumBranches, SpectrumBranches | None]:
-        soil, *corners = self._ground_types[self.type][self.ground]
+        soil, *corners = self._ground_types[self.ground][self.type - 1]
         ratio = {1: 0.90, 2: 0.45}[self.type]  # a_vg / a_g [-]
         return (
             _european_branches(self.ag * soil, 2.5, corners, self.damping),

@@ -131,18 +131,3 @@ def test_energy_is_that_of_closed_springs(block):
     assert block.energy(np.array([0.0, 1e-4, 0.0])) == 0.0
     stored = 0.5 * 0.8 * (2e9 * 1e-4**2 + 1e9 * 3e-5**2)
     assert block.energy(np.array([3e-5, -1e-4, 0.0])) == pytest.approx(stored)
-
-
-@pytest.mark.parametrize(("plane", "points"), [((True, False), 2 + 8), ((True, True), 2 + 2)])
-def test_one_facet_bears_a_plane_joint_as_several_do(stack, plane, points):
-    """Tractions are integrated exactly along either, at the same ends of the joint."""
-    model = af.build(stack, fidelity="rigid", cells=(4, 1), quadrature="exact")
-    q = 1e-5 * np.array([1.0, -2.0, 9.0, 3.0, -4.0, 0.0])
-    fewer = model.operator.with_plane_joints(plane)
-    assert len(fewer.points.offset) == points
-    assert fewer.points.offset[:2] == pytest.approx([-0.5, 0.5])
-    normal, _, moment = model.operator.resultants(q).T
-    assert np.abs(moment / normal).min() > 0.25  # open at an end
-    found, _, turning = fewer.resultants(q).T
-    assert found == pytest.approx(normal, rel=1e-12)
-    assert turning == pytest.approx(moment, rel=1e-12)
