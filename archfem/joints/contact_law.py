@@ -24,9 +24,8 @@ from math import inf
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from archfem._typing import Array
+from archfem._typing import Array, Flags, Numbers
 
 # Added to a denominator that may be zero where the quotient is to be zero
 ZERO_DIVISION_GUARD = 1e-300
@@ -53,7 +52,7 @@ def negative_part(x: Any) -> Any:
     return 0.5 * (x - abs(x))
 
 
-def is_closed(opening: Array) -> NDArray[np.bool_]:
+def is_closed(opening: Array) -> Flags:
     """Return where the normal spring acts."""
     # a joint that just touches is closed: the tangent of the unloaded structure would be singular
     return opening <= 0.0
@@ -81,7 +80,7 @@ class ContactLaw(NamedTuple):
         return law if law.friction < inf else held
 
     @classmethod
-    def at_points(cls, contacts: Sequence[Any], number: NDArray[np.intp]) -> "ContactLaw":
+    def at_points(cls, contacts: Sequence[Any], number: Numbers) -> "ContactLaw":
         """Return the law at points, from the number of the contact of each (p,)."""
         return cls(*np.array([cls.of(contact) for contact in contacts]).T[:, number])
 
@@ -180,7 +179,7 @@ def clip_to_friction(trial: Any, limit: Any) -> Any:
     return trial - friction_excess(trial, limit)
 
 
-def exceeds_limit(trial: Array, limit: Array) -> NDArray[np.bool_]:
+def exceeds_limit(trial: Array, limit: Array) -> Flags:
     """Return where a trial shear traction slides, by more than round-off."""
     return np.abs(trial) > (1.0 + SLIP_LIMIT_TOLERANCE) * limit
 

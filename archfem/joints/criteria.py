@@ -10,9 +10,8 @@ from typing import Any, TypeVar
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
-from archfem._typing import Array, Seconds
+from archfem._typing import Array, Flags, Seconds
 from archfem._validation import (
     check_between,
     check_integer,
@@ -77,7 +76,7 @@ def find_lasting(
     return None
 
 
-def lasting_flags(flagged: NDArray[np.bool_], time: Array, duration: float) -> NDArray[np.bool_]:
+def lasting_flags(flagged: Flags, time: Array, duration: float) -> Flags:
     """Return whether each joint has by then been flagged for a duration [s] (steps, joints)."""
     if len(flagged) == 1:
         return flagged
@@ -85,7 +84,7 @@ def lasting_flags(flagged: NDArray[np.bool_], time: Array, duration: float) -> N
     return flagged & (unbroken_durations(flagged, time) >= (1.0 - 1e-6) * duration)
 
 
-def find_first_lasting(holds: NDArray[np.bool_], time: Array, duration: float) -> int | None:
+def find_first_lasting(holds: Flags, time: Array, duration: float) -> int | None:
     """Return the record from which on a condition first holds for a duration, without a break."""
     lasts = lasting_flags(holds[:, None], time, duration)[:, 0]
     if not lasts.any():
@@ -190,7 +189,7 @@ def sliding_ratio(
 
 def judge_joints(
     eccentricity: Array, friction: Array, limits: Array, hinge: float
-) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+) -> tuple[Flags, Flags]:
     """Return which joints hinge, and which slide; open ones, with undefined e, do neither."""
     # the margin is well above the round-off of programmes and equilibria (1e-9)
     return np.abs(eccentricity) >= hinge, friction >= (1.0 - 1e-6) * limits
@@ -297,7 +296,7 @@ def longest_duration(flags: xr.DataArray) -> xr.DataArray:
     return xr.DataArray(longest, {"joint": flags["joint"]}, ("joint",))
 
 
-def unbroken_durations(flagged: NDArray[np.bool_], time: Array) -> Array:
+def unbroken_durations(flagged: Flags, time: Array) -> Array:
     """Return the time [s] for which each joint has by then been flagged (steps, joints)."""
     elapsed = np.cumsum(np.where(flagged, step_lengths(time)[:, None], 0.0), axis=0)
     # less the flagged time until the last record without the flag

@@ -33,9 +33,8 @@ from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from archfem._typing import Array
+from archfem._typing import Array, Flags, Numbers
 from archfem.joints.contact_law import (
     ContactLaw,
     contact_fraction,
@@ -43,7 +42,7 @@ from archfem.joints.contact_law import (
     is_closed,
 )
 from archfem.joints.large.closing_law import excess_energies, sum_excess
-from archfem.joints.quadrature import JointPoints, Numbers, Quadrature
+from archfem.joints.quadrature import JointPoints, Quadrature
 
 
 @dataclass(frozen=True, eq=False)
@@ -307,12 +306,12 @@ class Bonds:
     crack: Array  # κ, irreversible opening of softening bonds (p,) [m]
 
     @cached_property
-    def intact(self) -> NDArray[np.bool_]:
+    def intact(self) -> Flags:
         """Whether each point has a bond that is not broken (p,)."""
         return (self._strength > 0.0) & (self.damage < 1.0)
 
     @cached_property
-    def softens(self) -> NDArray[np.bool_]:
+    def softens(self) -> Flags:
         """Whether each point has a softening bond that is not broken (p,)."""
         rate = self.law.points.damage_by_opening
         return np.zeros_like(self.intact) if rate is None else self.intact & (rate > 0.0)
@@ -362,12 +361,12 @@ class Bonds:
         """Return the stored energies across the joints, from gaps less `shift` (p,) [J]."""
         return self.normal_law.energies(gaps) + self.pull * (gaps + 0.5 * self.stretch)
 
-    def find_exceeded(self, gaps: Array) -> NDArray[np.bool_]:
+    def find_exceeded(self, gaps: Array) -> Flags:
         """Return which bonds are pulled beyond their strength, from gaps less `shift` (p,)."""
         stretch = self._strength / self.law.points.contact.normal_stiffness
         return self.intact & (gaps > BOND_STRENGTH_TOLERANCE * stretch)
 
-    def most_exceeded(self, gaps: Array) -> NDArray[np.bool_]:
+    def most_exceeded(self, gaps: Array) -> Flags:
         """Return the bonds beyond their strength at the largest gap of each joint (p,)."""
         exceeded, joint = self.find_exceeded(gaps), self.law.points.joint
         largest = np.zeros(self.law.points.joint_count)
@@ -376,7 +375,7 @@ class Bonds:
         return exceeded & (gaps >= (1.0 - 1e-6) * largest[joint])
 
     def after(
-        self, gaps: Array, exceeded: NDArray[np.bool_], excess: Array, limit: Array
+        self, gaps: Array, exceeded: Flags, excess: Array, limit: Array
     ) -> tuple[Array, Array]:
         """Return damage and irreversible opening at the end of a step, as they are stored."""
         points = self.law.points

@@ -9,7 +9,6 @@ Joints have memory: the irreversible slip of each point, and the damage of bonds
 from the displacements since the memory was updated.
 """
 
-from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Self
@@ -18,12 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from archfem._typing import Array
+from archfem._typing import Array, Flags, Numbers
 from archfem.joints.contact_law import ContactLaw, clip_to_friction, shear_tangent
 from archfem.joints.normal_law import Bonds, CrackedLaw, NormalLaw, dilatancy_opening
 from archfem.joints.quadrature import JointPoints
-
-Flags = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +43,7 @@ class Pattern:
         """Number of rows."""
         return len(self.indptr) - 1
 
-    def find_entries(self, rows: NDArray[np.int32], columns: NDArray[np.int32]) -> NDArray[np.intp]:
+    def find_entries(self, rows: NDArray[np.int32], columns: NDArray[np.int32]) -> Numbers:
         """Return the positions of entries in the data of this pattern (k,)."""
         # one sorted key for each entry: row times size plus column
         row = np.repeat(np.arange(self.size, dtype=np.int64), np.diff(self.indptr))
@@ -58,16 +55,7 @@ class Pattern:
 
     def with_data(self, data: Array) -> sparse.csr_matrix:
         """Return a matrix with this pattern."""
-        result = copy(self._bare)
-        result.data = data
-        return result
-
-    @cached_property
-    def _bare(self) -> sparse.csr_matrix:
-        """A matrix without data: copying it skips the checks that a new one needs."""
-        bare = sparse.csr_matrix((self.size, self.size))
-        bare.indptr, bare.indices = self.indptr, self.indices
-        return bare
+        return sparse.csr_matrix((data, self.indices, self.indptr), 2 * (self.size,))
 
     def spread(self, matrix: sparse.csr_matrix) -> sparse.csr_matrix:
         """Return a matrix stored on this pattern."""

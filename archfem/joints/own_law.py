@@ -19,13 +19,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
 
-from archfem._typing import Array, Pascals, PascalsPerMetre
+from archfem._typing import Array, Numbers, Pascals, PascalsPerMetre
 from archfem._validation import check_own_keys, report_user_errors, short_repr, validate_arguments
 from archfem.errors import InvalidInput
 from archfem.joints.contact_law import ContactLaw, clip_to_friction, is_closed, shear_tangent
 from archfem.joints.normal_law import choose_law
 from archfem.joints.operator import JointOperator, Pattern
-from archfem.joints.quadrature import JointPoints, Numbers, Quadrature
+from archfem.joints.quadrature import JointPoints, Quadrature
 from archfem.joints.step_average import StepForces
 from archfem.masonry.materials import Contact
 from archfem.masonry.structure import Structure

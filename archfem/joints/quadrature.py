@@ -5,17 +5,14 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from archfem._typing import Array
+from archfem._typing import Array, Flags, Numbers
 from archfem._validation import check_choice, check_integer
 from archfem.errors import InvalidInput
 from archfem.joints.contact_law import ContactLaw
 from archfem.masonry.structure import Structure
 
 legendre: Any = np.polynomial.legendre  # without type annotations
-
-Numbers = NDArray[np.intp]
 
 
 @dataclass(frozen=True)
@@ -167,7 +164,7 @@ class JointPoints:
         return bool(self.contact.closing_rate.any())
 
     @cached_property
-    def slides(self) -> NDArray[np.bool_]:
+    def slides(self) -> Flags:
         """Whether each point can slide (p,)."""
         return np.asarray(self.contact.resistance == 0.0)
 

@@ -15,11 +15,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 from scipy import sparse
 
 from archfem._files import atomic_write
-from archfem._typing import Array
+from archfem._typing import Array, Numbers
 from archfem._validation import validate_arguments
 from archfem.errors import InvalidInput
 from archfem.joints.criteria import (
@@ -58,7 +57,7 @@ def face_matrix(operator: JointOperator) -> tuple[sparse.csr_matrix, Array]:
 
 
 def _fit_matrices(
-    joint: NDArray[np.intp], weight: Array, offset: Array, joint_count: int
+    joint: Numbers, weight: Array, offset: Array, joint_count: int
 ) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:
     """Return matrices (n_joints, p) to the weighted mean over each joint and the slope along it."""
     entries, shape = (joint, np.arange(len(joint))), (joint_count, len(joint))

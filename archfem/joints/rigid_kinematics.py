@@ -3,10 +3,10 @@
 import numpy as np
 from scipy import sparse
 
-from archfem._typing import Array
+from archfem._typing import Array, Numbers
 from archfem.joints.operator import JointOperator
 from archfem.joints.own_law import make_operator
-from archfem.joints.quadrature import JointPoints, Numbers, Quadrature
+from archfem.joints.quadrature import JointPoints, Quadrature
 from archfem.masonry.structure import Structure, rigid_motion_matrix
 
 
@@ -50,13 +50,8 @@ def jump_rates(
     A jump is the motion of the second body of a pair less that of the first; -1 does not move.
     """
     row, body, values = jump_entries(directions, places, pairs, centres)
-    # by rows and columns at once: these small matrices are built by the thousand
-    order = np.lexsort((body, row))
-    columns = 3 * body[order, None] + np.arange(3)
-    starts = 3 * np.searchsorted(row, np.arange(len(pairs) + 1))
-    shape = len(pairs), 3 * len(centres)
-    rates = sparse.csr_matrix((values[order].ravel(), columns.ravel(), starts), shape)
-    rates.sum_duplicates()
+    entries = np.repeat(row, 3), (3 * body[:, None] + np.arange(3)).ravel()
+    rates = sparse.csr_matrix((values.ravel(), entries), (len(pairs), 3 * len(centres)))
     rates.eliminate_zeros()
     return rates
 

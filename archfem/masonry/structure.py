@@ -16,12 +16,11 @@ from numbers import Integral
 from typing import Any, Protocol, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from archfem._display import ResultDisplay
-from archfem._typing import Array, Metres, MetresPerSecondSquared
+from archfem._typing import Array, Flags, Metres, MetresPerSecondSquared, Numbers
 from archfem._validation import check_between, check_fields, check_type
 from archfem.errors import InvalidInput, InvalidStructure
 from archfem.masonry.block import Block, Point, as_point, check_overlaps, say_place
@@ -130,7 +129,7 @@ Shape = TypeVar("Shape", bound=Callable[..., "Structure"])
 
 
 def describe_assessment(
-    faces: Sequence[str], parts: Sequence[str], judged: NDArray[np.bool_], heads: NDArray[np.bool_]
+    faces: Sequence[str], parts: Sequence[str], judged: Flags, heads: Flags
 ) -> str:
     """Describe which joints are assessed, and which are not; empty where all are.
 
@@ -342,7 +341,7 @@ class Structure(ResultDisplay):
         return np.array([joint.contact.tension for joint in self.joints])
 
     @cached_property
-    def pairs(self) -> NDArray[np.intp]:
+    def pairs(self) -> Numbers:
         """Numbers of the two blocks at each joint, the lower first (n_joints, 2)."""
         return np.array([(joint.lower, joint.higher) for joint in self.joints], dtype=np.intp)
 
@@ -453,7 +452,7 @@ class Structure(ResultDisplay):
         return tuple(number for number, block in enumerate(self.blocks) if not block.fixed)
 
     @cached_property
-    def first_coordinates(self) -> NDArray[np.intp]:
+    def first_coordinates(self) -> Numbers:
         """First of the three coordinates of each free block, -1 of a fixed one (n_blocks,)."""
         first = np.full(len(self.blocks), -1)
         first[list(self.free)] = 3 * np.arange(len(self.free))
@@ -465,7 +464,7 @@ class Structure(ResultDisplay):
         return np.array([block.centroid for block in self.blocks])
 
     @cached_property
-    def heads(self) -> NDArray[np.bool_]:
+    def heads(self) -> Flags:
         """Whether each joint is a head joint of a wall (n_joints,).
 
         That is a joint nearer to the vertical than to the horizontal, between two stones of one
@@ -482,7 +481,7 @@ class Structure(ResultDisplay):
         return steep & np.array(inner, dtype=bool)
 
     @cached_property
-    def judged(self) -> NDArray[np.bool_]:
+    def judged(self) -> Flags:
         """Whether each joint counts: of a ring or pier, and no head joint (n_joints,)."""
         parts = select_assessed_parts({joint.part: joint.role for joint in self.joints})
         return ~self.heads & np.array([joint.part in parts for joint in self.joints], dtype=bool)

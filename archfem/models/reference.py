@@ -157,14 +157,13 @@ class MonolithicModel(Model):
         self._places, self._owner = space.places, space.owner
         self._displacement = np.zeros(2 * len(space.places))  # workspace, of all nodes
         self._memory = linear.memory
-        coupled = self.facets.coupling()[self.free][:, self.free]
+        coupled = self._of_free_blocks(self.steps.tangent.assemble())
         self._pattern = Pattern.of(linear.mass, linear.block_stiffness, coupled)
-        self._entries = self._find_entries()
         self.mass = self._pattern.spread(linear.mass)
         self.block_stiffness = self._pattern.spread(linear.block_stiffness)
         self._closed = linear.closed_tangent()
-        # assembled entries of joints and tangent of the last call
-        self._last: tuple[Array, sparse.csr_matrix] | None = None
+        # assembled tangents of the joints and of the model in the last call
+        self._last: tuple[sparse.csr_matrix, sparse.csr_matrix] | None = None
 
     def with_support_motion(self, motion: Array) -> Self:
         """Return the model with supports displaced: their nodes follow."""
@@ -231,7 +230,7 @@ class MonolithicModel(Model):
     def tangent(self, q: Array) -> sparse.csr_matrix:
         """Return the derivative of `force`, the same object while no point changes its state."""
         of_joints = self._forms.joint_tangent(self.spread(q), self._memory)
-        if self._last is None or not np.array_equal(of_joints, self._last[0]):
+        if self._last is None or not np.array_equal(of_joints.data, self._last[0].data):
             self._last = of_joints, self.add_joints(1.0, of_joints)
         return self._last[1]
 
@@ -240,27 +239,16 @@ class MonolithicModel(Model):
         tangent = self._forms.tangent(self.spread(q), self._memory)
         return (tangent @ self._support_displacement(motion))[self.free]
 
-    def _find_entries(self) -> tuple[Numbers, Numbers]:
-        """Return entries of assembled joint tangents, and their positions on the pattern."""
-        of_joints = self.steps.tangent.assemble().tocoo()
+    def _of_free_blocks(self, matrix: sparse.csr_matrix) -> sparse.csr_matrix:
+        """Return the rows and columns of an assembled matrix for the free blocks (n, n)."""
         # Rows of fixed blocks are left out, rather than replaced as by boundary conditions of
         # DOLFINx: coordinates are those of the free blocks, as for every other fidelity.
-        coordinate = np.full(len(self._displacement), -1)
-        coordinate[self.free] = np.arange(self.size)
-        rows, columns = coordinate[of_joints.row], coordinate[of_joints.col]
-        # entries of the pattern numbered from one, since absent ones read as zero
-        numbered = self._pattern.with_data(np.arange(1.0, len(self._pattern.indices) + 1.0))
-        position = np.asarray(numbered[rows, columns]).ravel().astype(np.intp) - 1
-        # Forms also couple nodes off the joint, by zeros, which would only make factors wider
-        kept = np.flatnonzero((rows >= 0) & (columns >= 0) & (position >= 0))
-        return kept, position[kept]
+        return matrix[self.free][:, self.free]
 
-    def add_joints(self, block_factor: float, of_joints: Array) -> sparse.csr_matrix:
-        """Return the block stiffness times a factor, plus assembled entries of joints (n, n)."""
-        assembled, positions = self._entries
-        data = block_factor * self.block_stiffness.data
-        data[positions] += of_joints[assembled]
-        return self._pattern.with_data(data)
+    def add_joints(self, block_factor: float, of_joints: sparse.csr_matrix) -> sparse.csr_matrix:
+        """Return the block stiffness times a factor, plus an assembled tangent of joints (n, n)."""
+        joints = self._pattern.spread(self._of_free_blocks(of_joints))
+        return self._pattern.with_data(block_factor * self.block_stiffness.data + joints.data)
 
     def closed_tangent(self) -> sparse.csr_matrix:
         """Return the tangent with every joint closed over its whole depth."""
@@ -299,7 +287,7 @@ class MonolithicStep(ModelStep):
     def tangent(self, q: Array) -> sparse.csr_matrix:
         """Return the derivative of `force` (n, n)."""
         factor = 0.5 + self.start.damping_lag
-        return self.model.add_joints(factor, self._forms(q).tangent.values())
+        return self.model.add_joints(factor, self._forms(q).tangent.assemble())
 
     def _tractions(self, q: Array) -> Array:
         return self.model.facets.read(self._forms(q).tractions)

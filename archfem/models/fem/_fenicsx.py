@@ -126,16 +126,12 @@ class MatrixAssembler:
 
     def assemble(self) -> sparse.csr_matrix:
         """Assemble the form with the present coefficients, always on the same pattern."""
-        data = self.values()
-        indptr, indices = self._matrix.getRowIJ()
-        return sparse.csr_matrix((data, indices, indptr), self._matrix.getSize())
-
-    def values(self) -> Array:
-        """Assemble the form, and return the entries alone (nnz,)."""
         self._matrix.zeroEntries()
         fem.petsc.assemble_matrix(self._matrix, self._form)
         self._matrix.assemble()
-        return self._matrix.getValuesCSR()[2]
+        indptr, indices = self._matrix.getRowIJ()
+        data = self._matrix.getValuesCSR()[2]
+        return sparse.csr_matrix((data, indices, indptr), self._matrix.getSize())
 
 
 def assemble_matrix(form: Any) -> sparse.csr_matrix:

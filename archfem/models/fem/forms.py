@@ -293,15 +293,14 @@ class Forms:
         of_joints = self.joint_work([f.tangent_tractions(u, fixed) for f in self.faces], v)
         return _fenicsx.MatrixAssembler(fem.form(ufl.derivative(of_joints, u)))
 
-    def joint_tangent(self, displacement: Array, slip: Array | None = None) -> Array:
-        """Return the entries of the assembled derivative of the joint forces (nnz,) [N/m]."""
+    def joint_tangent(self, displacement: Array, slip: Array | None = None) -> sparse.csr_matrix:
+        """Return the derivative of the joint forces (2 m, 2 m) [N/m]."""
         self._set_state(displacement, slip)
-        return self._joint_tangent.values()
+        return self._joint_tangent.assemble()
 
     def tangent(self, displacement: Array, slip: Array | None = None) -> sparse.csr_matrix:
         """Return the derivative of `force` (2 m, 2 m) [N/m]."""
-        self._set_state(displacement, slip)
-        return self.stiffness + self._joint_tangent.assemble()
+        return self.stiffness + self.joint_tangent(displacement, slip)
 
     @cached_property
     def _energy(self) -> Any:

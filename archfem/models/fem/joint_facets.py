@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 import ufl
 from dolfinx import fem
-from scipy import sparse
 
 from archfem._typing import Array, Numbers
 from archfem.joints.quadrature import Quadrature
@@ -135,14 +134,6 @@ class JointFacets:
         metadata = {"quadrature_rule": name, "quadrature_degree": 2 * self.size - loss}
         dS = ufl.Measure("dS", domain=grid, subdomain_data=tags, metadata=metadata)
         return [Patch(contacts[k // count], k % count, dS(k)) for k in np.unique(numbers).tolist()]
-
-    def coupling(self) -> sparse.csr_matrix:
-        """Return a matrix with an entry wherever joints couple two displacements (2 m, 2 m)."""
-        # Of the two cells at a facet, no other nodes displace it.
-        nodes = self.space.facets.nodes.reshape(len(self.numbers), -1)
-        entries = np.ones(nodes.size), nodes.ravel(), nodes.shape[1] * np.arange(len(nodes) + 1)
-        of_facet = sparse.csr_matrix(entries, (len(nodes), len(self.space.places)))
-        return sparse.kron(of_facet.T @ of_facet, np.ones((2, 2)), format="csr")
 
     def _cellwise_space(self, size: int) -> tuple[Any, Numbers]:
         """Space of cellwise constants, `size` for each colour; entries of facets (f, 2, size)."""
