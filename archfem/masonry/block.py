@@ -4,8 +4,7 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
-from math import hypot, sqrt
+from math import sqrt
 from typing import Any
 
 import numpy as np
@@ -104,22 +103,27 @@ def find_side_of_line(points: Array, line: Array, near: float, arcs: Sequence[in
     """Return the side of a line on which an outline lies: 1 left, -1 right, 0 if not along it."""
     # An anticlockwise outline has its interior on the left: an edge in the direction of the line
     # belongs to an outline on its left, an opposite one to an outline on its right.
-    (x, y), (x_end, y_end) = line.tolist()  # for few numbers, floats are faster than arrays
-    length = hypot(x_end - x, y_end - y)
-    t_x, t_y = (x_end - x) / length, (y_end - y) / length
-    moved = [(p_x - x, p_y - y) for p_x, p_y in points.tolist()]
-    along = [d_x * t_x + d_y * t_y for d_x, d_y in moved]
-    near_line = [abs(d_y * t_x - d_x * t_y) <= near for d_x, d_y in moved]
-    covered, side = 0.0, 0
-    for edge, (start, end) in enumerate(pairwise([*along, along[0]])):
-        low, high = min(start, end), max(start, end)
-        straight = edge not in arcs and near_line[edge] and near_line[edge + 1 - len(along)]
-        if not straight or high - low <= near:
-            continue
-        covered += max(min(high, length) - max(low, 0.0), 0.0)
-        if side == 0 and low < length - near and high > near:
-            side = 1 if end > start else -1
-    return side if abs(covered - length) <= 4.0 * near else 0
+    starts, ends, length = _find_edges_on_line(points, line, near, arcs)
+    low, high = np.minimum(starts, ends), np.maximum(starts, ends)
+    shared = np.maximum(np.minimum(high, length) - np.maximum(low, 0.0), 0.0)
+    is_edge = high - low > near
+    sides = (ends > starts)[is_edge & (low < length - near) & (high > near)]
+    covers = abs(shared[is_edge].sum() - length) <= 4.0 * near
+    return (1 if sides[0] else -1) if covers and len(sides) else 0
+
+
+def _find_edges_on_line(
+    points: Array, line: Array, near: float, arcs: Sequence[int]
+) -> tuple[Array, Array, float]:
+    """Return where the straight edges on a line start and end along it, and its length [m]."""
+    length = float(np.linalg.norm(line[1] - line[0]))
+    along = (line[1] - line[0]) / length
+    arm = points - line[0]
+    on_line = np.abs(arm @ [-along[1], along[0]]) <= near
+    straight = on_line & np.roll(on_line, -1)
+    straight[list(arcs)] = False
+    places = arm @ along
+    return places[straight], np.roll(places, -1)[straight], length
 
 
 def trace_boundary(cells: Sequence[Numbers] | Sequence[list[int]]) -> list[int]:
@@ -296,14 +300,8 @@ class Block:
             line: start and end of a part of the face (2, 2) [m].
             near: distance of points that count as one [m].
         """
-        depth = float(np.linalg.norm(line[1] - line[0]))
-        along = (line[1] - line[0]) / depth
-        arm = self.points - line[0]
-        on_line = np.abs(arm @ [-along[1], along[0]]) <= near
-        straight = on_line & np.roll(on_line, -1)
-        straight[list(self._arcs)] = False
-        ends = np.stack([arm @ along, np.roll(arm @ along, -1)])[:, straight]
-        edges = list(zip(*np.sort(ends, axis=0).tolist(), strict=True))
+        starts, stops, depth = _find_edges_on_line(self.points, line, near, self._arcs)
+        edges = np.sort([starts, stops], axis=0).T.tolist()
         low, high = 0.0, depth
         # an outline does not touch itself: edges on the line that meet are consecutive
         for start, end in sorted(edges):

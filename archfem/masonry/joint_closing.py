@@ -474,10 +474,9 @@ def fit_closing(
         )
     if min(stress.min(), measured.min()) <= 0.0:
         raise InvalidInput(f"stresses or {name} are not above 0: leave out the unloaded joint")
-    if name == "tangents":
-        line = np.sqrt(measured)
-    else:
-        line = stress / measured if name == "closings" else measured
+    # the measured quantity, of closings over the stress, is this power of a line in the stress
+    power = {"closings": -1.0, "secants": 1.0, "tangents": 2.0}[name]
+    line = stress / measured if name == "closings" else measured ** (1.0 / power)
     rows = np.stack([np.ones_like(stress), stress], axis=1) / line[:, None]
     (start, slope), *_ = np.linalg.lstsq(rows, np.ones_like(stress), rcond=None)
     # a growth of a millionth over the test is round-off of a linear joint
@@ -493,10 +492,7 @@ def fit_closing(
         raise InvalidInput(
             f"closings have a limit of {closure:.3g} m: give them in m, stress in Pa"
         )
-    ratio = rows @ (start, slope)
-    if name != "secants":
-        ratio = 1.0 / ratio if name == "closings" else ratio**2
-    misfit = float(abs(ratio - 1.0).max())
+    misfit = float(abs((rows @ (start, slope)) ** power - 1.0).max())
     return ClosingFit(stiffness, closure, misfit, (float(stress.min()), float(stress.max())))
 
 

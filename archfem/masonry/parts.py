@@ -322,12 +322,7 @@ class Direction:
 
     middle: Array  # mean position of its stones (2,) [m]
     centre: Array | None  # of the fitted circle (2,) [m]; None if straight
-    upright: bool  # of a straight one: vertical instead of horizontal
-
-    @property
-    def is_upright(self) -> bool:
-        """Whether it is straight and vertical."""
-        return self.centre is None and self.upright
+    upright: bool  # whether it is straight and vertical
 
     def outward(self, place: Array) -> Array:
         """Return the unit vector (2,) from the inner to the outer face, rightwards in a pier."""
@@ -390,7 +385,7 @@ def find_backs(
             stone, near = blocks[k], blocks[next_to]
             way, middle = directions.get(stone.part), line.mean(axis=0)
             # an upright ring has no back
-            if way is None or stone.role != "ring" or stone.fixed or way.is_upright:
+            if way is None or stone.role != "ring" or stone.fixed or way.upright:
                 continue
             outward, tangent = way.outward(middle), line[1] - line[0]
             if near.part == stone.part and not near.fixed:
@@ -424,4 +419,4 @@ def _fit_direction(places: Array, role: str) -> Direction:
         return Direction(middle, None, role == "pier" or upright)
     design = np.column_stack([2.0 * arms, np.ones(len(arms))])
     solution = np.linalg.lstsq(design, np.sum(arms**2, axis=1), rcond=None)[0]
-    return Direction(middle, middle + solution[:2], upright)
+    return Direction(middle, middle + solution[:2], upright=False)

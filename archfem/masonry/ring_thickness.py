@@ -170,12 +170,8 @@ def _scale_stone(
     outer = _walk(block, first_out, last_out, {first_in, last_in})
     new = points.copy()
     for here, there in ((inner, outer), (outer, inner)):
-        opposite = np.column_stack(
-            [
-                np.interp(_shares(points[here]), _shares(points[there]), points[there].T[i])
-                for i in (0, 1)
-            ]
-        )
+        places = _shares(points[here]), _shares(points[there])
+        opposite = np.column_stack([np.interp(*places, row) for row in points[there].T])
         new[here] = points[here] + 0.5 * (1.0 - factor) * (opposite - points[here])
     for start, end in corners:
         between = _walk(block, start, end, {*inner, *outer} - {start, end})[1:-1]
@@ -229,11 +225,5 @@ def _make_springing(joint: Joint, stone: Block) -> Block:
     corners = [intrados, extrados, extrados + normal, intrados + normal]
     (a, b), (c, d) = corners[1] - corners[0], normal
     outline = tuple(map(as_point, corners if a * d - b * c > 0.0 else corners[::-1]))
-    return Block(
-        outline,
-        stone.material,
-        f"springing at {joint.name}",
-        fixed=True,
-        part=stone.part,
-        role=stone.role,
-    )
+    name = f"springing at {joint.name}"
+    return Block(outline, stone.material, name, fixed=True, part=stone.part, role=stone.role)

@@ -70,15 +70,6 @@ def _build_cells(space: BrokenSpace, forms: Forms, free: Numbers) -> Cells:
     )
 
 
-@dataclass(frozen=True)
-class StepStart:
-    """State at the start of a step."""
-
-    displacement: Array  # of all nodes (2 m,) [m]
-    irreversible_slip: Array  # of each joint point (p,) [m]
-    damping_lag: float  # time lag of damping over the length of the step [-]
-
-
 @dataclass(frozen=True, eq=False)
 class StepForms:
     """Weak forms of a step, compiled when first used."""
@@ -95,12 +86,11 @@ class StepForms:
     def _lag(self) -> Any:
         return _fenicsx.constant(self.forms.space.mesh.grid, 0.0)
 
-    def set_step(self, start: StepStart, end: Array) -> Self:
-        """Set start and end of the step in all forms."""
-        self._step[0].x.array[:] = start.displacement
-        self._step[1].x.array[:] = end
-        self._lag.value = start.damping_lag
-        self.forms.facets.set_point_values(start.irreversible_slip)
+    def set_step(self, start: Array, end: Array, slip: Array, lag: float) -> Self:
+        """Set displacements at both ends of the step, slip at its start and lag in all forms."""
+        self._step[0].x.array[:], self._step[1].x.array[:] = start, end
+        self._lag.value = lag
+        self.forms.facets.set_point_values(slip)
         return self
 
     @cached_property
@@ -206,7 +196,7 @@ class MonolithicModel(Model):
                 "time step: use scheme=af.dynamics.Newmark(), or fidelity 'full', which is the "
                 "same but for them"
             )
-        return MonolithicStep(self, StepStart(self.spread(start).copy(), self._memory, damping_lag))
+        return MonolithicStep(self, start, damping_lag)
 
     @property
     def kinematics(self) -> JointOperator:
@@ -271,23 +261,25 @@ class MonolithicStep(ModelStep):
     """A time step of the reference model."""
 
     model: MonolithicModel  # with the joint memory at the start
-    start: StepStart
+    start: Array  # coordinates at its start (n,)
+    damping_lag: float  # time lag of damping over the length of the step [-]
 
     def _forms(self, q: Array) -> StepForms:
         """Return the forms of the step to q, which the steps of a model share."""
-        return self.model.steps.set_step(self.start, self.model.spread(q))
+        model, start = self.model, self.model.spread(self.start).copy()
+        return model.steps.set_step(start, model.spread(q), model.memory, self.damping_lag)
 
     def force(self, q: Array) -> Array:
         """Return the mean of the internal forces of blocks and joints (n,)."""
-        model, lag = self.model, self.start.damping_lag
-        mean = (0.5 - lag) * self.start.displacement[model.free] + (0.5 + lag) * q
+        model, lag = self.model, self.damping_lag
+        mean = (0.5 - lag) * self.start + (0.5 + lag) * q
         of_joints = _fenicsx.assemble_vector(self._forms(q).force)[model.free]
         return np.asarray(model.block_stiffness @ mean) + of_joints
 
     def tangent(self, q: Array) -> sparse.csr_matrix:
         """Return the derivative of `force` (n, n)."""
-        factor = 0.5 + self.start.damping_lag
-        return self.model.add_joints(factor, self._forms(q).tangent.assemble())
+        of_joints = self._forms(q).tangent.assemble()
+        return self.model.add_joints(0.5 + self.damping_lag, of_joints)
 
     def _tractions(self, q: Array) -> Array:
         return self.model.facets.read(self._forms(q).tractions)
@@ -302,7 +294,7 @@ class MonolithicStep(ModelStep):
 
     def dissipation(self, q: Array) -> float:
         """Return the energy lost to friction and damping [J]."""
-        change = q - self.start.displacement[self.model.free]
+        change = q - self.start
         of_blocks = change @ (self.model.block_stiffness @ change)
         at_joints = fem.assemble_scalar(self._forms(q).dissipation)
-        return float(self.start.damping_lag * of_blocks + at_joints)
+        return float(self.damping_lag * of_blocks + at_joints)

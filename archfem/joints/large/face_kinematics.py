@@ -121,19 +121,14 @@ def measure_step(jumps, begin, turns):  # type: ignore
 
 @inlined_kernel
 def face_forces(rates, force):  # type: ignore
-    """Return Dᵀ f: the force on the jump, and the moments on both faces [N, N, N m, N m]."""
+    """Return Dᵀ f: the force on the jump, and the moments on both faces [N, N, N m, N m].
+
+    Derivatives by the measures become those by the jump's x and y and both angles alike.
+    """
     c, s, a, b, t = rates
     middle, apart = a * force[0] - b * force[1], t * force[2]
     x, y = c * force[0] - s * force[1], s * force[0] + c * force[1]
     return x, y, middle - apart, middle + apart
-
-
-@inlined_kernel
-def measure_rates(now, row):  # type: ignore
-    """Return derivatives by the jump's x and y and both angles from those by the measures."""
-    c, s, a, b, t = now
-    middle, apart = a * row[0] - b * row[1], t * row[2]
-    return c * row[0] - s * row[1], s * row[0] + c * row[1], middle - apart, middle + apart
 
 
 @inlined_kernel
@@ -149,9 +144,9 @@ def force_derivative(step, rates, now, force, law):  # type: ignore
     px, py = -0.25 * (f * s1 + g * c1), 0.25 * (f * c1 - g * s1)
     qx, qy = 0.25 * shrunk * ax, 0.25 * shrunk * ay
     # derivative of f at constant D: the law's, times that of the measures at the end
-    first = measure_rates(now, law[0])
-    second = measure_rates(now, law[1])
-    third = measure_rates(now, law[2])
+    first = face_forces(now, law[0])
+    second = face_forces(now, law[1])
+    third = face_forces(now, law[2])
     c, s, a, b, t = rates
     middle = _combine_rows(a, first, -b, second, (qx, qy, 0.0, 0.0))
     return (

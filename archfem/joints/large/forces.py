@@ -19,7 +19,6 @@ from archfem.joints.large.face_kinematics import (
     force_derivative,
     gather_face_forces,
     joint_measures,
-    measure_rates,
     relative_stretch,
     rotation_stiffness,
     step_measures,
@@ -92,12 +91,8 @@ def segment_measures(joints, segment, q):  # type: ignore
 @inlined_kernel
 def _add_initial_measures(joints, segment, measures):  # type: ignore
     """Return opening, slip and rotation since the segment was built free of stress."""
-    initial = joints.initial_measures
-    return (
-        measures[0] + initial[segment, 0],
-        measures[1] + initial[segment, 1],
-        measures[2] + initial[segment, 2],
-    )
+    (opening, slip, turn), initial = measures, joints.initial_measures[segment]
+    return opening + initial[0], slip + initial[1], turn + initial[2]
 
 
 @allocating_entry
@@ -115,9 +110,7 @@ def _measure_state(joints, q, sums, measures):  # type: ignore
     """Store the measures of one state, with the plane nearest to the openings of the segments."""
     # sums over the segments of a joint, d their depth and a their offset: Σ d, Σ d a, Σ d a² with
     # the segments' own moment, and Σ d a g with that of their openings
-    for joint in range(joints.joint_count):
-        for k in range(4):
-            sums[joint, k] = 0.0
+    sums[:] = 0.0
     for segment in range(len(joints.normal_angle)):
         own = segment_measures(joints, segment, q)
         orientation, joint = joints.orientation[segment], joints.joint[segment]
@@ -173,9 +166,7 @@ def joint_energy(joints, q, slip):  # type: ignore
 @entry
 def compute_step_forces(joints, before, after, lag, slip, forces):  # type: ignore
     """Compute the joint forces of a step."""
-    for joint in range(len(forces.resultants)):
-        for k in range(3):
-            forces.resultants[joint, k] = 0.0
+    forces.resultants[:] = 0.0
     for segment in range(len(joints.normal_angle)):
         _compute_segment(joints, segment, (before, after), lag, slip, forces)
 
@@ -224,7 +215,7 @@ def _compute_segment(joints, segment, states, lag, slip, forces):  # type: ignor
     _store_bend(bend[segment, 0], lower_rotation, (-x, -y, low))
     _store_bend(bend[segment, 1], higher_rotation, (x, y, high))
     if sides.stretch.shape[2] > 0:
-        of_stretch = measure_rates(now, law_rate[3])
+        of_stretch = face_forces(now, law_rate[3])
         by_stretch = face_forces(rates, (0.0, stretch_rate[0], 0.0))
         _store_stretch(of_law[segment], of_stretch, by_stretch, stretch_rate[1])
 
@@ -244,10 +235,8 @@ def _store_forces(sides, segment, means, push, pull, forces):  # type: ignore
 @inlined_kernel
 def _store_derivative(law_rate, rows):  # type: ignore
     """Store the derivatives of the forces on the jump and the angles by these."""
-    _store_row(law_rate[0], rows[0])
-    _store_row(law_rate[1], rows[1])
-    _store_row(law_rate[2], rows[2])
-    _store_row(law_rate[3], rows[3])
+    for k in range(4):
+        _store_row(law_rate[k], rows[k])
 
 
 @inlined_kernel

@@ -73,18 +73,15 @@ def add_rates(sides, joint, rates, factor, workspace, places, entries):  # type:
     """Add the derivatives of a joint segment, times a factor, to the entries of a matrix."""
     law = rates.law[joint]
     # Uᵀ L V of each pair of faces
-    if _has_entries(law):
-        for side in range(2):
-            count, own = sides.size[joint, side], workspace[side]
-            _face_derivatives(sides, joint, side, rates.motion[joint, side], own)
-            _multiply_law(law, factor, 2 + side, own[1][:, :count], own[2])
-        for side in range(2):
-            for other in range(2):
-                counts = sides.size[joint, side], sides.size[joint, other]
-                own = places[sides.block_start[joint, side, other] :]
-                _add_product(
-                    counts, workspace[side, 0], workspace[other, 2], 2 + side, own, entries
-                )
+    for side in range(2):
+        count, own = sides.size[joint, side], workspace[side]
+        _face_derivatives(sides, joint, side, rates.motion[joint, side], own)
+        _multiply_law(law, factor, 2 + side, own[1][:, :count], own[2])
+    for side in range(2):
+        for other in range(2):
+            counts = sides.size[joint, side], sides.size[joint, other]
+            own = places[sides.block_start[joint, side, other] :]
+            _add_product(counts, workspace[side, 0], workspace[other, 2], 2 + side, own, entries)
     # rotation stiffness of each face with a frame
     for side in range(2):
         if sides.has_frame[joint, side]:
@@ -104,16 +101,6 @@ def copy_rates(source, target, joint):  # type: ignore
             target.motion[joint, side, k] = source.motion[joint, side, k]
         for k in range(5):
             target.bend[joint, side, k] = source.bend[joint, side, k]
-
-
-@kernel
-def _has_entries(law):  # type: ignore
-    """Return whether forces change at all; those of an open joint do not."""
-    for row in range(5):
-        for column in range(5):
-            if law[row, column] != 0.0:
-                return True
-    return False
 
 
 @kernel

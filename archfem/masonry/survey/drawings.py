@@ -426,11 +426,8 @@ def _block_name(outline: Outline, inside: Sequence[str], number: int) -> str:
     if inside:
         return inside[0]
     # a number alone, such as layer 0 of entities without one, is no name
-    return (
-        f"layer {outline.layer}, stone {number}"
-        if outline.layer.isdigit()
-        else f"{outline.layer} {number}"
-    )
+    stem = f"layer {outline.layer}, stone" if outline.layer.isdigit() else outline.layer
+    return f"{stem} {number}"
 
 
 def _check_polygon(given: Any, name: str, factor: float) -> Array:

@@ -363,13 +363,8 @@ def write_outlines(structure: Structure, path: str | Path) -> None:
     features = []
     for block in structure.blocks:
         ring = block.drawn().tolist()
-        properties = {
-            "name": block.name,
-            "part": block.part,
-            "role": block.role,
-            "material": block.material.name,
-            "fixed": block.fixed,
-        }
+        properties: dict[str, Any] = {key: getattr(block, key) for key in ("name", "part", "role")}
+        properties |= {"material": block.material.name, "fixed": block.fixed}
         geometry = {"type": "Polygon", "coordinates": [[*ring, ring[0]]]}
         features.append({"type": "Feature", "properties": properties, "geometry": geometry})
     lines = ",\n".join(json.dumps(feature, ensure_ascii=False) for feature in features)

@@ -71,11 +71,6 @@ class CorotationalCoordinates:
         stacked = sparse.block_diag(bases, format="csr")
         return cls(stacked[np.argsort(np.concatenate(order))], blocks, centres)
 
-    @property
-    def block_starts(self) -> Array:
-        """First coordinate of each free block, and the number of all (m + 1,)."""
-        return np.array([0, *(span.stop for span, _ in self.blocks.values())])
-
 
 def _corotational_basis(small: LinearBlockModel, columns: Any, number: int) -> tuple[Array, Array]:
     """Return rigid and elastic motions of a block in the model's coordinates, and its centre."""
@@ -181,23 +176,16 @@ class RotatingCells(Cells):
     def displacement(self, q: Array) -> Array:
         """Return the displacements of all points (…, m, 2) [m]."""
         (rx, ry), elastic = self._arms
-        # once for each block, and then for its points
-        frames, frame = self._frames
-        turn, x, y = (np.where(frames >= 0, q[..., frames - k], 0.0) for k in (0, 2, 1))
+        turns = self.turns
+        turn, x, y = (np.where(turns >= 0, q[..., turns - k], 0.0) for k in (0, 2, 1))
         # (x, y) + (R - I) r + R u, with cos θ - 1 by the half angle
         c, s, less = np.cos(turn), np.sin(turn), -2.0 * np.sin(0.5 * turn) ** 2
-        x, y, c, s, less = (each[..., frame] for each in (x, y, c, s, less))
         dx, dy = x + less * rx - s * ry, y + s * rx + less * ry
         if elastic.nnz:
             strained = np.asarray(elastic @ q.T).T.reshape(*x.shape, 2)
             u, v = strained[..., 0], strained[..., 1]
             dx, dy = dx + c * u - s * v, dy + s * u + c * v
         return np.stack([dx, dy], axis=-1)
-
-    @cached_property
-    def _frames(self) -> tuple[Any, Any]:
-        """Coordinates of the rotations of all blocks, and the number of each point's (m,)."""
-        return np.unique(self.turns, return_inverse=True)
 
 
 @dataclass(frozen=True, eq=False)
@@ -252,7 +240,7 @@ class LargeDisplacementModel(Model):
         self.fidelity = small.fidelity
         self.size = self.small.size
         # first coordinate of each free block, and the number of all
-        self.block_starts = blocks.block_starts
+        self.block_starts = np.array([0, *(span.stop for span, _ in blocks.blocks.values())])
         # whether each free block has a rotating frame; fill has none
         self.has_frame = np.array([turns for _, turns in blocks.blocks.values()])
         self.centres = blocks.centres  # about which blocks rotate (n_blocks, 2) [m]
