@@ -123,3 +123,10 @@ def test_rings_on_a_pier_that_one_stone_would_not_part_are_refused():
     given = {"spans": [3.2, 3.2], "rises": 1.6, "thicknesses": 0.4, "voussoirs": 5, "heights": 2.0}
     with pytest.raises(af.errors.InvalidStructure, match=r"'pier 2'.* on a breadth of 0.7 m, and"):
         shapes.arcade(breadths=[1.0, 0.7, 1.0], **given)
+
+
+@pytest.mark.parametrize("course", [1e-320, 1e-5])
+def test_more_courses_than_there_is_room_for_are_refused(course):
+    given = {"span": 4.0, "rise": 1.0, "thickness": 0.3, "voussoirs": 9, "breadth": 1.5}
+    with pytest.raises(af.InvalidInput, match=r"courses of 'pier 1': 3 by .* room for 10000"):
+        shapes.buttressed_arch(height=3.0, course=course, **given)

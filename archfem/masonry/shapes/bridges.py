@@ -534,7 +534,7 @@ class StoneworkBuilder:
         (x, y), (edge, level) = face
         # from the clear springing, or from that of the centre line
         outer = 0.5 * (x + edge) - inward * pier.gap_beside(0.5 * abs(edge - x))
-        step = pier.height / max(1, round(pier.height / pier.course))
+        step = pier.height / count_pieces(pier.height, pier.course, f"courses of '{pier.name}'")
         if not inward * (edge - outer) >= 0.0 or y <= -step:
             raise InvalidStructure(
                 f"'{pier.name}': a ring does not stand on {_width_text(pier)} and a course "
