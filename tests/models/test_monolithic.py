@@ -151,7 +151,7 @@ def test_no_cell_has_two_facets_of_one_colour():
     cells_at = _fenicsx.find_connectivity(facets.space.mesh.grid, 1, 2)
     pairs = [
         (cell, colour)
-        for facet, colour in zip(facets.numbers, facets.colours, strict=True)
+        for facet, colour in zip(facets.space.facets.numbers, facets.colours, strict=True)
         for cell in cells_at(facet)
     ]
     assert len(set(pairs)) == len(pairs)

@@ -114,14 +114,8 @@ def _piecewise_means(u, v):  # type: ignore
         p, q = greatest(u, LARGEST_CLOSING), greatest(v, LARGEST_CLOSING)
         is_whole = (p == u) & (q == v)
         begin, end = (p - u) * share, select(is_whole, 1.0, (q - u) * share)
-        others = _spread(_tangent_moments(p, q), begin, end)
-        means = (
-            means[0] + others[0],
-            means[1] + others[1],
-            means[2] + others[2],
-            means[3] + others[3],
-            means[4] + others[4],
-        )
+        (near, far, first, mixed, last), more = means, _spread(_tangent_moments(p, q), begin, end)
+        means = near + more[0], far + more[1], first + more[2], mixed + more[3], last + more[4]
     return means
 
 

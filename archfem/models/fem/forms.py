@@ -58,13 +58,10 @@ class ContactFaces:
     facets: JointFacets  # on all joints
     patch: Patch  # those of this contact and of one colour
 
-    def _number(self, value: float) -> Any:
-        return _fenicsx.constant(self.facets.space.mesh.grid, value)
-
     @cached_property
     def _law(self) -> ContactLaw:
         """Contact law with constants of the forms."""
-        return ContactLaw.of(self.patch.contact).mapped(self._number)
+        return ContactLaw.of(self.patch.contact).mapped(self.facets.space.constant)
 
     @cached_property
     def _normal(self) -> Any:
@@ -219,15 +216,13 @@ class Forms:
         """Faces of the joints, one entry for each contact and colour."""
         return [ContactFaces(self.facets, patch) for patch in self.facets.patches]
 
-    def _number(self, value: float) -> Any:
-        return _fenicsx.constant(self.space.mesh.grid, value)
-
     def _stress(self, u: Any, material: Material) -> Any:
-        return plane_stress(u, self._number(material.young), self._number(material.poisson))
+        moduli = map(self.space.constant, (material.young, material.poisson))
+        return plane_stress(u, *moduli)
 
     def block_work(self, u: Any, v: Any) -> Any:
         """Return ∫ w σ(u):ε(v), a UFL form."""
-        width = self._number(self.space.mesh.structure.width)
+        width = self.space.constant(self.space.mesh.structure.width)
         return sum(
             width * ufl.inner(self._stress(u, material), strain(v)) * dx
             for material, dx in self._measures
@@ -235,7 +230,7 @@ class Forms:
 
     def over_joints(self, densities: list[Any]) -> Any:
         """Return Σ ∫ w d over the joints, a UFL form."""
-        width = self._number(self.space.mesh.structure.width)
+        width = self.space.constant(self.space.mesh.structure.width)
         pairs = zip(densities, self.faces, strict=True)
         return sum(width * density * faces.patch.measure for density, faces in pairs)
 
@@ -259,9 +254,9 @@ class Forms:
         """Assemble the consistent mass [kg]."""
         structure = self.space.mesh.structure
         u, v = ufl.TrialFunction(self.space.functions), ufl.TestFunction(self.space.functions)
-        width = self._number(structure.width)
+        width = self.space.constant(structure.width)
         integral = sum(
-            width * self._number(m.unit_weight / structure.gravity) * ufl.inner(u, v) * dx
+            width * self.space.constant(m.unit_weight / structure.gravity) * ufl.inner(u, v) * dx
             for m, dx in self._measures
         )
         return _fenicsx.assemble_matrix(fem.form(integral))

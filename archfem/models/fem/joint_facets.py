@@ -58,11 +58,6 @@ class JointFacets:
         return self.rule.count(self.space.degree)
 
     @property
-    def numbers(self) -> Numbers:
-        """Numbers of the facets in the mesh (f,)."""
-        return self.space.facets.numbers
-
-    @property
     def joint(self) -> Numbers:
         """Number of each facet's joint (f,)."""
         return self.space.facets.joint
@@ -128,7 +123,7 @@ class JointFacets:
         of_joint = np.array([contacts.index(joint.contact) for joint in joints])
         count = self._colour_count
         numbers = of_joint[self.joint] * count + self.colours
-        tags = _fenicsx.tag_entities(grid, 1, self.numbers, numbers)
+        tags = _fenicsx.tag_entities(grid, 1, self.space.facets.numbers, numbers)
         # FFCx's name of the rule, and the degree of the polynomials it integrates exactly
         name, loss = ("default", 1) if self.rule.rule == "gauss" else ("GLL", 3)
         metadata = {"quadrature_rule": name, "quadrature_degree": 2 * self.size - loss}

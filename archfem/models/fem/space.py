@@ -44,6 +44,10 @@ class BrokenSpace:
         nodes = np.flatnonzero(moves[self.owner])
         return (2 * nodes[:, None] + np.arange(2)).ravel()
 
+    def constant(self, value: float) -> Any:
+        """Return a constant of forms on the mesh: with another value the same code serves."""
+        return _fenicsx.constant(self.mesh.grid, value)
+
     @cached_property
     def facets(self) -> "OrderedFacets":
         """Facets on all joints, in the order of their joints, along each of them."""
