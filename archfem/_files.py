@@ -51,7 +51,7 @@ _is_junction = getattr(os.path, "isjunction", lambda _: False)
 
 # Number of the format of result files: raise it where a key, column or attribute of them changes
 # name or meaning. A file of another number is refused when it is read.
-FORMAT = 7
+FORMAT = 8
 
 # What computes a file of another format again, by its kind
 REMEDIES = {

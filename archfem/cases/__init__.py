@@ -9,6 +9,7 @@
     motion_keys      [motion] and [suite]
     provenance       digests of inputs and program, modules of the user
     push_factors     pushes as multiples of the acceleration of a site
+    rating_text      ratings of bridges as text
     report           HTML report of the results of a case
     result_folder    result folders written and opened again
     result_text      results as text

@@ -19,11 +19,10 @@ from archfem.dynamics.motion_scaling import CollapseScale
 from archfem.dynamics.scale_search import MechanismScales
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.limit.fill_range import FillRange
-from archfem.limit.rating import Rating
 from archfem.masonry.loads import AttachedLoad, name_side
 from archfem.masonry.materials import COURSE_LENGTH
 from archfem.masonry.out_of_plane import describe_transverse_push, find_transverse_push
-from archfem.masonry.structure import Structure, join_words
+from archfem.masonry.structure import Structure
 from archfem.models.model import Doubt, read_doubts, write_doubts
 from archfem.motion.hazard import DESIGN_PERIOD, MEASURES
 from archfem.motion.motion import Motion
@@ -241,78 +240,6 @@ def state_scale(
     row = Row(result, f"'{motion.name}', PGA {pga:.2f} g", words, factor, scales._asdict())
     stated = Statement([f"{result}: {words}"], [row], found.doubts).with_remarks(remarks)
     return {**stated.as_file("scale"), **files}
-
-
-# All that is unfavourable in the variations of a rating, which may be left out
-ALL_AT_ONCE, NOT_COMPUTED = "all unfavourable at once", "not computed"
-AT_ONCE_BY_CS454 = f"{ALL_AT_ONCE}, by CS 454"
-
-
-def state_ratings(
-    rated: Sequence[tuple[Rating, Sequence[Remark]]], varied: ResultTable | None = None
-) -> Statement:
-    """State the factor of each vehicle, by codes too, least first; sentences are of the first.
-
-    `varied` has the factors of one of them with other properties.
-    """
-    rows, first = list[tuple[float, Row]](), rated[0][0]
-    for found, _ in rated:
-        for code, each in {"": found, **found.by_codes}.items():
-            demand, words = f"{found.vehicle.name} {code}".strip(), each.short_outcome
-            at, flips = f", {each.place}" if each is found else "", ""
-            own = varied is not None and varied.head[0] == f"{found.label} with"
-            if varied and own and each.passes and "CS 454" not in code:  # on one axle, no multiple
-                flips = _say_flips(each.factor / found.factor, varied)
-            stands = not np.isnan(each.factor)
-            at += "".join(f"; {x}" for x in (*(each.say_losses() if stands else []), flips) if x)
-            least, state = each.least, ", ".join(of for _, of in each.list_losses() if stands)
-            if varied and own:
-                least, state = _compare_at_once(each, code, found.factor, varied, state)
-            factor = "-" if np.isnan(each.factor) else format_ratio(each.factor, 4)
-            numbers = {"passes": bool(each.passes), "least": least} | (
-                {"state": state} if state else {}
-            )
-            rows.append((each.factor, Row("rating", demand, f"{words}{at}", factor, numbers)))
-    sentences = [repr(first)]
-    if not np.isnan(first.factor):
-        outcome, *others = first.clauses
-        outcome = f"rating for {first.vehicle.name}: {first.said_factor}, {outcome}"
-        sentences = [outcome, f"worst {first.place}", *others]
-    if len(rated) > 1:
-        least, code = first.least_by_codes
-        words = f", {least:.4g} {code}" * bool(code)
-        sentences.append(f"of {len(rated)} vehicles it has the least factor{words}")
-    sentences += [*first.describe_codes(), *first.describe_pressure(), *first.describe_backing()]
-    least_first = [row for _, row in sorted(rows, key=lambda each: each[0])]
-    stated = Statement(sentences, least_first)
-    return stated.with_remarks([each for _, own in rated for each in own])
-
-
-def _compare_at_once(
-    rated: Rating, code: str, given: float, varied: ResultTable, state: str
-) -> tuple[float, str]:
-    """Return the least factor, with all that is unfavourable at once too, and its state in words.
-
-    `given` is the factor of the varied vehicle. With an impact on one axle that is no share of it.
-    """
-    by_axle = "CS 454" in code and len(rated.by_cs454) > 0
-    cell = dict(varied.rows).get(AT_ONCE_BY_CS454 if by_axle else ALL_AT_ONCE, "-")
-    if cell in ("-", NOT_COMPUTED):
-        return rated.least, ", ".join(filter(None, [state, f"{ALL_AT_ONCE} {NOT_COMPUTED}"]))
-    share = 1.0 if by_axle else rated.factor / given
-    factor = share * float(cell.replace("does not stand", "0"))
-    return (factor, ALL_AT_ONCE) if factor < rated.least else (rated.least, state)
-
-
-def _say_flips(share: float, varied: ResultTable) -> str:
-    """Say with which properties a bridge that passes fails, by a multiple of their factors."""
-    factors = {
-        name: share * float(cell.replace("does not stand", "0"))
-        for name, cell in varied.rows
-        if cell not in ("-", NOT_COMPUTED) and name != AT_ONCE_BY_CS454
-    }
-    fails = [f"{name} ({x:.3g})" for name, x in factors.items() if x < 1.0]
-    return f"fails with {join_words(fails)}" * bool(fails)
 
 
 def state_assessments(

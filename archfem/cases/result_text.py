@@ -25,10 +25,8 @@ from archfem.dynamics.verdict import ALL_DEFINITIONS, Verdict, find_farthest
 from archfem.errors import filter_log
 from archfem.joints.criteria import assessed_joints, envelope, first_time, longest_duration
 from archfem.limit.collapse import Collapse, Outcome, describe_fill
-from archfem.limit.fill_strength import Fill, PlasticFill, as_pressure
-from archfem.limit.instability import describe_geometric_factor
+from archfem.limit.fill_strength import Fill, PlasticFill
 from archfem.limit.mechanism_count import Mechanism, duration_text
-from archfem.limit.rating import Rating
 from archfem.masonry.backfill import describe_held_ends
 from archfem.masonry.loads import Action, Settlement, describe_massless
 from archfem.masonry.out_of_plane import UNCHECKED_ACROSS, describe_transverse_push
@@ -38,7 +36,6 @@ from archfem.masonry.structure import (
     Structure,
     join_joint_names,
     join_names,
-    join_words,
     list_or_count,
 )
 from archfem.models.model import Doubt
@@ -97,9 +94,6 @@ OF_GIVEN_FILL = "with the fill as given, "
 
 # Share of its peak velocity with which a record may end, as ground that comes to rest [-]
 MAX_DRIFT = 0.1
-
-# Note on abutments, which a rating varies
-IMMOVABLE = "abutments are taken as immovable"
 
 
 class ResultTable(NamedTuple):
@@ -374,58 +368,6 @@ def note_masses(
     return [f"{NOTE_MARK}{each}" for each in words if each]
 
 
-def tabulate_ratings(ratings: Iterable[Rating]) -> ResultTable:
-    """Tabulate the ratings of a bridge for several vehicles."""
-    rows, columns, rated = [], list[str](), list(ratings)
-    by_codes = any(found.least_by_codes[1] for found in rated)
-    for found in rated:
-        columns, numbers = [*found.factors], found.factors.values()
-        cells = ["-" if np.isnan(value) else f"{value:.4g}" for value in numbers]
-        values = {"live": found.live, "impact": found.impact}
-        by = ("none" if key in found.missing else f"{x:g}" for key, x in values.items())
-        first, *others = found.clauses
-        outcome = "; ".join([f"{first}, {found.place}", *others])
-        least, code = found.least_by_codes
-        cells += [f"{least:.4g} {code.partition(' (')[0]}".strip()] * by_codes
-        rows.append([found.vehicle.name, " × ".join(by), *cells, outcome])
-    columns += ["least by codes"] * by_codes
-    head = ["vehicle", "live × impact", *(column.replace("_", " ") for column in columns)]
-    return ResultTable([*head, "outcome, and axles at the worst place"], rows)
-
-
-def describe_ratings(
-    case: Case, rated: Sequence[tuple[Rating, Sequence[Remark]]], varied: ResultTable | None = None
-) -> tuple[str, dict[str, str]]:
-    """Return the text of ratings and their doubts, and this and its tables as files."""
-    lines = [[*str(found).splitlines(), *mark_remarks(own)] for found, own in rated]
-    files, tables = {"rating.csv": rated[0][0].table()}, list[str]()
-    if len(rated) > 1:
-        summary = tabulate_ratings([found for found, _ in rated])
-        files["vehicles.csv"] = summary.csv
-        pairs = zip(summary.rows, rated, strict=True)
-        short = [[*row[:-1], x.short_outcome] for row, (x, _) in pairs]
-        tables = [ResultTable([*summary.head[:-1], "outcome"], short).text]
-        common = [line for line in lines[0] if all(line in other for other in lines)]
-        lines = [[line for line in own if line not in common] for own in lines]
-        lines.append(["of all vehicles:", *common])
-    at_rest = "" if np.isnan(rated[0][0].factor) else _describe_standing(case)
-    of_case = [at_rest, defaults.describe_fill_defaults(case)]
-    texts = [*tables, *("\n".join(each) for each in lines), *of_case]
-    files["rating.txt"] = "\n\n".join(filter(None, texts))
-    if varied is None:
-        return files["rating.txt"], files
-    files["rating_variations.csv"] = varied.csv
-    return f"{files['rating.txt']}\n\n{varied.text}", files
-
-
-def _describe_standing(case: Case) -> str:
-    """Say that a bridge stands under its own weight, with its factor of safety."""
-    limit, left_out = case.limit, defaults.say_loads_left_out(case)
-    depth = describe_geometric_factor(case.structure, limit.strength, limit.fill)
-    without = ", without parapets" * bool(case.parapets)
-    return f"it stands under its own weight{left_out}{without}{f': {depth}' * bool(depth)}"
-
-
 def note_lower_crowns(structure: Structure, fill: Fill | PlasticFill | None) -> list[str]:
     """Return a note on the fill above lower rings, where the crowns of rings differ."""
     crowns = dict[str, float]()
@@ -439,39 +381,6 @@ def note_lower_crowns(structure: Structure, fill: Fill | PlasticFill | None) -> 
         return []
     by = f"crowns differ by {high - low:.2f} m: fill above '{min(crowns, key=crowns.__getitem__)}'"
     return [f"{NOTE_MARK}{by} bears none of the passive pressure of a higher ring"]
-
-
-def doubt_rating(found: Rating, limit: LimitAnalysis) -> list[Remark]:
-    """Return doubts about a rating, equilibrium and a strength left out, and notes."""
-    if np.isnan(found.factor):
-        words = "limit analysis finds no equilibrium of the bridge under its own weight"
-        return [Doubt(words, "check the thickness of its rings and piers, and the fill")]
-    lines = list[Remark]()
-    if limit.strength is None and found.crushing_text:
-        words = "joints do not crush, as the case gives no strength of the stones: "
-        remedy = "give strength in [materials] or [limit]"
-        lines.append(Doubt(f"{words}{found.crushing_text}", remedy))
-    remedy = "show by tests that these act, or judge by the least factor"
-    if only := found.passes and found.needed:
-        lines.append(Doubt(f"the bridge passes only with {only}", remedy))
-    if "from memory" in str(found):
-        words = "values from memory were not compared with the text of their code"
-        lines.append(f"{NOTE_MARK}{words}: look them up before you sign")
-    if (fill := as_pressure(found.fill)) is not None:
-        least = fill.active / fill.passive_coefficient**2  # over the passive pressure
-        if fill.mobilisation < least:
-            words = f"mobilisation {fill.mobilisation:.2g} counts as {least:.2g}, the active"
-            lines.append(f"{NOTE_MARK}{words} pressure; 0 is not without pressure, which is beside")
-    structure = found.structure
-    lines += note_lower_crowns(structure, found.fill)
-    rings = [joint for joint in structure.joints if joint.role == "ring"]
-    if any(structure.blocks[number].fixed for joint in rings for number in joint.blocks):
-        words = 'state = "free" tests them, of [structure.sidewalls]'
-        lines.append(f"{NOTE_MARK}{IMMOVABLE}: {words}")
-    left_out = ["a second lorry that meets the vehicle", "all that spandrel walls carry"]
-    if not found.parapets:
-        left_out.append('parapets (their weight is parapets = "… kN/m" of [rating])')
-    return [*lines, f"{NOTE_MARK}left out: {join_words(left_out)}"]
 
 
 def describe_limit(

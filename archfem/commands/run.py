@@ -16,11 +16,11 @@ from archfem import _files
 from archfem._display import DOUBT_MARK, NOTE_MARK, ProgressReport, write_progress_line
 from archfem._files import create_result_folder
 from archfem._optional import can_film
-from archfem.cases import answers, defaults, result_text, structure_text
+from archfem.cases import answers, defaults, rating_text, result_text, structure_text
 from archfem.cases import result_folder as results
 from archfem.cases import run as case_run
 from archfem.cases.analysis_keys import name_vehicles, parse_rating, rate_case
-from archfem.cases.answers import RESULTS, state_ratings
+from archfem.cases.answers import RESULTS
 from archfem.cases.case import Case, sign
 from archfem.cases.run import CASE_FILE, RATING_FILE, DeadLoadResult, Result, Run, replace_run
 from archfem.cases.structure_keys import read_survey
@@ -283,7 +283,7 @@ def rate(case: Case, options: argparse.Namespace) -> int:
     tables = name_vehicles(options.vehicles, rating)
     rated = _rate_each(case, tables)
     ratings, (first, _, table), varied = [each[:2] for each in rated], rated[0], None
-    stated = state_ratings(ratings)
+    stated = rating_text.state_ratings(ratings)
     interrupted = len(ratings) < len(tables) and not np.isnan(first.factor)
     if options.vary and not interrupted and not np.isnan(first.factor):
         # the one whose outcome other properties change first
@@ -295,11 +295,11 @@ def rate(case: Case, options: argparse.Namespace) -> int:
             sentences.append(f"{words}others by --vehicle, each alone")
         freed = [cell for name, cell in varied.rows if name.startswith("abutments free")]
         if freed and "not computed" not in freed:
-            lines[:] = [x for x in lines if result_text.IMMOVABLE not in str(x)]
-        stated = state_ratings(ratings, varied)
+            lines[:] = [x for x in lines if rating_text.IMMOVABLE not in str(x)]
+        stated = rating_text.state_ratings(ratings, varied)
         lines[:0] = [*sentences, *doubts]
         stated = stated._replace(sentences=[*stated.sentences, *sentences]).with_remarks(doubts)
-    text, files = result_text.describe_ratings(case, ratings, varied)
+    text, files = rating_text.describe_ratings(case, ratings, varied)
     # the case of the folder, that of a run, may be rated for another vehicle
     files |= {RATING_FILE: format_tables({"rating": table}).rstrip(), **stated.as_file("rating")}
 
@@ -351,7 +351,7 @@ def _rate_each(
                 left = f"interrupted: {count - number} of {count} vehicles were not rated"
                 rated[-1][1].append(Doubt(left, "a new command rates all of its own"))
                 break
-            rated.append((found, [*doubts, *result_text.doubt_rating(found, case.limit)], table))
+            rated.append((found, [*doubts, *rating_text.doubt_rating(found, case.limit)], table))
             progress.show(f"{found.vehicle.name}: {found.headline.partition(',')[0]}", 1)
             if np.isnan(found.factor):  # whatever the vehicle
                 break

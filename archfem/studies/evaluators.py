@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 
 from archfem._validation import validate_arguments
-from archfem.cases import result_text
+from archfem.cases import rating_text, result_text
 from archfem.cases.analysis_keys import rate_case
 from archfem.cases.answers import doubt_fill, find_margin
 from archfem.cases.case import Case
@@ -247,7 +247,7 @@ def evaluate_rating(case: Case) -> Findings:
     """Return the factor of a case in each state of its fill, and the place of the vehicle."""
     with result_text.record_doubts(case.structure) as doubts:
         found = rate_case(case.structure, case.rating, case.limit)
-    stated = result_text.doubt_rating(found, case.limit)
+    stated = rating_text.doubt_rating(found, case.limit)
     doubts += [each for each in stated if isinstance(each, Doubt)]
     place = {"position": found.moving.position, "hinges": len(found.moving.worst.hinges)}
     return found.factors | place | _state_doubts(doubts)

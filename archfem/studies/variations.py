@@ -18,9 +18,9 @@ import xarray as xr
 from scipy.stats import qmc
 
 from archfem._validation import check_integer, validate_arguments
-from archfem.cases.answers import ALL_AT_ONCE, AT_ONCE_BY_CS454, NOT_COMPUTED
 from archfem.cases.case import Case
 from archfem.cases.defaults import list_default_keys
+from archfem.cases.rating_text import ALL_AT_ONCE, AT_ONCE_BY_CS454, NOT_COMPUTED
 from archfem.cases.result_text import ResultTable
 from archfem.cases.structure_keys import PRESETS, find_table
 from archfem.cases.toml_file import Table, format_key

@@ -130,7 +130,7 @@ def test_what_happens_at_the_upper_end_of_a_range_alone_is_a_note(angle, doubtfu
     assert [note.startswith(upper) for note in found.notes] == [True]
     noted, limit = f"with the fill as given, {upper}", LimitAnalysis((), None)
     assert f"\nnote: {noted}" in describe_collapse(buried_stone(), found, limit)
-    case = SimpleNamespace(structure=buried_stone(), limit=limit, parapets=0.0)
+    case = SimpleNamespace(structure=buried_stone(), limit=limit, parapets=0.0, motion=None)
     stated = json.loads(limit_files(case, found, "", None, [])["limit.json"])
     assert [note.startswith(noted) for note in stated["notes"]] == [True]
     assert found.least.notes == found.notes

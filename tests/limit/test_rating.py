@@ -11,8 +11,8 @@ from backfilled import arch_bridge
 
 import archfem as af
 from archfem.cases.analysis_keys import LimitAnalysis, parse_limit
-from archfem.cases.answers import state_ratings
-from archfem.cases.result_text import ResultTable, doubt_rating, tabulate_ratings
+from archfem.cases.rating_text import doubt_rating, state_ratings, tabulate_ratings
+from archfem.cases.result_text import ResultTable
 from archfem.limit import VEHICLES, Vehicle, rating, worst_places
 from archfem.limit.rating import _places_along as places_along
 from archfem.models.model import Doubt

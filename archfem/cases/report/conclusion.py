@@ -10,7 +10,7 @@ import numpy as np
 
 from archfem._files import group_of, read_file_list
 from archfem.cases import result_text
-from archfem.cases.answers import NOT_COMPUTED, RESULTS, Ratios, Row, Statement, read_numbers
+from archfem.cases.answers import RESULTS, Ratios, Row, Statement, read_numbers
 from archfem.cases.case import REPORT_KEYS
 from archfem.cases.defaults import (
     list_default_keys,
@@ -18,6 +18,7 @@ from archfem.cases.defaults import (
     say_loads_left_out,
 )
 from archfem.cases.push_factors import PushFactors
+from archfem.cases.rating_text import NOT_COMPUTED
 from archfem.cases.report import margins, outcomes
 from archfem.cases.report.demands import list_demands, name_spectrum, tabulate_demands
 from archfem.cases.report.doubts import (
