@@ -23,7 +23,7 @@ STACK = {
     "record": {"fields_every": 4},
 }
 
-MESSAGE = r"{} was written by another version of archfem \(format '.*', not '.* 7'\): "
+MESSAGE = r"{} was written by another version of archfem \(format '.*', not '.* 8'\): "
 """Begin of the message, behind the name of the file."""
 
 READERS = {

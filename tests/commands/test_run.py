@@ -400,7 +400,7 @@ def test_a_search_without_an_answer_is_not_drawn(tmp_path, undrawn, monkeypatch)
     for state in (None, stands):
         run = ScaledRun(1.0, {}, af.dynamics.Ending.FINISHED, "broken off", state)
         found = CollapseScale({0.005: MechanismScales(("collapse",), (run,))}, pga=1.0)
-        monkeypatch.setattr(margin, "collapse_scale", lambda *_, found=found, **__: found)
+        monkeypatch.setattr(motion_scaling, "collapse_scale", lambda *_, found=found, **__: found)
         af.commands.main(["scale", str(tmp_path / "block.toml"), "--out", str(tmp_path / "out")])
         assert (tmp_path / "out" / "scale.png").exists() is (state is not None)
 

@@ -7,6 +7,8 @@ second copy: a changed default changes the results of scripts, and is to be chan
 import inspect
 from importlib import import_module
 
+from archfem.units import Usual
+
 G = 9.81
 
 STRUCTURE = {"width": 1.0, "gravity": G}
@@ -167,7 +169,7 @@ def is_module(name):
 def is_number(value):
     members = value if isinstance(value, tuple) else (value,)
     return bool(members) and all(
-        is_number(each) if isinstance(each, tuple) else type(each) in (int, float)
+        is_number(each) if isinstance(each, tuple) else type(each) in (int, float, Usual)
         for each in members
     )
 

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from glued import glued
 
 import archfem as af
 
@@ -32,16 +31,6 @@ def models(arch):
 
 def test_a_stone_under_soil_keeps_its_four_corners(models):
     assert models["full"].size - models["faces"].size == (2 * 5 * 5 - 2 * 4) * STONES
-
-
-def test_joints_that_never_slide_are_spanned_unless_they_are_with_soil(arch, models):
-    held = af.build(glued(arch), fidelity={**SOIL, "rest": "faces"}, quadrature="exact")
-    slides = models["faces"].operator.points.slides.any()
-    for model, spanned in ((models["faces"], 8 if slides else 2), (held, 2)):
-        points = np.bincount(model.operator.points.joint)
-        for joint, count in zip(arch.joints, points, strict=True):
-            names = {arch.blocks[number].name for number in joint.blocks}
-            assert count == (8 if "backfill" in names else spanned)
 
 
 def test_the_basis_holds_rigid_motions(models):
