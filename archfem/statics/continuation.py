@@ -316,14 +316,14 @@ class LoadPath(EquilibriumPath):
 def _solve_bordered(
     tangent: sparse.csr_matrix, load: Array, row: Array, right: Array
 ) -> Array | None:
-    """Solve for steps of q and λ; None where their matrix is exactly singular."""
+    """Solve for steps of q and λ; None where their matrix is singular, or no step is finite."""
     try:
         matrix = _border(tangent, load, row)
-        if isinstance(matrix, np.ndarray):
-            return np.asarray(np.linalg.solve(matrix, right))
-        return np.asarray(splu(matrix).solve(right))
+        dense = isinstance(matrix, np.ndarray)
+        step = np.linalg.solve(matrix, right) if dense else splu(matrix).solve(right)
     except (RuntimeError, np.linalg.LinAlgError):  # from SuperLU, from LAPACK
         return None
+    return np.asarray(step) if np.isfinite(step).all() else None
 
 
 def _border(tangent: sparse.csr_matrix, load: Array, row: Array) -> Array | sparse.csc_matrix:

@@ -107,6 +107,14 @@ def test_steps_of_state_and_factor_solve_both_equations(size, seed):
 
 
 @pytest.mark.parametrize("size", [8, 401])
+def test_a_matrix_of_steps_that_overflow_has_no_solution(size):
+    tangent, load, row = steps_matrix(size, 0)
+    tangent = sparse.diags(np.append(1e-320, np.ones(size - 1))).tocsr() @ tangent
+    load[0] = 0.0
+    assert continuation._solve_bordered(tangent, load, row, np.ones(size + 1)) is None
+
+
+@pytest.mark.parametrize("size", [8, 401])
 def test_a_singular_matrix_of_steps_has_no_solution_and_no_sign(size):
     tangent, load, row = steps_matrix(size, 0)
     tangent = sparse.diags(np.append(0.0, np.ones(size - 1))).tocsr() @ tangent
