@@ -20,6 +20,9 @@ from archfem.units import G, GPa, MPa, StatedWeight, Usual, kN
 # Largest closing of a joint [m]: those measured are below 1 mm, so that more is in millimetres
 MAX_CLOSURE = 0.02
 
+# Coefficient of friction of dry joints where none is given [-]
+USUAL_FRICTION = Usual(0.60)
+
 
 def _check_range(item: Any, key: str, low: float, high: float, remedy: str) -> None:
     """Check that a field is a number between two values."""
@@ -134,7 +137,7 @@ class Contact:
 
     normal_stiffness: PascalsPerMetre
     shear_stiffness: PascalsPerMetre
-    friction: Friction = Usual(0.60)  # noqa: RUF009
+    friction: Friction = USUAL_FRICTION
     name: str = "contact"
     cohesion: Pascals = 0.0
     dilatancy: float = 0.0
@@ -254,8 +257,8 @@ COURSE_LENGTH = "its length"
 # 2.60 MPa that it prints for backfill is that of an isotropic material, E / 2 (1 + ν).
 STONE = Material(Usual(30.0 * GPa), Usual(0.2), Usual(20.0 * kN), Usual(56.0 * MPa), "stone")
 BACKFILL = Material(Usual(6.25 * MPa), Usual(0.2), Usual(18.0 * kN), None, "backfill")
-STONE_TO_STONE = Contact(Usual(1.48e9), Usual(0.30e9), Usual(0.60), "stone to stone")
-SOIL_TO_STONE = Contact(Usual(0.30e9), Usual(0.24e9), Usual(0.60), "soil to stone")
+STONE_TO_STONE = Contact(Usual(1.48e9), Usual(0.30e9), USUAL_FRICTION, "stone to stone")
+SOIL_TO_STONE = Contact(Usual(0.30e9), Usual(0.24e9), USUAL_FRICTION, "soil to stone")
 
 # Named presets
 MATERIAL_PRESETS = {material.name: material for material in (STONE, BACKFILL)}
