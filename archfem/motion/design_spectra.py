@@ -1,7 +1,7 @@
 """Elastic design spectra in g: Turkish, European, Italian and American codes, and tables."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import Annotated, Any, ClassVar, Protocol
 
 import numpy as np
@@ -61,6 +61,13 @@ def _validate_periods(periods: float | Array, longest: float) -> Array:
 def damping_correction(damping: float) -> float:
     """Return the damping correction factor η of European codes [-]."""
     return max(float(np.sqrt(10.0 / (5.0 + 100.0 * damping))), 0.55)
+
+
+def damped_acceleration(spectrum: DesignSpectrum, periods: float | Array, damping: float) -> Array:
+    """Return horizontal spectral accelerations at a damping in the shape of the periods [g]."""
+    if is_dataclass(spectrum) and "damping" in {each.name for each in fields(spectrum)}:
+        return np.asarray(replace(spectrum, damping=damping).horizontal(periods))
+    return np.asarray(damping_correction(damping) * spectrum.horizontal(periods))
 
 
 @dataclass(frozen=True)
@@ -523,30 +530,33 @@ class Eurocode2024(CodeSpectrum):
 class FloorSpectrum:
     """Spectrum of what stands on a height of a building, by the first mode of the building.
 
-    With A = 1.1 / √ξ_1 and a_Z = S(T_1) · amplification · √(1 + 4 ξ_1²) it is a_Z at period zero,
+    With A = 1.1 η(ξ) / √ξ_1 and a_Z = S(T_1, ξ_1) · amplification · √(1 + 4 ξ_1²) it is a_Z at
+    period zero,
 
         a_Z A / (1 + (A - 1) (1 - T / (0.8 T_1))^1.6)  up to 0.8 T_1,  a_Z A  up to 1.1 T_1,
         a_Z A / (1 + (A - 1) (T / (1.1 T_1) - 1)^1.2)  beyond,
 
-    and nowhere below S, the spectrum of the ground. It has no vertical. With height and storeys in
-    place of the amplification, this is 3 n / (2 n + 1) z / H at the foot z of each mechanism of
-    an assessment; `horizontal` is then that of the ground, z = 0.
+    and nowhere below S(T, ξ), the spectrum of the ground, as the rule requires beyond T_1 alone.
+    It has no vertical. With height and storeys in place of the amplification, this is
+    3 n / (2 n + 1) z / H at the foot z of each mechanism of an assessment, also above H;
+    `horizontal` is then that of the ground, z = 0.
 
     Args:
         ground_spectrum: spectrum of the ground, S.
-        period: T_1 of the building [s]; by default 0.05 H^(3/4), that of masonry.
+        period: T_1 of the building [s]; by default 0.05 H^(3/4), that of masonry up to 40 m.
         amplification: participation of the mode times its shape at the height [-].
         building_damping: ξ_1 [-].
         height: H of the building above the ground, in place of the amplification [m].
         storeys: number n of its storeys, as equal ones.
+        damping: ξ of what stands there [-].
 
     Raises:
         InvalidInput: a value is out of range; not one of amplification and height with storeys is
             given; or the spectrum of the ground ends before a period.
 
     References:
-        Circolare 7/2019, C7.2.3 and C7.3.3.2, and Degli Abbati, Cattari and Lagomarsino (2018), all
-        from memory: check them before you sign.
+        Circolare 7/2019, eq. C7.2.5 to C7.2.10, read in a transcription, and C7.3.2; these are of
+        Degli Abbati, Cattari and Lagomarsino, Bull. Earthquake Eng. 16 (2018).
 
     Example:
         >>> ground = af.motion.Ntc2018(ag=0.18, f0=2.5, tc_star=0.32, site="B")
@@ -561,6 +571,7 @@ class FloorSpectrum:
     building_damping: float = 0.05
     height: Metres | None = None
     storeys: int | None = None
+    damping: OtherDamping = 0.05
 
     def __post_init__(self) -> None:
         either = self.amplification, self.height, self.storeys
@@ -579,6 +590,7 @@ class FloorSpectrum:
         share = self.amplification or 0.0
         check_between(share, "floor spectrum, amplification [-]", 0.0, 3.0, ends="[]")
         check_between(self.building_damping, "floor spectrum, building_damping", 0.005, 0.3)
+        check_oscillators(np.zeros(1), self.damping)
 
     @property
     def own_period(self) -> float:
@@ -589,8 +601,13 @@ class FloorSpectrum:
     def level(self) -> float:
         """Spectral acceleration a_Z at period zero, without that of the ground [g]."""
         level = (self.amplification or 0.0) * np.sqrt(1.0 + 4.0 * self.building_damping**2)
-        level *= damping_correction(self.building_damping)
-        return float(level * self.ground_spectrum.horizontal(self.own_period))
+        given = self.ground_spectrum, self.own_period, self.building_damping
+        return float(level * damped_acceleration(*given))
+
+    @property
+    def resonance(self) -> float:
+        """Largest spectral acceleration over that at period zero, without the ground's, A [-]."""
+        return 1.1 * damping_correction(self.damping) / float(np.sqrt(self.building_damping))
 
     def at(self, foot: float) -> "FloorSpectrum":
         """Return that of what stands at a height above the ground [m]; itself without `height`."""
@@ -610,12 +627,11 @@ class FloorSpectrum:
             periods: natural periods, of any shape [s].
         """
         ratio = np.asarray(periods) / self.own_period
-        level, resonance = self.level, 1.1 / np.sqrt(self.building_damping)
+        level, resonance = self.level, self.resonance
+        ground = damped_acceleration(self.ground_spectrum, periods, self.damping)
         below, beyond = np.maximum(1.0 - ratio / 0.8, 0.0), np.maximum(ratio / 1.1 - 1.0, 0.0)
         reduction = 1.0 + (resonance - 1.0) * (below**1.6 + beyond**1.2)
-        return np.asarray(
-            np.maximum(level * resonance / reduction, self.ground_spectrum.horizontal(periods))
-        )
+        return np.asarray(np.maximum(level * resonance / reduction, ground))
 
     def vertical(self, periods: float | Array) -> Array:
         """Refuse the vertical, which the rule does not have."""

@@ -1,7 +1,7 @@
 """Checks of a kinematic assessment: rules of codes, and capacity against demand."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -22,7 +22,7 @@ from archfem.motion.design_spectra import (
     FloorSpectrum,
     Ntc2018,
     TableSpectrum,
-    damping_correction,
+    damped_acceleration,
     registered_spectra,
 )
 from archfem.motion.motion import Motion
@@ -355,23 +355,30 @@ def describe_floor(spectrum: DesignSpectrum | Motion) -> str:
     return f" ({spectrum.describe()})"
 
 
+def note_free_elements(spectrum: DesignSpectrum | Motion) -> list[str]:
+    """Note that the linear check is of what does not vibrate by itself, where a floor shakes it."""
+    if not describe_floor(spectrum) or not isinstance(spectrum, FloorSpectrum):
+        return []
+    return [
+        "the linear check takes a_Z, that of what cross walls hold until it moves; of what "
+        "vibrates freely, as a parapet or a gable above its eaves, eq. C8.7.1.9 takes the spectrum "
+        f"at its own period T_0, up to {spectrum.resonance:.3g} times as much"
+    ]
+
+
 def spectral_acceleration(
     spectrum: DesignSpectrum | Motion, periods: Array, damping: float
 ) -> Array:
     """Return the horizontal pseudo-acceleration spectrum at a damping (n,) [m/s²]."""
     if isinstance(spectrum, Motion):
         return response_spectrum(spectrum, periods, damping)
-    factor = STANDARD_GRAVITY
-    if is_dataclass(spectrum) and "damping" in {each.name for each in fields(spectrum)}:
-        spectrum = replace(spectrum, damping=damping)
-    else:
-        factor *= damping_correction(damping)
     # the spectral displacement is held beyond the longest period of European codes
     ground = getattr(spectrum, "ground_spectrum", spectrum)
     longest = 4.0 if isinstance(ground, Eurocode8 | Ntc2018 | Eurocode2024) else np.inf
     held = np.minimum(periods, longest)
     beyond = np.where(periods > longest, longest / np.maximum(periods, 1e-9), 1.0)
-    return np.asarray(factor * spectrum.horizontal(held) * beyond**2)
+    own = damped_acceleration(spectrum, held, damping)
+    return np.asarray(STANDARD_GRAVITY * own * beyond**2)
 
 
 def peak_acceleration(spectrum: DesignSpectrum | Motion) -> float:

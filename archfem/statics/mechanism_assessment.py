@@ -63,6 +63,7 @@ from archfem.statics.assessment_checks import (
     describe_floor,
     find_height_left_out,
     list_lower,
+    note_free_elements,
     peak_acceleration,
     place_spectrum,
     secant_period,
@@ -593,6 +594,7 @@ class _Oscillator:
         if self.path is None:
             return []
         found = describe_loads(self.path, self.given.loads, self.ties, self.stretches)
+        found += note_free_elements(self.spectrum)
         collapse = self.path.mechanisms[0].factor
         if factor < (1.0 - 1e-3) * collapse:
             found.append(

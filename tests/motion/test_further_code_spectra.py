@@ -4,6 +4,8 @@ The coefficients and branches were compared with other people's transcriptions o
 two of those differed, nothing was taken from either: the user gives such a value.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.signal import lsim
@@ -12,6 +14,7 @@ import archfem as af
 from archfem.cases.motion_keys import build_spectrum
 from archfem.motion import Asce2022, Eurocode2024, Ntc2018
 from archfem.motion.response_spectra import response_spectrum
+from archfem.statics.assessment_checks import spectral_acceleration
 
 ROUND_OFF = 1e-12
 
@@ -147,6 +150,13 @@ def test_a_floor_spectrum_at_its_corners():
     expected = level * np.array([1.0, 1.1 / np.sqrt(0.03), 1.1 / np.sqrt(0.03)])
     assert floor.horizontal([0.0, 0.2, 0.275]) == pytest.approx(expected)
     assert af.motion.FloorSpectrum(ground, 0.25, 0.3).horizontal(4.0) == ground.horizontal(4.0)
+    # the damping of what stands there lowers the peak, and the branches by less
+    peak = 1.1 / np.sqrt(0.03) * np.sqrt(10.0 / 13.0)
+    parts = 1.0 + (peak - 1.0) * np.array([0.5**1.6, 1.0**1.2])
+    damped = replace(floor, damping=0.08)
+    assert damped.horizontal([0.1, 0.55]) == pytest.approx(level * peak / parts)
+    own = spectral_acceleration(floor, np.array([0.1, 0.55]), 0.08) / af.units.STANDARD_GRAVITY
+    assert own == pytest.approx(level * peak / parts)
     case = {"code": "floor", "period": "0.25 s", "amplification": 1.5, "building_damping": 0.03}
     case["ground_spectrum"] = {"code": "NTC-2018", "ag": 0.17, "f0": 2.45, "tc_star": 0.32}
     case["ground_spectrum"]["site"] = "B"

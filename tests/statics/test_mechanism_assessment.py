@@ -1709,7 +1709,10 @@ def test_a_floor_spectrum_follows_the_mechanism_up_a_front(verified):
         assert says in str(above)
         (row,) = (x for x in state_assessments({"x": above}, ()).rows if "linear" in x.result)
         assert row.demand == says.removeprefix("demand ")
+        # 1.1 / √0.05 of what vibrates by itself
+        assert "at its own period T_0, up to 4.92 times as much" in str(above)
         assert "amplification" not in str(found.linear)
+        assert "T_0" not in str(found).partition("rocking of all above")[0]
         assert not any("that of the ground" in each.cause for each in above.doubts)
     # from the floors on: what a column above them has for its tie
     roof = {"block": "block 1", "point": [0.0, 3.7], "weight": 5e3, "force": [1.5e3, 0.0]}
