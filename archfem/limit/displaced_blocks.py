@@ -72,7 +72,7 @@ class Tie(NamedTuple):
     anchor: int | None  # block at the other end, None for the ground
     place: Array  # (2,) [m]
     force: Array  # largest, towards the other end (2,) [N]
-    length: float  # between two blocks, 0 to the ground [m]
+    stretch: float  # from rest; to the ground that along its force [m]
 
     @property
     def size(self) -> float:
@@ -93,6 +93,7 @@ class PlacedBlocks:
     growing: tuple[AttachedLoad, ...] = ()  # forces that grow, instead of the horizontal ones
     # by which faces end before each joint, where it crushes (n_joints,) [m]
     setback: Array = field(default_factory=lambda: np.zeros(0))
+    longest: float | Array = 0.0  # largest stretch of each tie so far (n_ties,) [m]
 
     @classmethod
     def at_rest(
@@ -172,15 +173,30 @@ class PlacedBlocks:
         for block, place, load in self.attached:
             if not (load.passive and any(load.force)):
                 continue
-            force, anchor, length = np.array(load.force), None, 0.0
+            force, anchor, rest = np.array(load.force), None, np.array(load.point)
+            stretch = (rest - place) @ force / np.hypot(*force)
             if load.anchor is not None:
                 anchor = self.structure.block_number(load.anchor)
                 chord = self.places(np.array(load.anchor_point), anchor) - place
-                length = float(np.hypot(*chord))
-                force = np.hypot(*force) * chord / length
+                stretch = np.hypot(*chord) - np.hypot(*(load.anchor_point - rest))
+                force = np.hypot(*force) * chord / np.hypot(*chord)
             ends = [self.structure.blocks[k].name for k in (block, anchor) if k is not None]
-            found.append(Tie(" and ".join(ends), block, anchor, place, force, length))
+            found.append(Tie(" and ".join(ends), block, anchor, place, force, float(stretch)))
         return found
+
+    @cached_property
+    def stretches(self) -> Array:
+        """Present stretch of each tie (n_ties,) [m]."""
+        return np.array([tie.stretch for tie in self.ties])
+
+    @cached_property
+    def slack(self) -> Flags:
+        """Whether each tie is shorter than it was before, or at rest (n_ties,)."""
+        return self.stretches < self.longest - TOUCHING * self.structure.size
+
+    def keep_stretches(self) -> "PlacedBlocks":
+        """Return the blocks with the present stretches of ties among those so far."""
+        return replace(self, longest=np.maximum(self.longest, self.stretches))
 
     @cached_property
     def live(self) -> Array:
@@ -382,11 +398,13 @@ class Bodies:
     def bounded_forces(self) -> tuple[csr_matrix, csr_matrix]:
         """Return generalised least forces of the fill, and those that it and the ties may add.
 
-        Each is (n, 3 n_bodies); of the latter a share from 0 to 1 acts.
+        Each is (n, 3 n_bodies); of the latter a share from 0 to 1 acts. Slack ties have no force.
         """
-        fill, blocks = self.blocks.fill, self.blocks
+        fill, blocks, pulls = self.blocks.fill, self.blocks, self.tie_forces
+        if blocks.slack.any():
+            pulls = (sparse.diags(1.0 - blocks.slack) @ pulls).tocsr()
         if fill is None:
-            return csr_matrix((0, 3 * self.count)), self.tie_forces
+            return csr_matrix((0, 3 * self.count)), pulls
         arms = fill.points - blocks.structure.centroids[fill.block]
         turned = rotate(arms, blocks.displacement[fill.block, 2])
         body = self.body[fill.block]
@@ -399,20 +417,21 @@ class Bodies:
         )
         further = (fill.shared.T @ further).tocsr()
         if blocks.ties:  # a stack of matrices takes longer than all before
-            further = sparse.vstack([further, self.tie_forces], format="csr")
+            further = sparse.vstack([further, pulls], format="csr")
         return least, further
 
     def find_held_ties(self, velocity: Array) -> Numbers:
-        """Return the ties that a velocity neither stretches nor slackens, between two bodies."""
+        """Return the taut ties whose length a velocity keeps, between two bodies."""
         far, near = self.tied_bodies.T
         sizes = np.array([tie.size for tie in self.blocks.ties])
-        return np.flatnonzero((np.abs(self.tie_forces @ velocity) <= STILL * sizes) & (far != near))
+        keeps = np.abs(self.tie_forces @ velocity) <= STILL * sizes
+        return np.flatnonzero(keeps & (far != near) & ~self.blocks.slack)
 
     def dead_forces(self, velocity: Array | None = None, held: Numbers | None = None) -> Array:
         """Return the generalised forces that do not grow (3 n_bodies,).
 
         The fill presses actively, and passively where a velocity moves a stone into it. A tie that
-        it stretches pulls with all of its force, and those that are held are left out.
+        it stretches pulls with all of its force, unless it is slack. Held ones are left out.
         """
         least, further = self.bounded_forces
         dead = self.generalised(self.blocks.dead) + least.sum(axis=0).A1

@@ -9,7 +9,8 @@ virtual work on the velocities there.
 These events change the mechanism: a joint that closes again, a contact that would need tension, a
 corner that slides off its face, and a tie that slackens or yields. There, limit analysis is
 repeated on the displaced blocks, with friction at the contacts that remain, and its mechanism is
-followed from then on.
+followed from then on. Ties are rigid-plastic: one that was longer before, or at rest, does not
+pull.
 
 Faces slide flat: sliding in limit analysis dilates by μ (associated flow), the finite motion does
 not. Where a joint slides and others hinge, α at rest can therefore be below the collapse factor.
@@ -118,6 +119,12 @@ class MechanismPath:
             if event.text != self.end:
                 found.setdefault(event.text, event.place)
         return found
+
+    @cached_property
+    def stretches(self) -> Array:
+        """Largest stretch of each tie up to each place (n, n_ties) [m]."""
+        found = [self.blocks.moved(each).stretches for each in self.displacements]
+        return np.maximum.accumulate(np.maximum(found, 0.0))
 
     @property
     def ending(self) -> str:
@@ -567,6 +574,7 @@ class PathFollower:
         if path.factors[place] <= 0.0 or released:
             return True  # the fall itself, or the end at which nothing is in equilibrium
         blocks = self.blocks.moved(path.displacements[place])
+        blocks = replace(blocks, longest=path.stretches[place])
         try:
             mechanism = find_mechanism(blocks, self.joints, self.friction)
         except NoEquilibrium:

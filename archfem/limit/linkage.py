@@ -114,12 +114,8 @@ class LinkageState:
     @property
     def shortenings(self) -> list[float]:
         """By how much shorter than at the start each held tie is [m]."""
-        found = []
-        for k in self.linkage.held:
-            start, tie = self.linkage.start.ties[k], self.blocks.ties[k]
-            moved = (tie.place - start.place) @ start.force / start.size
-            found.append(float(moved if tie.anchor is None else start.length - tie.length))
-        return found
+        moved = self.linkage.start.stretches - self.blocks.stretches
+        return [float(moved[k]) for k in self.linkage.held]
 
     @cached_property
     def held_sizes(self) -> Array:
@@ -175,10 +171,11 @@ class LinkageState:
 
     def advanced(self, velocity: Array, step: float) -> "tuple[LinkageState, Array] | None":
         """Return state and velocities after a step along the path, by the mid-point rule."""
-        middle = self.linkage.place(self.blocks, 0.5 * step * velocity).corrected()
+        start = self.blocks.keep_stretches()
+        middle = self.linkage.place(start, 0.5 * step * velocity).corrected()
         if middle is None or (halfway := middle.velocity(velocity)) is None:
             return None
-        end = self.linkage.place(self.blocks, step * halfway).corrected()
+        end = self.linkage.place(start, step * halfway).corrected()
         if end is None or (after := end.velocity(halfway)) is None:
             return None
         # constraints that contradict each other beyond first order bring a step back

@@ -14,7 +14,7 @@ from archfem.errors import InvalidInput
 from archfem.limit import displaced_blocks
 from archfem.limit.backfill import BlocksWithFill, FillProfile
 from archfem.limit.collapse import collapse_factor
-from archfem.limit.displaced_blocks import FillPressure, KinematicChain, PlacedBlocks
+from archfem.limit.displaced_blocks import FillPressure, KinematicChain, PlacedBlocks, Tie
 from archfem.limit.finite_mechanism import MechanismPath
 from archfem.limit.linear_programme import NoEquilibrium
 from archfem.limit.mechanism_kinematics import find_rigid_regions
@@ -266,24 +266,18 @@ def find_foot(structure: Structure, path: MechanismPath | None) -> float:
 
 
 def find_stretches(
-    placed: PlacedBlocks, path: MechanismPath | None, moved: Array, share: float
-) -> list[tuple[str, float]]:
-    """Return block and stretch of each tie at a share of a displacement on a path [m]."""
+    path: MechanismPath | None, moved: Array, share: float
+) -> list[tuple[Tie, float]]:
+    """Return each tie and its largest stretch up to a share of a displacement on a path [m]."""
     if path is None or len(moved) == 1:
         return []
-    found, ties = [], [placed.moved(each).ties for each in path.displacements]
-    for k, tie in enumerate(placed.ties):
-        away = np.array([each[k].length - tie.length for each in ties])
-        if tie.anchor is None:
-            places = np.array([each[k].place for each in ties])
-            away = (tie.place - places) @ tie.force / tie.size
-        size = float(np.interp(share * moved[-1], np.maximum.accumulate(moved), away))
-        # a hundredth of a millimetre is round-off
-        found.append((tie.name, max(0.0, round(size, 5))))
-    return found
+    place = share * moved[-1], np.maximum.accumulate(moved)
+    # a hundredth of a millimetre is round-off
+    sizes = [round(float(np.interp(*place, each)), 5) for each in path.stretches.T]
+    return list(zip(path.blocks.ties, sizes, strict=True))
 
 
-def doubt_stretches(stretches: Sequence[tuple[str, float]]) -> list[Doubt]:
+def doubt_stretches(stretches: Sequence[tuple[Tie, float]]) -> list[Doubt]:
     """Return the doubts about ties that are stretched further than a short bar bears."""
     words = (
         "at the capacity the tie at {} is stretched by {:mm}, by which iron that bears 2 % breaks "
@@ -291,8 +285,8 @@ def doubt_stretches(stretches: Sequence[tuple[str, float]]) -> list[Doubt]:
     )
     remedy = "verify its free length"
     return [
-        Doubt(words, remedy, (name, size, size / 0.02, UPPER_BOUND))
-        for name, size in stretches
+        Doubt(words, remedy, (tie.name, size, size / 0.02, UPPER_BOUND))
+        for tie, size in stretches
         if size > MAX_STRETCH
     ]
 
@@ -325,7 +319,7 @@ def describe_loads(
     path: MechanismPath,
     loads: Sequence[AttachedLoad],
     ties: str,
-    stretches: Sequence[tuple[str, float]],
+    stretches: Sequence[tuple[Tie, float]],
 ) -> list[str]:
     """Describe loads along the motion: fill, ties and constant forces; and masses far away."""
     found, placed, pulls = list[str](), path.blocks, path.pulls
@@ -335,13 +329,13 @@ def describe_loads(
             "weights as built: that the fill stays in place is not checked"
         )
     if ties:
-        at = ", ".join(f"{format_mm(size)} at {name}" for name, size in stretches)
+        at = ", ".join(f"{format_mm(size)} at {tie.name}" for tie, size in stretches)
         each = zip(pulls, placed.ties, strict=len(pulls) > 0)  # none where nothing moves on
         held = [f"{pull / kN:.4g} kN at {x.name}" for pull, x in each if pull > 1e-4 * x.size]
         found.append(
-            f"{ties}; along the motion a tie pulls with all of its force where it is stretched"
-            f"{f', at the capacity by {at},' * bool(at)} with what equilibrium needs where it "
-            f"keeps its length{f', up to {join_names(held)}' * bool(held)}, and else with none: "
+            f"{ties}; along the motion a tie pulls with all of its force where it is longer than "
+            f"before{f', at the capacity by {at},' * bool(at)} with what equilibrium needs where "
+            f"it keeps its length{f', up to {join_names(held)}' * bool(held)}, and else with none: "
             "verify bar and anchor"
         )
     if forces := [load.force for load in loads if any(load.force) and not load.passive]:

@@ -33,7 +33,7 @@ from archfem._validation import check_between, check_choice, validate_arguments
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.limit.backfill import attach_fill
 from archfem.limit.collapse import ONE_OF_MANY, slides_anywhere
-from archfem.limit.displaced_blocks import TOUCHING, KinematicChain, PlacedBlocks
+from archfem.limit.displaced_blocks import TOUCHING, KinematicChain, PlacedBlocks, Tie
 from archfem.limit.fill_range import FillAssumption, vary_fill
 from archfem.limit.fill_strength import Fill, PlasticFill
 from archfem.limit.finite_mechanism import MechanismPath, PathEnd, PathFollower
@@ -622,10 +622,9 @@ class _Oscillator:
         return found
 
     @cached_property
-    def stretches(self) -> list[tuple[str, float]]:
-        """Block and stretch of each tie at the capacity of the displacement check [m]."""
-        moved = self.curve["d"].values
-        return find_stretches(self.placed, self.path, moved, self.given.rules.share)
+    def stretches(self) -> list[tuple[Tie, float]]:
+        """Each tie and its largest stretch up to the capacity of the displacement check [m]."""
+        return find_stretches(self.path, self.curve["d"].values, self.given.rules.share)
 
     @property
     def opens(self) -> bool:

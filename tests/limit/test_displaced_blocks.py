@@ -1,5 +1,6 @@
 """Blocks at other places: rates by finite differences, work of loads, faces and what touches."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -237,3 +238,22 @@ def test_masses_are_those_of_blocks_and_of_loads_with_weight(blocks):
     own = [(k, each.area * 20e3) for k, each in enumerate(ring.blocks)]
     assert found == [*((k, pytest.approx(weight)) for k, weight in own), (2, 7e3)]
     assert blocks.masses[-1][1] == pytest.approx(blocks.attached[0][1])
+
+
+def test_a_tie_that_was_longer_does_not_pull():
+    """A block of 0.6 × 2.4 m turned by θ: moments about its toe, with and without its tie."""
+    turn, force, wall = 0.1, 5e3, af.column(breadth=0.6, heights=[2.4])
+    weight = 0.6 * 2.4 * wall.blocks[1].material.unit_weight
+    tie = af.masonry.AttachedLoad("block 1", (-0.3, 2.0), force=(-force, 0.0), passive=True)
+    (cosine, sine), toe = (np.cos(turn), np.sin(turn)), np.array([0.3, 0.0])
+    x, y = np.array([[cosine, sine], [-sine, cosine]]) @ (wall.centroids[1] - toe) + toe
+    moved = np.array([[0.0, 0.0, 0.0], [x - wall.centroids[1, 0], y - wall.centroids[1, 1], -turn]])
+    turned = PlacedBlocks.at_rest(wall, [tie]).moved(moved)
+    # the tie's point is 0.6 m behind the toe and 2 m above it
+    stretch = 0.6 * (1.0 - cosine) + 2.0 * sine
+    assert turned.stretches == pytest.approx([stretch])
+    for longest, pull in ((0.9 * stretch, force), (stretch, force), (1.1 * stretch, 0.0)):
+        found = find_mechanism(replace(turned, longest=np.array([longest])), [0], wall.friction)
+        moment = weight * (0.3 * cosine - 1.2 * sine) + pull * (2.0 * cosine + 0.6 * sine)
+        factor = moment / (weight * (1.2 * cosine + 0.3 * sine))
+        assert found.factor == pytest.approx(factor, rel=1e-6)
