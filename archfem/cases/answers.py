@@ -19,6 +19,7 @@ from archfem.dynamics.motion_scaling import CollapseScale
 from archfem.dynamics.scale_search import MechanismScales
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.limit.fill_range import FillRange
+from archfem.limit.finite_mechanism import PathEnd
 from archfem.masonry.loads import AttachedLoad, name_side
 from archfem.masonry.materials import COURSE_LENGTH
 from archfem.masonry.out_of_plane import describe_transverse_push, find_transverse_push
@@ -408,6 +409,7 @@ class _Tied(NamedTuple):
     mechanism: str
     ratios: Ratios  # of the check that decides
     bounded: bool  # whether one is an upper bound
+    breaks: bool  # whether a tie does, at the end of a path
 
 
 @dataclass(frozen=True, eq=False)
@@ -440,8 +442,9 @@ class _TieSearch:
         ratios, name = min(listed, key=lambda each: (not each[0].fails, each[0].decisive))
         margin = min(MOST_TIED, *(x.decisive for x, _ in listed))
         linear = min(MOST_TIED, *(x.decisive for x, _ in listed if x.linear))
-        bounded = any(x.bounded for x, _ in listed)
-        return self.tried.setdefault(scale, _Tied(margin, linear, name, ratios, bounded))
+        breaks = any(each.path and each.path.end is PathEnd.BREAKS for each in found)
+        given = ratios, any(x.bounded for x, _ in listed), breaks
+        return self.tried.setdefault(scale, _Tied(margin, linear, name, *given))
 
     def find_multiple(self, name: str) -> float:
         """Return from which multiple on a ratio is 1 at all that are tried; infinite if at none."""
@@ -473,9 +476,8 @@ class _TieSearch:
         most, scale = self.solve(MOST_TIED), self.find_multiple("margin")
         if scale < np.inf:
             length = describe_tied_length(self.case.structure)
-            bounded = ", one by an upper bound alone" * self.solve(scale).bounded
             text = f"from {self.say_forces(scale)} on, {length}, all forces tried pass its checks"
-            text += bounded
+            text += ", one by an upper bound alone" * self.solve(scale).bounded
         elif not any(tie.anchor or self.sense * tie.force[0] < 0.0 for tie in self.ties):
             return f"no tie holds it: if floors and walls do, give direction = {-self.sense:g}"
         else:
@@ -492,12 +494,13 @@ class _TieSearch:
 
     def doubt_lower(self) -> list[Remark]:
         """Return the doubt of a mechanism that has a lower ratio with stronger ties."""
-        stronger = {x: found.margin for x, found in self.tried.items() if x > 1.0}
-        # of about equal ratios that with the least force
-        scale = min(x for x, margin in stronger.items() if margin < 1.01 * min(stronger.values()))
-        own, least = self.solve(1.0), self.tried[scale]
-        if own.margin < 1.01 * least.margin:
+        # the end of a path by a tie that breaks bounds nothing
+        stronger = {x: y.margin for x, y in self.tried.items() if x > 1.0 and not y.breaks}
+        own, bound = self.solve(1.0), 1.01 * min(stronger.values(), default=np.inf)
+        if own.margin < bound:
             return []
+        # of about equal ratios that with the least force
+        least = self.tried[scale := min(x for x, margin in stronger.items() if margin < bound)]
         words = (
             "pushed to the {}, {} has a ratio of {} ({}) with {:.3g} times the forces of the ties, "
             "and with those given the least is {:.3g}: ties only resist it, so that with these it "
@@ -521,8 +524,8 @@ def note_ties(case: Case) -> list[Remark]:
                     doubts = search.doubt_lower()
             except DidNotConverge as error:
                 text = f"the force of ties with which all checks pass was not found: {error}"
-            notes += [f"{NOTE_MARK}pushed to the {name_side(sense)}, {text}"] * bool(text)
-            notes += doubts
+            note = f"{NOTE_MARK}pushed to the {name_side(sense)}, {text}"
+            notes += [*[note] * bool(text), *doubts]
     return notes
 
 
@@ -548,10 +551,9 @@ def assess_untied(
 
 def note_sense(case: Case) -> list[str]:
     """Return a note on the sense of push that the case leaves out."""
-    found = case.assessment.directions
-    words = f"pushed to the {name_side(-found[0])} nothing was assessed"
-    given = f"as the case gives direction = {found[0]:g}"
-    return [f"{NOTE_MARK}{words}, {given}"] * (len(found) == 1)
+    sense, *others = case.assessment.directions
+    words = f"pushed to the {name_side(-sense)} nothing was assessed, as the case gives direction"
+    return [f"{NOTE_MARK}{words} = {sense:g}"] * (not others)
 
 
 def note_band(case: Case, found: Iterable[KinematicAssessment]) -> list[str]:
@@ -560,12 +562,11 @@ def note_band(case: Case, found: Iterable[KinematicAssessment]) -> list[str]:
         return []
     low, high = band
     longer = [each.checks[-1].period for each in found if each.checks[-1].period > high]
-    if not longer:
-        return []
-    return [
-        f"{NOTE_MARK}{MATCHED} {low:g} to {high:g} s, and T = {max(longer):.2f} s is longer: "
-        "there they may be weaker than the spectrum; give suite.band"
-    ]
+    words = (
+        f"{MATCHED} {low:g} to {high:g} s, and T = {max(longer, default=high):.2f} s is longer: "
+    )
+    words += "there they may be weaker than the spectrum; give suite.band"
+    return [f"{NOTE_MARK}{words}"] * bool(longer)
 
 
 def state_risk(found: Any) -> Statement:  # of `archfem.studies`, a room to the right

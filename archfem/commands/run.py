@@ -36,6 +36,7 @@ from archfem.masonry.structure import join_words
 from archfem.models.model import Doubt, group_doubts, merge_doubts
 from archfem.motion.motion import Motion
 from archfem.motion.suite import Suite
+from archfem.statics.first_mechanism import OF_TIES
 from archfem.statics.mechanism_assessment import KinematicAssessment
 from archfem.statics.modes import Modes
 from archfem.statics.pushover import Pushover
@@ -252,8 +253,9 @@ def _show_assessment(
     every = [*remarks, *map(merge_doubts, own)]  # of both senses once
     texts = [answers.describe_margin(found.values())]
     for name, result in found.items():
-        # doubts follow at the end, once
-        lines = [x for x in str(result).splitlines() if not x.startswith(DOUBT_MARK)]
+        # doubts follow at the end, once, and the note on all forces of ties is that of the first
+        said = DOUBT_MARK, *[f"{NOTE_MARK}{OF_TIES}"] * any(OF_TIES in text for text in texts)
+        lines = [x for x in str(result).splitlines() if not x.startswith(said)]
         texts.append("\n".join([f"{name}: {lines[0]}", *lines[1:]]))
     of_fill = describe_fill(case.assessment.options.get("fill"), case.structure)
     spectrum = defaults.describe_spectrum_defaults(case)

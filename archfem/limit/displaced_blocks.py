@@ -31,6 +31,9 @@ TOUCHING = 1e-6
 # Velocities, relative to the largest of any corner, that count as zero [-]
 STILL = 1e-6
 
+# Strain at which the iron of a tie breaks [-]
+BREAKING_STRAIN = 0.02
+
 
 class Contact(NamedTuple):
     """A corner of one block on the face of another, or two corners that coincide."""
@@ -73,6 +76,7 @@ class Tie(NamedTuple):
     place: Array  # (2,) [m]
     force: Array  # largest, towards the other end (2,) [N]
     stretch: float  # from rest; to the ground that along its force [m]
+    limit: float  # stretch at which it breaks, infinite where its free length is not known [m]
 
     @property
     def size(self) -> float:
@@ -181,7 +185,9 @@ class PlacedBlocks:
                 stretch = np.hypot(*chord) - np.hypot(*(load.anchor_point - rest))
                 force = np.hypot(*force) * chord / np.hypot(*chord)
             ends = [self.structure.blocks[k].name for k in (block, anchor) if k is not None]
-            found.append(Tie(" and ".join(ends), block, anchor, place, force, float(stretch)))
+            limit = BREAKING_STRAIN * (load.free_length or np.inf)
+            given = place, force, float(stretch), limit
+            found.append(Tie(" and ".join(ends), block, anchor, *given))
         return found
 
     @cached_property

@@ -69,6 +69,7 @@ class PathEnd(ExplainedWord):
     ENDURES = "endures", "it still needs a force after a way as long as the structure is large"
     UNRESOLVED = "unresolved", "at the end no mechanism was found whose faces slide flat"
     RELEASED = "released", "at the end a tie yields or slackens, and no equilibrium follows"
+    BREAKS = "breaks", "at the end a tie breaks, at a strain of 2 % of its free length"
     SLIDES = "slides", "it slides without turning, up to the ends of the faces as drawn"
 
 
@@ -97,7 +98,7 @@ class MechanismPath:
         holds: last place up to which no other mechanism has a lower factor; beyond it the factors
             are upper bounds. None where that was not examined.
         pulls: largest force of each tie on the way, while it keeps its length (n_ties,) [N].
-        met: names of the blocks that run into each other at the end, if they do.
+        met: names of the blocks that run into each other at the end, or of the tie that breaks.
     """
 
     blocks: PlacedBlocks
@@ -128,18 +129,18 @@ class MechanismPath:
 
     @property
     def ending(self) -> str:
-        """Meaning of the end, with the names of blocks that run into each other."""
+        """Meaning of the end, with the names of blocks that run into each other, or of a tie."""
         return ": ".join([self.end.sentence, *[" and ".join(self.met)] * bool(self.met)])
 
     @cached_property
     def curve(self) -> xr.Dataset:
         """Factor [-], and displacement of the growing loads along themselves [m], over place."""
-        loaded = [not self.blocks.structure.blocks[k].fixed for k, *_ in self.blocks.pulls]
-        forces = np.array([force for *_, force in self.blocks.pulls])[loaded]
-        start, moved = self._places_of_forces(self.blocks, loaded), np.zeros(len(self.factors))
-        for number, displacement in enumerate(self.displacements):
-            travel = self._places_of_forces(self.blocks.moved(displacement), loaded) - start
-            moved[number] = np.sum(forces * travel) / np.hypot(*forces.T).sum()
+        blocks = self.blocks
+        loaded = [not blocks.structure.blocks[k].fixed for k, *_ in blocks.pulls]
+        forces = np.array([force for *_, force in blocks.pulls])[loaded]
+        every = blocks, *map(blocks.moved, self.displacements)
+        places = np.array([[place for _, place, _ in each.pulls] for each in every])[:, loaded]
+        moved = np.sum(forces * (places[1:] - places[0]), axis=(1, 2)) / np.hypot(*forces.T).sum()
         values = {"factor": (self.factors, "1"), "displacement": (moved, "m")}
         return xr.Dataset(
             {key: ("place", value, {"units": unit}) for key, (value, unit) in values.items()}
@@ -152,10 +153,19 @@ class MechanismPath:
         rest = self.factors[:1], self.displacements[:1], self.velocity
         return MechanismPath(self.blocks, *rest, self.mechanisms[:1], (), PathEnd.SLIDES)
 
-    @staticmethod
-    def _places_of_forces(blocks: PlacedBlocks, chosen: Sequence[bool]) -> Array:
-        """Return the present places of the chosen forces that grow (n, 2) [m]."""
-        return np.array([place for _, place, _ in blocks.pulls])[chosen]
+    def end_broken(self) -> "MechanismPath":
+        """Return the path up to where the first tie breaks, which one does."""
+        numbers = np.arange(len(self.factors))
+        ties = zip(self.blocks.ties, self.stretches.T, strict=True)
+        number, name = min((np.interp(x.limit, sizes, numbers), x.name) for x, sizes in ties)
+        last = int(np.ceil(number))
+        factors, displacements = (
+            np.append(x[:last], [x[last] + (number - last) * (x[last] - x[last - 1])], axis=0)
+            for x in (self.factors, self.displacements)
+        )
+        events = tuple(event for event in self.events if event.place < last)
+        kept = self.blocks, factors, displacements, self.velocity, self.mechanisms, events
+        return MechanismPath(*kept, PathEnd.BREAKS, None, self.pulls, (f"that at {name}",))
 
     def __repr__(self) -> str:
         """Describe start and end of the path in one line."""
@@ -297,10 +307,9 @@ class PathFollower:
             if not self.factors:
                 raise
             end = PathEnd.UNRESOLVED
-        places = np.array(self.factors), np.array(self.displacements)
+        places = self.blocks, np.array(self.factors), np.array(self.displacements), motion
         changes = tuple(mechanisms), tuple(self.events)
-        path = MechanismPath(self.blocks, *places, motion, *changes, end)
-        return replace(path, pulls=self.pulls, met=self.met)
+        return MechanismPath(*places, *changes, end, None, self.pulls, self.met)
 
     def _start(
         self, blocks: PlacedBlocks, mechanism: KinematicChain

@@ -102,20 +102,15 @@ class LinkageState:
 
     @cached_property
     def misfits(self) -> Array:
-        """Violation of each constraint, gaps of all contacts and slips of sticking ones [m]."""
+        """Violation of each constraint: gaps, slips that stick, ties that shorten [m]."""
         gaps, slips = [], []
         for contact, (_, on_face, _) in zip(self.contacts, self.linkage.anchors, strict=True):
             jump = contact.point - self.blocks.places(on_face, contact.face)
             gaps.append(contact.normal @ jump)
             if not contact.slip:
                 slips.append(tangent(contact.normal) @ jump)
-        return np.array([*gaps, *slips, *self.shortenings])
-
-    @property
-    def shortenings(self) -> list[float]:
-        """By how much shorter than at the start each held tie is [m]."""
-        moved = self.linkage.start.stretches - self.blocks.stretches
-        return [float(moved[k]) for k in self.linkage.held]
+        shorter = self.linkage.start.stretches - self.blocks.stretches
+        return np.array([*gaps, *slips, *shorter[self.linkage.held]])
 
     @cached_property
     def held_sizes(self) -> Array:

@@ -193,10 +193,12 @@ class AttachedLoad:
         anchor: number or name of the block at the other end of a tie, which it pulls back; without
             one the ground holds the tie.
         anchor_point: where this end is, at rest (x, y) [m]; `force` points to it.
+        free_length: of the bar of a tie, over which it stretches [m]: it breaks at a strain of 2 %.
+            None where it is not known; stretches of more than 4 cm are then in doubt.
 
     Raises:
         InvalidInput: a value is no number, above 1e9 N, or the weight is negative; an anchor has no
-            point, or is not that of a tie along its force.
+            point, or is not that of a tie along its force; a free length is not that of a tie.
     """
 
     block: int | str
@@ -206,6 +208,7 @@ class AttachedLoad:
     passive: bool = False
     anchor: int | str | None = None
     anchor_point: tuple[Metres, Metres] | None = None
+    free_length: Metres | None = None
 
     def __post_init__(self) -> None:
         """Check that the values are metres and newtons."""
@@ -222,6 +225,10 @@ class AttachedLoad:
             )
         if self.anchor is not None or self.anchor_point is not None:
             self._check_anchor()
+        if self.free_length is not None:
+            check_between(self.free_length, "attached load, free_length [m]", 0.0)
+            if not self.passive:
+                raise InvalidInput(f"free_length of {self.block} is of a tie: give passive = true")
 
     def _check_anchor(self) -> None:
         """Check that a tie between two blocks pulls along itself."""

@@ -14,7 +14,13 @@ from archfem.errors import InvalidInput
 from archfem.limit import displaced_blocks
 from archfem.limit.backfill import BlocksWithFill, FillProfile
 from archfem.limit.collapse import collapse_factor
-from archfem.limit.displaced_blocks import FillPressure, KinematicChain, PlacedBlocks, Tie
+from archfem.limit.displaced_blocks import (
+    BREAKING_STRAIN,
+    FillPressure,
+    KinematicChain,
+    PlacedBlocks,
+    Tie,
+)
 from archfem.limit.finite_mechanism import MechanismPath
 from archfem.limit.linear_programme import NoEquilibrium
 from archfem.limit.mechanism_kinematics import find_rigid_regions
@@ -26,8 +32,11 @@ from archfem.models.model import Doubt
 from archfem.statics.assessment_checks import UPPER_BOUND, measure_blocks
 from archfem.units import MPa, format_mm, kN
 
-# Stretch from which a tie is doubted, as its free length is not known: 2 % of 2 m [m]
-MAX_STRETCH = 0.04
+# Stretch from which a tie whose free length is not known is doubted, that of 2 m [m]
+MAX_STRETCH = 2.0 * BREAKING_STRAIN
+
+# Begin of the note on the forces of ties, which is the same of all mechanisms
+OF_TIES = "forces of ties are "
 
 # Load over the weight of the lightest block, below which its unit is probably wrong [-]
 TINY_LOAD = 0.01
@@ -236,10 +245,8 @@ def describe_ties(
         need = f"{share * size:.4g}" if share > 1e-4 else "none"
         needs.append(f"{need} of the {size:.4g} kN of the tie at {tie.name}")
     side, listed = name_side(placed.direction), join_names(needs)
-    split = ", or another split," * (len(needs) > 1)
-    onset = f"{split} as it begins to move, no force to design for" * bool(max(shares) > 1e-4)
-    length = describe_tied_length(placed.structure)
-    return f"pushed to the {side}, alpha_0 needs {listed}{onset}, {length}"
+    split = ", or another split" * bool(len(needs) > 1 and max(shares) > 1e-4)
+    return f"pushed to the {side}, alpha_0 needs {listed}{split}"
 
 
 def describe_tied_length(structure: Structure) -> str:
@@ -283,11 +290,11 @@ def doubt_stretches(stretches: Sequence[tuple[Tie, float]]) -> list[Doubt]:
         "at the capacity the tie at {} is stretched by {:mm}, by which iron that bears 2 % breaks "
         "unless {:.3g} m of bar are free: the displacement check is {}"
     )
-    remedy = "verify its free length"
+    remedy = "verify its free length, and give it as `free_length`"
     return [
-        Doubt(words, remedy, (tie.name, size, size / 0.02, UPPER_BOUND))
+        Doubt(words, remedy, (tie.name, size, size / BREAKING_STRAIN, UPPER_BOUND))
         for tie, size in stretches
-        if size > MAX_STRETCH
+        if size > MAX_STRETCH and tie.limit == np.inf
     ]
 
 
@@ -329,22 +336,26 @@ def describe_loads(
             "weights as built: that the fill stays in place is not checked"
         )
     if ties:
-        at = ", ".join(f"{format_mm(size)} at {tie.name}" for tie, size in stretches)
+        known = [f" (it breaks at {format_mm(x.limit)})" * (x.limit < np.inf) for x, _ in stretches]
+        sizes = zip(stretches, known, strict=True)
+        at = ", ".join(f"{format_mm(size)} at {tie.name}{more}" for (tie, size), more in sizes)
         each = zip(pulls, placed.ties, strict=len(pulls) > 0)  # none where nothing moves on
         held = [f"{pull / kN:.4g} kN at {x.name}" for pull, x in each if pull > 1e-4 * x.size]
-        found.append(
-            f"{ties}; along the motion a tie pulls with all of its force where it is longer than "
-            f"before{f', at the capacity by {at},' * bool(at)} with what equilibrium needs where "
-            f"it keeps its length{f', up to {join_names(held)}' * bool(held)}, and else with none: "
-            "verify bar and anchor"
-        )
+        ties += f"; up to the capacity stretched by {at}" * bool(at)
+        ties += f"; where its length is kept pulling up to {join_names(held)}" * bool(held)
+        found += [
+            ties,
+            f"{OF_TIES}{describe_tied_length(placed.structure)}, those of alpha_0 as it begins to "
+            "move, none to design for; along the motion a tie pulls with all of its force where it "
+            "gets longer than it ever was, with what equilibrium needs where it keeps its length, "
+            "and else with none: verify bar and anchor",
+        ]
     if forces := [load.force for load in loads if any(load.force) and not load.passive]:
         pushes = any(force[0] * placed.direction > 0.0 for force in forces)
         found.append(
             "constant forces have no mass, so that they are not pushed, and count from the start "
             "of the motion to its end; attach only those whose presence is verified up to collapse"
-            + "; one pushes in this sense: a tie is `passive = true`"
-            * pushes
+            + ("; one pushes in this sense: a tie is `passive = true`" * pushes)
         )
     far = []
     for load in loads:

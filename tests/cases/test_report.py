@@ -1229,7 +1229,7 @@ def test_points_of_a_spectrum_and_attached_loads_are_stated(kept, undrawn):
     loads = [
         {"block": "block 2", "point": ["0.2 m", 1.5], "weight": "12 kN"},
         {"block": "block 2", "point": [0.0, 1.5], "force": ["-3 kN", 0.0], "passive": True},
-        {"block": "block 2", "point": [0.0, 1.5], "passive": True, **bar},
+        {"block": "block 2", "point": [0.0, 1.5], "passive": True, "free_length": "90 cm", **bar},
         {"block": "block 1", "point": [0.0, 0.5], "force": [1500.0, 0.0]},
     ]
     tables = tomllib.loads(CASE) | {"assessment": {"spectrum": spectrum, "loads": loads}}
@@ -1247,7 +1247,8 @@ def test_points_of_a_spectrum_and_attached_loads_are_stated(kept, undrawn):
         for text in (
             "on block 2 at (0.2, 1.5) m; weight 12 kN",
             "on block 2 at (0, 1.5) m; tie of at most (-3, 0) kN; held by the ground",
-            "on block 2 at (0, 1.5) m; tie of at most (0, -2) kN; held by block 1 at (0, 0.5) m",
+            "on block 2 at (0, 1.5) m; tie of at most (0, -2) kN; held by block 1 at (0, 0.5) m; "
+            "0.9 m of it free",
             "on block 1 at (0, 0.5) m; constant force (1.5, 0) kN",
         )
     ]

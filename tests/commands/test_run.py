@@ -227,6 +227,32 @@ def test_a_range_in_doubt_has_the_exit_code_of_doubts(small, unplotted, monkeypa
     )
 
 
+TIED = """
+[structure]
+shape = "column"
+breadth = 0.5
+heights = [2.0, 2.0]
+[assessment]
+direction = 1
+spectrum = { code = "EC8", ag = 0.25, ground = "B" }
+[[assessment.loads]]
+block = "block 1"
+point = [0.0, 2.0]
+force = ["-3 kN", "0 kN"]
+passive = true
+"""
+
+
+def test_the_note_on_forces_of_ties_is_printed_once(tmp_path, capsys):
+    """Of a wall and what is above its tie, each with its own stretch."""
+    (path := tmp_path / "tied.toml").write_text(TIED, encoding="utf-8")
+    assert af.commands.main(["assess", str(path)]) == 3
+    text = capsys.readouterr().out
+    assert text.count("note: pushed to the right, alpha_0 needs ") == 2
+    assert len({*re.findall(r"to the capacity stretched by (\S+) mm", text)}) == 2
+    assert text.count("forces of ties are in all for 1 m of width") == 1
+
+
 LEFT_OUT = """
 [assessment]
 spectrum = { code = "EC8", ag = 0.1, ground = "A" }

@@ -95,6 +95,9 @@ def test_an_attached_load_stays_with_any_block_and_weighs_nothing_or_more():
     for given, says in (
         ({"block": -1}, "block = -1 is not a whole"),
         ({"weight": -0.1}, "below 0"),
+        ({"free_length": 0.0, "passive": True}, "free_length .* is not above 0"),
+        ({"free_length": np.inf, "passive": True}, "free_length .* is not a finite number"),
+        ({"free_length": 2.0}, "free_length of 0 is of a tie: give passive = true"),
     ):
         with pytest.raises(af.errors.InvalidInput, match=says):
             af.masonry.AttachedLoad(**{"block": 0, "point": (0.0, 1.0)} | given)

@@ -411,6 +411,7 @@ def _load_rows(loads: Sequence[AttachedLoad]) -> Iterator[Row]:
             words.append(f"held by {load.anchor} at {_say_pair(load.anchor_point)} m")
         elif load.passive:
             words.append("held by the ground")
+        words += [f"{load.free_length} m of it free"] * (load.free_length is not None)
         yield f"assessment: load {number}", "; ".join(words), "given", "assessment.loads"
 
 
