@@ -249,7 +249,7 @@ def test_a_tie_bears_what_equilibrium_needs(force, factor, pull):
     free = assess_tied(2.0, force, direction=-1.0)
     assert free.alpha_0 == pytest.approx(0.125, rel=1e-4)
     assert free.notes[0].startswith(
-        f"pushed to the left, alpha_0 needs none of the {force / 1e3:g} kN of the tie at block 1,"
+        f"pushed to the left, alpha_0 needs none of the {force / 1e3:g} kN of the tie at block 1;"
     )
     assert ", pushed to the left: " in describe_margin([found, free])
     assert ", pushed to" not in describe_margin([free, replace(free, direction=1.0)])
@@ -927,6 +927,21 @@ def test_a_tie_breaks_by_its_free_length(length, verified):
         assert tied.displacement.passes
         says = " mm at block 1 (it breaks at 300 mm)\n"
     assert says in str(tied)
+
+
+@pytest.mark.slow
+def test_a_stronger_tie_that_breaks_puts_a_given_one_in_no_doubt():
+    """The wall above: of 10.5 m it breaks beyond the capacity, and with more force before it."""
+    spectrum = {"code": "NTC-2018", "ag": 0.165, "f0": 2.5, "tc_star": 0.33, "site": "B"}
+    tie = {"block": "block 1", "point": [0.0, 3.8], "force": [-2e3, 0.0], "passive": True}
+    loads = [tie | {"free_length": "10.5 m"}]
+    column = {"shape": "column", "breadth": 0.6, "heights": [6.0]}
+    assessment = {"spectrum": spectrum, "direction": 1, "loads": loads}
+    case = af.Case.of({"structure": column, "assessment": assessment})
+    (found,) = case.assessment.solve(case.structure, None).values()
+    assert (found.passes, found.path.end) == (True, PathEnd.FALLS)
+    (note,) = note_ties(case)
+    assert note.startswith("note: pushed to the right, from ")
 
 
 def test_a_force_acts_on_its_block():
