@@ -153,6 +153,12 @@ class MechanismPath:
         rest = self.factors[:1], self.displacements[:1], self.velocity
         return MechanismPath(self.blocks, *rest, self.mechanisms[:1], (), PathEnd.SLIDES)
 
+    @property
+    def breaks(self) -> bool:
+        """Whether a tie is stretched by more than breaks it, at the end of the path."""
+        ties = zip(self.blocks.ties, self.stretches.T, strict=True)
+        return any(sizes[-1] > tie.limit for tie, sizes in ties)
+
     def end_broken(self) -> "MechanismPath":
         """Return the path up to where the first tie breaks, which one does."""
         numbers = np.arange(len(self.factors))
