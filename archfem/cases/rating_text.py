@@ -151,7 +151,7 @@ def doubt_rating(found: Rating, limit: LimitAnalysis) -> list[Remark]:
         return [Doubt(words, "check the thickness of its rings and piers, and the fill")]
     lines = list[Remark]()
     if limit.strength is None and found.crushing_text:
-        words = "joints do not crush, as the case gives no strength of the stones: "
+        words = "joints do not crush, as no strength of the stones is given: "
         remedy = "give strength in [materials] or [limit]"
         lines.append(Doubt(f"{words}{found.crushing_text}", remedy))
     remedy = "show by tests that these act, or judge by the least factor"

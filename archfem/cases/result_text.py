@@ -29,7 +29,11 @@ from archfem.limit.fill_strength import Fill, PlasticFill
 from archfem.limit.mechanism_count import Mechanism, duration_text
 from archfem.masonry.backfill import describe_held_ends
 from archfem.masonry.loads import Action, Settlement, describe_massless
-from archfem.masonry.out_of_plane import UNCHECKED_ACROSS, describe_transverse_push
+from archfem.masonry.out_of_plane import (
+    UNCHECKED_ACROSS,
+    describe_transverse_push,
+    find_transverse_push,
+)
 from archfem.masonry.standing import describe_carried, describe_widths, find_bodies
 from archfem.masonry.structure import (
     CLEAR_TURNS,
@@ -346,6 +350,8 @@ def note_collapse(
     """Return the notes on a limit analysis: on crowns, on masses, and on the fill as given."""
     notes = note_lower_crowns(structure, limit.fill)
     notes += note_masses(structure, collapse.live, collapse.dead, parapets)
+    if collapse.push and find_transverse_push(structure)[0] < collapse.factor * abs(collapse.push):
+        notes.append(f"{NOTE_MARK}{describe_transverse_push(structure)}")
     return [*notes, *(f"{NOTE_MARK}{OF_GIVEN_FILL}{note}" for note in collapse.notes)]
 
 

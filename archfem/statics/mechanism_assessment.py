@@ -727,7 +727,7 @@ class _Oscillator:
     @property
     def remedy(self) -> str:
         """What tests a ratio of displacements; no run, where there are ties."""
-        tied = "runs leave out ties: judge by the linear check alone"
+        tied = "not decided, as runs leave out ties: count on what it withstands without them"
         return tied if self.placed.ties else "a time history with large displacements can test it"
 
     def _check_displacement(self) -> AssessmentCheck:

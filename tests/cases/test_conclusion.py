@@ -1661,7 +1661,7 @@ def test_a_push_is_compared_with_a_demand_in_numbers_and_words_are_not_read(
     assert [*demands.rows] == [
         (
             *("as stated", "0.3 g at the ground", "[report]"),
-            "none: limit.demand is compared" if demand else "none",
+            "words alone, which are compared with none" + ": limit.demand is" * bool(demand),
         ),
         *own,
     ]

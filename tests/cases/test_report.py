@@ -171,7 +171,7 @@ def test_demand_and_capacity_stand_beside_their_doubts(kept, undrawn):
     demands, table = (each for each in sentences if each.kind == "grid")
     vertical = "with vertical ones of up to 0.034 g"
     assert demands.rows == [
-        ("as stated", "0.25 g, 475 years", "[report]", "none"),
+        ("as stated", "0.25 g, 475 years", "[report]", "words alone, which are compared with none"),
         (f"motions, {vertical}", "PGA 0.051 g", "[suite]", demands.rows[1][-1]),
     ]
     verdicts = [run.verdict for run in data.runs.values()]

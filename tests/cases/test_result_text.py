@@ -34,6 +34,7 @@ from archfem.limit.collapse import Outcome, describe_fill
 from archfem.limit.fill_range import FillAssumption, FillRange
 from archfem.limit.instability import list_margins_at_rest
 from archfem.limit.mechanism_count import duration_text
+from archfem.masonry.out_of_plane import find_transverse_push
 
 
 @pytest.fixture(scope="module")
@@ -178,7 +179,13 @@ def test_a_hinge_of_a_pier_is_named_by_its_left_or_right_face(foot):
 def test_limit_analysis_in_words(ring):
     pushed = af.collapse_factor(ring, live=af.BodyForce(1.0))
     limit = parse_limit({"strength": 2e6, "fill": {"friction_angle": 35}})
-    outcome, hinges, crushing, fill = describe_collapse(ring, pushed, limit).splitlines()
+    outcome, hinges, crushing, fill, across = describe_collapse(ring, pushed, limit).splitlines()
+    least = find_transverse_push(ring)[0]
+    assert least < pushed.factor
+    assert across.startswith("note: nothing is checked across the plane of the drawing: held by")
+    assert f"begins to overturn at {least:.3g} g" in across
+    wide = replace(ring, width=100.0)
+    assert "across the plane" not in describe_collapse(wide, pushed, limit)
     place = f"at {pushed.factor:.4g} g, pushed to the right"
     assert outcome == f"limit analysis: four-hinge mechanism, {place}"
     assert hinges.startswith("hinges, by the face in contact: joint 0 at the intrados; joint 6 at")

@@ -961,7 +961,7 @@ def test_rating_of_a_case(tmp_path, ring, capsys):
     named = replace(ring, name="a ring pushed over")
     found = af.rate(named, "CS454-single", live=0.1)
     assert str(found) in said
-    assert f"as the case gives no strength of the stones: {found.crushing_text}; give" in said
+    assert f"as no strength of the stones is given: {found.crushing_text}; give" in said
     assert af.commands.main([*command[:-1], f"{100.0 * ring.width} cm"]) == 3
     assert str(found) in capsys.readouterr().out
     assert af.commands.main([*command[:-1], "wide"]) == 1

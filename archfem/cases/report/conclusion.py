@@ -234,7 +234,9 @@ def _say_plainly(data: ReportData, doubtful: Sequence[str]) -> Iterator[tuple[st
     """Yield the answer for a client, in the lines of the head."""
     checks = list_checks(data)
     failed = [x for x in checks if x.needed or (x.least < 1.0 and not x.unshown)]
-    found = dict.fromkeys(margins.judge_check(data, check)[0] for check in failed or checks)
+    unsure = [x for x in checks if x.unshown or x.by_split or x.bounded]
+    judged = failed or unsure or checks
+    found = dict.fromkeys(margins.judge_check(data, check)[0] for check in judged)
     # of two senses one may say more than the other
     longest = [x for x in found if sum(y.startswith(x) for y in found) == 1]
     assessed = [f"by the kinematic assessment {words}" for words in longest]
@@ -486,6 +488,8 @@ def _mark_rows(data: ReportData) -> Iterator[tuple[str, ...]]:
     def is_about(doubt: Doubt, row: Row) -> bool:
         named = [f"'{pair}'" for pair in pairs if f"'{pair}'" in doubt.place]
         named += [name for name in checks if name and name in doubt.values]
+        if "the displacement check" in doubt.words and row.numbers.get("linear"):
+            return False
         return not named or any(name in f"{row.result} {row.demand}" for name in named)
 
     for result, row in rows:

@@ -21,7 +21,8 @@ def list_demands(data: ReportData) -> Iterator[tuple[str, Ends, str, list[str]]]
         # whole motions: the ground of a run ends with it
         up = [x.vertical for x in data.motions.values() if x.vertical is not None]
         vertical = max((np.abs(x).max().item() for x in up), default=0.0) / STANDARD_GRAVITY
-        also = f", with vertical ones of up to {vertical:.2g} g" * bool(vertical)
+        with_vertical = f", with vertical ones of up to {vertical:.2g} g"
+        also = with_vertical if vertical else ", without vertical ones"
         peaks, source = map(peak_of_ground, data.runs.values()), "[suite]"
         used = ["time histories, and what varies or scales them"]
         yield f"motions{also}", Ends.of(peaks), source if case.suite else "[motion]", used
@@ -37,7 +38,8 @@ def list_demands(data: ReportData) -> Iterator[tuple[str, Ends, str, list[str]]]
 def tabulate_demands(data: ReportData) -> list[Grid]:
     """Tabulate the demands with their sources; none where the capacities have a single one."""
     found, text = [each for each in list_demands(data) if each[-1]], data.case.report.get("demand")
-    compared = "none" + ": limit.demand is compared" * (data.case.limit.demand is not None)
+    compared = "words alone, which are compared with none"
+    compared += ": limit.demand is" * (data.case.limit.demand is not None)
     rows = [("as stated", text, "[report]", compared)] if text else []
     rows += [(name, f"PGA {p:.3g} g", source, join_words(x)) for name, p, source, x in found]
     peaks = [peak for _, ends, *_ in found for peak in ends]
@@ -60,4 +62,5 @@ def name_spectrum(data: ReportData) -> str:
     code = read_spectrum(data).get("code")
     if code is None:
         return "the spectrum of the motion"
-    return f"the {code} spectrum of PGA {peak_of_spectrum(data.case):.3g} g"
+    ground = "above ground " * (code == "floor")
+    return f"the {code} spectrum {ground}of PGA {peak_of_spectrum(data.case):.3g} g"

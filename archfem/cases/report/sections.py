@@ -363,7 +363,7 @@ def _tabulate_dead_load(joints: xr.Dataset) -> Grid:
         row.append(f"{np.nanmax(ratio, initial=0.0):.3f}")
         row += [f"{normal.min() / kN:.4g}", f"{normal.max() / kN:.4g}"]
         rows.append([*row, str(int(selected["open"].sum()))])
-    head = ["part", "max |e|", "in", "max V/N", "min N [kN]", "max N [kN]", "open joints"]
+    head = ["part", "max |e|", "in", "max V/N", "min N [kN]", "max N [kN]", "open throughout"]
     return Grid(head, rows, "Joints of rings and piers under dead load")
 
 
@@ -527,6 +527,8 @@ def build_method_section(data: ReportData) -> Section:
     named = (each["code"] if each["code"] == "table" else describe_value(each) for each in given)
     spectra = [("design spectrum", text) for text in dict.fromkeys(named)]
     used = [row[1:] for row in _METHODS if not row[0] or data.list_parts(row[0])]
+    floor = "floor spectrum", "Circolare 7/2019, C7.2.3, by the first mode of the building"
+    used += [floor] * any(text.startswith("code floor") for _, text in spectra)
     used = [row for row in used if data.runs or row[0] != "joints, criteria"]
     if find_rule(data) is SELECTION_RULES["EC8"]:
         without = {"assessment": "; EN 1998-1 itself has no such check"}
