@@ -16,7 +16,15 @@ import archfem as af
 from archfem._files import read_sealed_json, write_sealed_json
 from archfem.cases import answers
 from archfem.cases.push_factors import PushFactors, site_acceleration
-from archfem.cases.report import conclusion, demands, doubts, margins, report_data, sections
+from archfem.cases.report import (
+    capacities,
+    conclusion,
+    demands,
+    doubts,
+    margins,
+    report_data,
+    sections,
+)
 from archfem.cases.report.outcomes import sentence
 from archfem.cases.report.report import _collect_data
 from archfem.cases.report.report_data import ReportData, label_parts
@@ -408,7 +416,7 @@ def test_capacities_at_rest_stand_beside_those_of_demands():
         data = ReportData(case, {})
         check = state("assessment", answers.Ratios("linear, q = 2", ["right"], 1.3, 1.3))
         vars(data)["statements"] = {"assessment": check}
-        (table,) = conclusion.tabulate_capacities({"": data})
+        (table,) = capacities.tabulate_capacities({"": data})
         depth = next(row for row in table.rows if row[0] == "at rest")
         assert depth[:3] == (
             "at rest",
@@ -421,7 +429,7 @@ def test_capacities_at_rest_stand_beside_those_of_demands():
         assert [each[0] for each in margins.rank_margins(data)] == [1.3]
     # a least thickness has that of all joints
     vars(data)["statements"] = {"thickness": answers.Statement([], [])}
-    assert conclusion.tabulate_capacities({"": data}) == []
+    assert capacities.tabulate_capacities({"": data}) == []
 
 
 def test_what_fails_under_a_motion_that_was_not_scaled_has_a_margin_below_one(case):
@@ -714,7 +722,7 @@ def test_a_part_of_the_motions_that_are_needed_decides_no_survival(
     assert order[outcome != "fallen"] == 0
     assert min(order) < max(order)
     assert verdict.count("withstand") == 1
-    ((_, (_, _, stated, *_)), *_) = conclusion._capacity_rows(data)
+    ((_, (_, _, stated, *_)), *_) = capacities._capacity_rows(data)
     left = ", ".join("abcde"[count:])
     assert (f"; not run: {left}" in stated) is bool(left)
 
@@ -1016,7 +1024,7 @@ def test_a_displacement_has_the_range_of_its_time_steps_and_single_changes_are_s
         found.dataset["sampled"][:2] = False
         found.dataset["dt"][1] = "half"
     data = data_of(case, ranges[0], a=verdict_of(displacement=0.1), b=verdict_of())
-    (row, *_) = (row for _, row in conclusion._capacity_rows(data))
+    (row, *_) = (row for _, row in capacities._capacity_rows(data))
     assert row[2] == (
         "stands in 2 of 2 runs; displaced by up to 100 mm under 'a', 0 mm at the end; over time "
         "steps by 20 to 120 mm under 'a'"
@@ -1243,7 +1251,7 @@ def test_a_rating_is_stated_by_the_norm_of_the_report_alone(case, norm, first):
     assert verdict == f"Rating for lorry {first}: factor {codes[first]}{needed}, passes."
     assert conclusion._rank_verdict(data)[1] == {"the vehicle": pytest.approx(least)}
     assert words_of(data)[0].startswith(f"Lorry {first[:12]}")
-    (table,) = conclusion.tabulate_capacities({"": data})
+    (table,) = capacities.tabulate_capacities({"": data})
     settings |= {"report": {"demand": "PGA 0.25 g"}}
     vars(data)["case"] = af.Case.of(settings)
     assert demands.tabulate_demands(data) == []  # of a vehicle there is none of an earthquake
@@ -1420,7 +1428,7 @@ def test_a_demand_that_overturns_it_across_its_plane_is_in_the_conclusion(ag, ov
     words += f" (demand {1.2 * ag:.3g} g)."
     assert words in head_of(conclusion.list_facts(data))
     # head and paragraph state it, and no row repeats it
-    assert {row.result for _, row in conclusion._capacity_rows(data)} == {"at rest"}
+    assert {row.result for _, row in capacities._capacity_rows(data)} == {"at rest"}
     shaken = data_of(case, a=verdict_of())
     verdict = head_of(conclusion.list_facts(shaken))  # by stronger motions of 0.204 g
     assert words in verdict
@@ -1475,7 +1483,7 @@ def test_a_report_of_a_wall_has_its_falls_across_the_plane_as_one_rigid_body(mon
     assert "survives" not in verdict
     (text,) = margins.build_transverse(data)
     assert text.text.startswith("Held by nothing else, ")
-    rows = [row for name, row in conclusion._capacity_rows(data) if not name]
+    rows = [row for name, row in capacities._capacity_rows(data) if not name]
     assert [(row.demand, row.factor) for row in rows] == [("'strong', of 0.1 to 2 ×", scale)] * 2
     # without the strong one it stands at the motion, and the margin is above one
     del data.motions["strong"]
@@ -1581,7 +1589,7 @@ def test_a_structure_with_rings_that_stands_across_its_plane_was_checked(monkeyp
     (text,) = margins.build_transverse(data)
     assert text.text.startswith("Held by nothing else, ")
     assert "not checked" not in head_of(conclusion.list_facts(data))
-    rows = [row.outcome for name, row in conclusion._capacity_rows(data) if not name]
+    rows = [row.outcome for name, row in capacities._capacity_rows(data) if not name]
     assert rows == ["as one rigid body it falls at none, held by nothing else"] * 2
 
 
@@ -1708,7 +1716,7 @@ def test_variations_that_miss_the_run_have_no_range_of_displacements(case):
         data = data_of(case, found, first=verdict_of(displacement=moved))
         texts = [getattr(piece, "text", "") for piece in conclusion.build_conclusion(data).pieces]
         said = [x for x in texts if "argest displacements are 1.2 mm to 4 mm" in x]
-        listed = str([*conclusion._capacity_rows(data)])
+        listed = str([*capacities._capacity_rows(data)])
         assert (bool(said), "largest displacements 1.2 mm to 4 mm" in listed) == (stated, stated)
 
 

@@ -21,7 +21,7 @@ from archfem._files import read_file_list, replace_results, write_sealed_json
 from archfem.cases import answers, result_text
 from archfem.cases.defaults import describe_defaults, list_defaults
 from archfem.cases.push_factors import PushFactors
-from archfem.cases.report import conclusion, report, report_data
+from archfem.cases.report import capacities, conclusion, report, report_data
 from archfem.cases.report.conclusion import build_conclusion, list_facts
 from archfem.cases.report.inputs import tabulate_inputs
 from archfem.cases.report.response import (
@@ -352,7 +352,7 @@ def test_a_result_of_one_pair_of_another_case_is_named_beside_that_of_the_others
             write_files({f"{pair}/{name}": text for name, text in files.items()}, draft)
     found = af.cases.open_results(kept)
     data = report_data.ReportData(found.case, found.runs, found.folder)
-    (table,) = conclusion.tabulate_capacities({"": data})
+    (table,) = capacities.tabulate_capacities({"": data})
     said = [row[2] for row in table.rows if row[0] == "scale of the motion"]
     assert said[0] == "first stands"
     assert "run `archfem scale --pair second`, or" in said[1]

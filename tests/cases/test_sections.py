@@ -16,7 +16,15 @@ from archfem._files import replace_results
 from archfem.cases import answers
 from archfem.cases.analysis_keys import LimitAnalysis
 from archfem.cases.case import case_of
-from archfem.cases.report import conclusion, inputs, outcomes, report_data, response, sections
+from archfem.cases.report import (
+    capacities,
+    conclusion,
+    inputs,
+    outcomes,
+    report_data,
+    response,
+    sections,
+)
 from archfem.cases.report.response import _check_row, supported_weight_ratio
 from archfem.cases.result_text import tabulate_joints, tabulate_motions, tabulate_runs
 from archfem.cases.run import MOTION_VARIABLE
@@ -346,7 +354,7 @@ def test_a_mechanism_is_stated_once(runs, piers):
     assert "Mechanism: verified, local mechanism of arch at 2.000 s by joint 1" in text.text
     other = SimpleNamespace(mechanisms={"verified": None, "any joints at once": hit})
     assert response.describe_mechanism(other).startswith("by any joints at once, local mech")
-    (row, *_) = (row for _, row in conclusion._capacity_rows(data))
+    (row, *_) = (row for _, row in capacities._capacity_rows(data))
     assert row[2] == "fallen in 2 of 2 runs"
 
 

@@ -1,5 +1,6 @@
 """HTML report of the results of a case.
 
+    capacities      demands and capacities, a row for each check
     conclusion      head, outcome with margin and range
     demands         demands of an earthquake, with their sources
     doubts          doubts and notes of results, and what was not varied

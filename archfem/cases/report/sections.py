@@ -16,12 +16,12 @@ from archfem._files import read_listed
 from archfem.cases.answers import Ratios, read_numbers
 from archfem.cases.defaults import describe_margins_at_rest
 from archfem.cases.report import response
+from archfem.cases.report.capacities import tabulate_capacities
 from archfem.cases.report.conclusion import (
     build_conclusion,
     build_signatures,
     describe_width,
     list_facts,
-    tabulate_capacities,
 )
 from archfem.cases.report.doubts import list_elastic_fill, list_ranges, list_varied, spans_run
 from archfem.cases.report.inputs import compare_inputs, describe_value, tabulate_inputs
