@@ -108,6 +108,26 @@ def _search_between(
     return near[0], rows
 
 
+def _search_each_way(
+    structure: Structure,
+    places: Sequence[float],
+    vehicles: Sequence[Array],
+    near: Sequence[_Place],
+    stones: BlocksWithFill,
+    dead: Programme,
+    strips: Mapping[PointLoad, Array],
+) -> tuple[dict[AxleRow, Array], dict[AxleRow, _Place]]:
+    """Return rows of axles, and places of the worst in each direction, between those known."""
+    rows, at_row = dict[AxleRow, Array](), dict[AxleRow, _Place]()
+    for way in DRIVING_DIRECTIONS:
+        if beside := [place for place in near if place[1] == way]:
+            given = structure, places, vehicles, beside, stones, dead, strips
+            place, found = _search_between(*given)
+            rows |= found
+            at_row |= dict.fromkeys(islice(found, 1), place)
+    return rows, at_row
+
+
 def find_least_factors(
     structure: Structure,
     places: Sequence[float],
@@ -146,8 +166,8 @@ def find_least_factors(
         if isinstance(given["fill"], Fill) and worst and not several:
             low = guides[name] <= _NEARLY_LEAST * min(guides[name].min(), 1e9)
             near = [place_of[row] for row, is_low in zip(axles, low, strict=True) if is_low]
-            place, worst = _search_between(structure, places, vehicles, near, stones, dead, strips)
-            at_row = dict.fromkeys(islice(worst, 1), place)
+            given_road = structure, places, vehicles
+            worst, at_row = _search_each_way(*given_road, near, stones, dead, strips)
         else:  # rows have adverse strips behind their axles
             first = islice(worst, 3 if several else 1)
             at_row = {x: next(place_of[a] for a in axles if x[: len(a)] == a) for x in first}
