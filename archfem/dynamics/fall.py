@@ -21,6 +21,7 @@ from archfem.dynamics.collapse_state import (
     classify_collapse,
     doubt_collapse,
     doubt_soft_blocks,
+    follow_until_lost,
     mark_lost,
 )
 from archfem.dynamics.history import Ending, History, with_fall
@@ -106,8 +107,8 @@ def follow_fall(
     """Add the fall of loose or overturning blocks, and the state of collapse, to a history.
 
     The states are those at the start, from which displacements count, and at the end of the run.
-    Not whole, the fall ends with the first lost block, and is not compared with rigid blocks. Where
-    the fall could not be followed to its end and no block was lost, there is no state of collapse.
+    Not whole, the fall ends once a block is lost for good, and is not compared with rigid blocks.
+    Where it could not be followed to its end and no block was lost, there is no state of collapse.
     Ctrl-C and SIGTERM end it with what was computed.
     """
     (start, state), structure, ending = states, model.structure, history.ending
@@ -203,13 +204,12 @@ def simulate_fall(
 ) -> tuple[xr.Dataset, list[FallFrame]]:
     """Follow loose blocks until they rest, or until 20 s after the motion has ended.
 
-    Not whole, they are followed by one length of step until the first block is lost. The ratio is
+    Not whole, they are followed by one length of step until a block is lost for good. The ratio is
     that of `RigidBlockSimulation`. Where they cannot be followed to the end, the frames until then
     are returned, and `fall_failure` has the reason.
     """
     released = release_blocks(model, state)
     end = max(motion.duration, state.time) + 20.0
-    find_lost = mark_lost(model.structure)
     structure, fields = with_sliding_joints(model.structure), _interpolate_deformed(model, state)
     loose = loosen_fill(structure, released.start, fields)
     # grains are many, and where each of them goes depends on the step anyhow
@@ -217,19 +217,18 @@ def simulate_fall(
     simulation = RigidBlockSimulation(loose.structure, dt=dt, rocking_ratio=rocking_ratio)
     found, failure = list[FallFrame](), ""
     try:
-        for each in simulation.frames(loose.start, end, motion, spacing=0.02):
+        frames = simulation.frames(loose.start, end, motion, spacing=0.02)
+        for each in frames if whole else follow_until_lost(structure, frames, loose.restore):
             found.append(each)
-            if not whole and find_lost(loose.restore(each).poses).any():
-                break
     except (DidNotConverge, KeyboardInterrupt) as error:
         found = found or [*getattr(error, "last", ())]
         if not found:  # interrupted before the first step
             raise
         failure = "interrupted" if isinstance(error, KeyboardInterrupt) else str(error)
-    frames = [loose.restore(each) for each in found]
+    placed = [loose.restore(each) for each in found]
     grains = loose.describe_grains([each.poses for each in found])
-    dataset = _fall_dataset(frames, motion, released).merge(grains)
-    return dataset.assign_attrs(fall_failure=failure), frames
+    dataset = _fall_dataset(placed, motion, released).merge(grains)
+    return dataset.assign_attrs(fall_failure=failure), placed
 
 
 def _interpolate_deformed(model: Model, state: State) -> dict[int, Field]:
@@ -285,12 +284,11 @@ def _doubt_joints(structure: Structure, motion: Motion, start: float) -> Iterato
         return
     simulation = RigidBlockSimulation(with_sliding_joints(structure), dt=TRIED_STEPS[0])
     at_rest, end = LooseBlocks.as_built(structure, start), motion.duration + 2.0
-    find_lost = mark_lost(structure)
     # without convergence there is nothing to compare with
     with suppress(DidNotConverge), ProgressReport("compared", None, rarely=True) as progress:
         progress.show("rigid blocks from rest")
         frames = simulation.frames(at_rest, end, motion, spacing=0.02)
-        if not any(find_lost(frame.poses).any() for frame in frames):
+        if classify_collapse(structure, follow_until_lost(structure, frames)).time is None:
             yield Doubt(
                 RIGID_STAND,
                 f"{RANGE_REMEDY}, and check the stiffness of the joints",
@@ -305,7 +303,7 @@ def _list_slid_off(structure: Structure, poses: Array) -> list[str]:
     lost, names = np.array([*map(mark_lost(structure), poses)]), []
     for joint in structure.joints:
         a, b = sorted(joint.blocks, key=lambda k: blocks[k].fixed)
-        if not blocks[b].fixed or a not in stones or not (gone := lost[:, stones.index(a)]).any():
+        if not blocks[b].fixed or a not in stones or not (gone := lost[:, stones.index(a)])[-1]:
             continue
         pose = poses[gone.argmax(), a]
         foot = places[a] + pose[:2] + rotate(joint.middle - places[a], pose[2])

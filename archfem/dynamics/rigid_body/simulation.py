@@ -161,8 +161,8 @@ class RigidBlockSimulation:
         return [*frames[:-1], replace(frames[-1], step_change=change)]
 
     def _step_change(self, coarse: Sequence[FallFrame], fine: Sequence[FallFrame]) -> float:
-        """Return the largest relative change of any block's largest displacement [-]."""
-        # a block that has moved by half its size is lost, wherever it comes to rest
+        """Return the largest relative change of any block's largest or last displacement [-]."""
+        # a block that has moved by half its size and stays there is lost, wherever it rests
         free = list(self.structure.free)
         lost = 0.5 * np.sqrt([self.structure.blocks[number].area for number in free])
         reach = self.bodies.reach[free]
@@ -170,9 +170,9 @@ class RigidBlockSimulation:
         for frames in (coarse, fine):
             moved = np.array([frame.poses[free] - frames[0].poses[free] for frame in frames])
             bounds = np.hypot(moved[..., 0], moved[..., 1]) + reach * np.abs(moved[..., 2])
-            largest.append(np.minimum(bounds.max(axis=0), lost))
-        # what is small beside a block is compared with a fiftieth of that
-        scale = np.maximum(np.maximum(*largest), 0.02 * lost)
+            largest.append(np.minimum([bounds.max(axis=0), bounds[-1]], lost))
+        # what is small beside a block is compared with a fiftieth of that, and what is last with it
+        scale = np.array([np.maximum(np.maximum(*largest)[0], 0.02 * lost), lost])
         return float(np.max(np.abs(largest[1] - largest[0]) / scale))
 
     def _take_steps(
