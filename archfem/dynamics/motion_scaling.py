@@ -129,7 +129,7 @@ def _run_as_far(model: Model | Analysis, motion: Motion, **options: Any) -> Hist
 
 
 def _shake_until_lost(shake: Callable[..., History]) -> tuple[History, bool]:
-    """Return a run, which a fall ends with its first lost block, and whether it is whole."""
+    """Return a run, which ends once a block is lost for good, and whether it is whole."""
     run = shake(record=Record(whole_fall=False))
     if "fall_step" not in run.dataset.attrs:  # no block became loose
         return run, True

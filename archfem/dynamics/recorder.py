@@ -32,7 +32,7 @@ class Record:
         fields_every: interval of steps at which coordinates q are recorded, for pictures of the
             whole structure and for stress; None for none.
         whole_fall: whether loose blocks are followed until they rest, and their fall is doubted as
-            it must; else a run ends with its first lost block.
+            it must; else a run ends once a block is lost for good.
     """
 
     every: int = 1

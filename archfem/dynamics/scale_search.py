@@ -3,7 +3,7 @@
 Incremental dynamic analysis: runs at increasing and decreasing scales until each limit state is
 bracketed, then at the geometric mean of the widest bracket. A structure may stand at a larger scale
 than one at which it falls. Hence runs also fill the gaps between scales below the smallest fall;
-where one falls, the search continues below it. A run that falls ends with its first lost block. The
+where one falls, the search continues below it. A run ends once a block is lost for good. The
 smallest fall is then repeated to its end, with the checks of a whole fall.
 """
 
@@ -51,7 +51,7 @@ class ScaledRun:
     fall: CollapseState | None = None  # state of collapse; None for small displacements
     doubts: tuple[Doubt, ...] = ()
     admissible_step: float = inf  # that follows sliding, where that of the run does not [s]
-    whole: bool = True  # whether its fall was followed beyond the first lost block
+    whole: bool = True  # whether its fall was followed beyond the loss of a block
 
     def has_answer(self, definition: str) -> bool:
         """Return whether the run decides on a limit state: on a fall by a state of collapse."""

@@ -98,7 +98,7 @@ def run_motion(result: DeadLoadResult, motion: Motion, *, whole_fall: bool = Tru
     Args:
         result: dead-load result of the case.
         motion: ground motion.
-        whole_fall: as of `Record`; False ends the fall of any case with its first lost block.
+        whole_fall: as of `Record`; False ends the fall of any case once a block is lost for good.
 
     Raises:
         DidNotConverge: a step failed.

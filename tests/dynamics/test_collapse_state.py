@@ -127,6 +127,68 @@ def test_a_block_is_lost_once_it_has_sunk_or_turned():
     )
 
 
+@pytest.mark.parametrize(
+    ("sunk", "kind", "time"),
+    [
+        ([0.0, 0.51, 0.52, 0.49, 0.01], "stands", None),  # it sags, and closes again
+        ([0.0, 0.51, 0.49, 0.49, 0.49], "dislocated", None),  # jammed
+        ([0.0, 0.51, 0.49, 0.52, 5.0], "fallen", 4.0),
+        ([0.0, 0.51, 0.52, 5.0, 4.9], "fallen", 2.0),
+    ],
+)
+def test_a_block_is_lost_only_if_it_does_not_come_back(sunk, kind, time):
+    """A block of 1 m², which is 0.5 m broad, at 1 to 5 s."""
+    structure = floor((0.0, 0.0, 0.5, 2.0))
+    frames = [LooseBlocks.as_built(structure, 1.0 + k) for k in range(len(sunk))]
+    for frame, depth in zip(frames, sunk, strict=True):
+        frame.poses[1, 1] = -depth
+    found = classify_collapse(structure, frames)
+    assert (found.kind, found.time) == (kind, time)
+
+
+@pytest.mark.parametrize(("share", "kind"), [(0.98, "stands"), (1.02, "fallen")])
+def test_a_block_that_rocks_beyond_the_limit_is_lost_only_if_it_topples(share, kind):
+    """A block 1 m by 0.7 m topples at 55°, by the energy that lifts its centroid over its corner.
+
+    With 0.98 of that it turns to 47.5°, where cos(55° - turn) = cos 55° + 0.98 (1 - cos 55°), and
+    back. Frames come each 0.02 s, in which it turns there by less than 1 % of that.
+    """
+    structure = floor((0.0, 0.0, 1.0, 0.7), friction=5.0, floor=(-2.0, 3.0))
+    start, radius, tilt = LooseBlocks.as_built(structure), np.hypot(0.5, 0.35), np.arctan(1 / 0.7)
+    # ½ (4/3) radius² speed² = share · g · radius (1 - cos tilt), about the lower right corner
+    speed = np.sqrt(1.5 * share * G / radius * (1.0 - np.cos(tilt)))
+    start.velocities[1] = 0.35 * speed, 0.5 * speed, -speed
+    frames = list(RigidBlockSimulation(structure, dt=5e-4).frames(start, 10.0))
+    assert classify_collapse(structure, frames).kind == kind
+    if kind == "stands":
+        turn = max(-each.poses[1, 2] for each in frames)
+        back = np.arccos(np.cos(tilt) + share * (1.0 - np.cos(tilt)))
+        assert turn == pytest.approx(tilt - back, rel=0.01)
+        assert turn > np.pi / 4.0
+    brief = [*collapse_state.follow_until_lost(structure, iter(frames))]
+    assert (len(brief) < len(frames)) == (kind == "fallen")
+
+
+def test_a_fall_is_followed_until_a_stone_is_lost_for_good():
+    """A free fall by the diagonal of 6 m by 8 m lasts 1.43 s; frames come each 0.1 s."""
+    structure = floor((0.0, 0.0, 1.0, 7.0), floor=(0.0, 6.0))
+    frames = [LooseBlocks.as_built(structure, 0.1 * k) for k in range(60)]
+    for frame in frames[10:20] + frames[21:]:  # from 1 s on, and from 2.1 s on
+        frame.poses[1, 1] = -2.0
+    last = [*collapse_state.follow_until_lost(structure, iter(frames))][-1]
+    assert last.time == pytest.approx(3.6)
+
+
+def test_a_fall_is_followed_by_the_blocks_that_are_restored():
+    """Grains in place of fill have poses that are not those of the structure."""
+    structure = floor((0.0, 0.0, 1.0, 7.0), floor=(0.0, 6.0))
+    frames = [LooseBlocks.as_built(structure, 1.0 * k) for k in range(9)]
+    fallen = LooseBlocks.as_built(structure)
+    fallen.poses[1, 2] = 1.0
+    found = collapse_state.follow_until_lost(structure, iter(frames), lambda _: fallen)
+    assert [each.time for each in found] == [0.0, 1.0, 2.0]
+
+
 def test_a_run_without_frames_is_refused():
     with pytest.raises(af.errors.InvalidInput, match="no frames"):
         classify_collapse(floor((0.0, 0.0, 0.5, 2.0)), [])

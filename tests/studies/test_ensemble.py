@@ -11,7 +11,7 @@ from archfem.studies import evaluators
 
 SCALES = (0.2, 5.0)
 
-# falls end with the first lost block
+# falls end once a block is lost for good
 BRIEF = af.Record(whole_fall=False)
 
 

@@ -314,6 +314,24 @@ def test_steps_that_fail_are_halved_and_the_last_error_is_raised(chords, monkeyp
     assert count == [5e-4, 2.5e-4, 1.25e-4, 6.25e-5]
 
 
+@pytest.mark.parametrize(("end", "count"), [(0.0, 3), (0.3, 3), (0.49, 2), (0.6, 2)])
+def test_steps_are_halved_where_a_block_comes_back_by_one_of_them_alone(end, count, monkeypatch):
+    """A block of 1 m² sinks by 0.6 m by all steps, and back by the first; a fifth is 0.1 m."""
+    structure, taken = floor((0.0, 0.0, 0.5, 2.0)), []
+    first = next(RigidBlockSimulation(structure).frames(LooseBlocks.as_built(structure), 1.0))
+
+    def sink(simulation, dt, *_):
+        taken.append(dt)
+        for depth in (0.0, 0.6, end if len(taken) == 1 else 0.6):
+            poses = np.zeros((2, 3))
+            poses[1, 1] = -depth
+            yield replace(first, poses=poses)
+
+    monkeypatch.setattr(RigidBlockSimulation, "_take_steps", sink)
+    last = RigidBlockSimulation(structure).final_frame(LooseBlocks.as_built(structure), 1.0)
+    assert (len(taken), last.step_change) == (count, pytest.approx(0.02 * (end == 0.49)))
+
+
 def test_rest_is_reported_only_once_the_ground_rests(chords):
     ground = af.Motion(1e-9 * np.ones(101), 0.01)
     end = RigidBlockSimulation(chords, dt=1e-3).final_frame(

@@ -115,8 +115,8 @@ function shake(engine, arch, motion, scale) {
   const fall = new Fall(engine, arch), { bodies: { reach }, parameters: { dt: step, tolerance } } = arch;
   const precise = { "parameters.max_sweeps": FIRST_SWEEPS, "parameters.tolerance": 1e-3 * tolerance };
   const end = (motion.x.length - 1) * motion.dt, poses = () => fall.view("state.q").slice();
-  const frames = [poses()], lost = new Set();
-  let time = 0, fell = null, anchor = frames[0], since = 0;
+  const frames = [poses()], lost = new Map();
+  let time = 0, anchor = frames[0], since = 0;
   while (time < end + EXTRA_TIME && (time <= end || time - since < 0.5)) {
     const ground = sampleGround(motion, (frames.length - 1) * FRAME_STEPS, FRAME_STEPS, step, scale), done = frames.length === 1 ? 2 : 0;
     if (done) fall.advance(ground.subarray(0, done), precise);
@@ -124,10 +124,12 @@ function shake(engine, arch, motion, scale) {
     time = frames.length * FRAME_STEPS * step;
     const now = poses();
     frames.push(now);
-    reach.forEach((_, body) => { if (now[3 * body + 1] < -0.5 * arch.sizes[body] || Math.abs(now[3 * body + 2]) > Math.PI / 4) lost.add(body); });
-    if (lost.size && fell === null) fell = time;
+    reach.forEach((_, body) => {
+      if (!(now[3 * body + 1] < -0.5 * arch.sizes[body] || Math.abs(now[3 * body + 2]) > Math.PI / 4)) lost.delete(body);
+      else if (!lost.has(body)) lost.set(body, time);
+    });
     // at rest: no point moves by more than 0.5 mm in half a second on a ground at rest
     if (time <= end || farthest(now, anchor, reach) > 5e-4) [anchor, since] = [now, time];
   }
-  return { frames, spacing: FRAME_STEPS * step, lost: lost.size, fell, displacement: Math.max(...frames.map((each) => farthest(each, frames[0], reach))) };
+  return { frames, spacing: FRAME_STEPS * step, lost: lost.size, fell: lost.size ? Math.min(...lost.values()) : null, displacement: Math.max(...frames.map((each) => farthest(each, frames[0], reach))) };
 }
