@@ -44,10 +44,10 @@ FALLEN_STATES = COLLAPSE_STATES[2:]
 class CollapseState:
     """State of collapse at the end of a run.
 
-    A loose block is *lost* if its centroid has sunk by more than half the root of its area, or the
-    block has turned by more than 45°, and it stays so to the end. Blocks of a ring that sags as far
-    and closes again are not lost. Where a lost block rests does not matter. Fill does not count,
-    and bodies that stand on the structure are not displaced with it. The structure
+    A loose block is out of its place where its centroid has sunk by more than half the root of its
+    area, or it has turned by more than 45°. It is *lost* if it stays so to the end, wherever it
+    rests: a ring that sags as far and closes again has lost none. Fill does not count, and bodies
+    that stand on the structure are not displaced with it. The structure
 
     - *stands*: no block is lost, and none is displaced by more than a tenth of the median joint
       depth of the shallowest ring or pier;
