@@ -22,6 +22,7 @@ from archfem.cases.report import (
     demands,
     doubts,
     margins,
+    outcomes,
     report_data,
     sections,
 )
@@ -339,7 +340,7 @@ def test_a_first_fall_has_scale_peak_and_motion_of_one_search(case):
     data = data_of(case, first=verdict_of(), third=verdict_of())
     vars(data)["statements"] = {"scale": state("scale", first, third._replace(pga=0.198))}
     (words,) = find_first_failures(data)
-    over = "(0.903 to 0.912 g over motions and time steps)"
+    over = "(by other motions or time steps up to 0.912 g)"
     assert words == f"first falls at 0.903 g, 4.56 × 'third' {over}"  # 4.56 × 0.198 g
 
 
@@ -350,8 +351,8 @@ def test_the_least_peak_of_a_fall_is_of_all_motions_scaled_or_not(case):
     empty = scales("c", 0.0, unfinished=True)
     vars(data)["statements"] = {"scale": state("scale", scales("a", 1.02, falls=1.06), empty)}
     assert [*find_first_failures(data)] == [
-        "first falls at 0.212 g at most, 1.06 × 'a'; the least scale is 1.00 × 'b', of 0.306 g; "
-        "1 of 3 motions was scaled"
+        "first falls at 0.212 g, 1.06 × 'a'; the least scale is 1.00 × 'b', of 0.306 g; "
+        "1 of 3 motions was scaled: under others it may fail at less"
     ]
     vars(data)["pairs"] = tuple("abc")
     assert margins.rank_margins(data)[-1][2][-1] == "'c' was not scaled"
@@ -364,14 +365,13 @@ def test_the_range_of_a_first_fall_has_no_motion_that_was_not_searched(case):
     vars(data)["statements"] = {"scale": state("scale", *searched)}
     (words,) = find_first_failures(data)
     assert words == (
-        "first falls at 0.082 g at most, 0.410 × 'a' (0.410 to 0.700 ×, 0.082 to 0.14 g over "
-        "motions and time steps); 2 of 3 motions were scaled"
+        "first falls at 0.082 g, 0.410 × 'a' (by other motions or time steps up to 0.700 ×, "
+        "0.14 g); 2 of 3 motions were scaled: under others it may fail at less"
     )
     vars(data)["statements"] = {"scale": state("scale", *searched, scales("c", 0.8, falls=0.9))}
     (words,) = find_first_failures(data)
     assert words == (
-        "first falls at 0.082 g, 0.410 × 'a' (0.410 to 0.900 ×, 0.082 to 0.18 g over motions and "
-        "time steps)"
+        "first falls at 0.082 g, 0.410 × 'a' (by other motions or time steps up to 0.900 ×, 0.18 g)"
     )
 
 
@@ -456,10 +456,8 @@ def test_what_fails_under_a_motion_that_was_not_scaled_has_a_margin_below_one(ca
     plain = head_of(conclusion.list_facts(data))
     assert plain.startswith("It survives with damage: it is dislocated but stands under 1 of 3 mot")
     # 2 m/s² are 0.204 g
-    said = (
-        "It is first dislocated at 0.204 g at most, 1.00 × 'b'. It first falls at 0.8 g at most, "
-    )
-    said += "4.00 × 'a'; 1 of 3 motions was scaled."
+    said = "It is first dislocated at 0.204 g, 1.00 × 'b'. It first falls at 0.8 g, 4.00 × 'a'; "
+    said += "1 of 3 motions was scaled: under others it may fail at less."
     assert said in plain
 
 
@@ -478,7 +476,7 @@ def test_the_stones_that_are_dislocated_stand_in_no_sentence_of_the_conclusion(c
     plain = head_of(conclusion.list_facts(data))
     assert "it is dislocated but stands under 1 of 2 motions: b (PGA 0.20 g). It" in plain
     # 0.95 × 0.2 g, of a range of one searched motion
-    first = "It is first dislocated at 0.19 g at most, 0.950 × 'a'; 1 of 2 motions was scaled."
+    first = "It is first dislocated at 0.19 g, 0.950 × 'a'; 1 of 2 motions was scaled: under"
     assert first in plain
     assert "Under 'a' it stands at 1.00 ×, but is dislocated at 0.950 ×: not" in plain
     assert "loses" not in words_of(data)[0]
@@ -565,9 +563,11 @@ def test_the_answer_has_displacements_the_first_fall_and_the_checks(case):
     assert head_of(facts.items()) == (
         "By the kinematic assessment it does not withstand the spectrum of the motion. Under its "
         "motions it survives: it stands under all 2 motions of PGA 0.20 g, and moves by 60 to 80 "
-        "mm. It first falls at 0.26 g, 1.30 × 'a' (1.30 to 1.51 ×, 0.26 to 0.302 g over motions "
-        "and time steps). No property was varied. The stiffness of joints is a default: measured "
-        "ones differ tenfold. Perpendicular to this section, as along a wall, it was not checked."
+        "mm. It first falls at 0.26 g, 1.30 × 'a' (by other motions or time steps up to 1.51 ×, "
+        "0.302 g). The least margin is 0.488 (0.592 with the weights apart), on the spectrum of "
+        "the motion, by damage, which it fails. No property was varied. "
+        "The stiffness of joints is a default: measured ones differ tenfold. "
+        "Perpendicular to this section, as along a wall, it was not checked."
     )
     assert facts["in doubt"] == "scale of the motion"
     pieces = conclusion.build_conclusion(data).pieces
@@ -589,7 +589,7 @@ def test_the_answer_has_displacements_the_first_fall_and_the_checks(case):
         assert (words in head_of(conclusion.list_facts(data))) == said
     data.statements["scale"] = state("scale", first._replace(unfinished=True), other)
     begun = head_of(conclusion.list_facts(data))
-    assert "time steps). The search is unfinished: at less it may, too." in begun
+    assert "0.302 g). The search is unfinished: at less it may, too." in begun
     assert " It falls at " in begun
     data.statements["scale"] = searched
     vars(data)["case"] = af.Case.of({**case.settings, "assessment": SPECTRUM})
@@ -1031,11 +1031,12 @@ def test_a_displacement_has_the_range_of_its_time_steps_and_single_changes_are_s
     )
     same = "it falls with none of 1 single changes"
     moved = "unvaried it is displaced by 20 mm, by 120 mm with half the time step"
-    assert [*conclusion._say_causes(ranges)] == [
+    causes = [each.what_changes for each in ranges]
+    assert [*outcomes.say_by_motion(ranges, causes)] == [
         f"under 'a' and 'b': {same}",
         f"under 'a' and 'b': {moved}",
     ]
-    assert [*conclusion._say_causes(ranges[:1])] == [same, moved]
+    assert [*outcomes.say_by_motion(ranges[:1], causes[:1])] == [same, moved]
     assert [*conclusion._describe_ranges(SimpleNamespace(verdict_ranges=ranges, runs={}))][:2] == [
         f"under '{motion}' it falls in none of 3 variations" for motion in "ab"
     ]
@@ -1052,16 +1053,75 @@ def test_what_displaces_it_most_does_so_by_more_than_time_steps(far, outcome):
     found.dataset["sign"] = "run", np.array(["as given", "as given", "reversed"])
     found.dataset["outcome"] = "run", np.array(["stands", "stands", outcome])
     found.dataset.attrs["properties"] = ["dt", "sign"]
-    said = conclusion._say_what_decides([found])
+    (said,) = outcomes.say_what_decides([found])
     most = "of what was varied, motion reversed displaces it most: "
     assert (
         said
         == {
             (0.029, "stands"): "no property that was varied decides",
             (0.031, "stands"): f"{most}31 mm in place of 20 mm",
-            (0.02, "dislocated"): f"{most}0 mm in place of 0 mm at the end",
+            (0.02, "dislocated"): "it is dislocated with motion reversed",
         }[far, outcome]
     )
+
+
+@pytest.mark.parametrize(
+    ("given", "half", "turned", "said"),
+    [
+        ("stands", "stands", "fallen", "it falls with motion reversed"),
+        ("dislocated", "fallen", "fallen", "it falls with HALF and with motion reversed"),
+        ("dislocated", "stands", "partly fallen", "it falls with motion reversed"),
+        ("dislocated", "dislocated", "stands", "it is not dislocated with motion reversed"),
+        ("fallen", "dislocated", "stands", "it does not fall with HALF and with motion reversed"),
+        ("fallen", "unknown", "fallen", "no property that was varied decides"),
+    ],
+)
+def test_a_single_change_of_another_outcome_stands_in_the_head(case, given, half, turned, said):
+    """Where no property separates the sampled runs, of which none falls."""
+    found = range_of(0.02, 0.02, 0.02, 0.02, motion="a")
+    found.dataset["sampled"][:3] = False
+    found.dataset["dt"] = "run", np.array(["as given", "half", "as given", "as given"])
+    found.dataset["sign"] = "run", np.array(["as given", "as given", "reversed", "as given"])
+    found.dataset["outcome"] = "run", np.array([given, half, turned, "stands"])
+    found.dataset.attrs["properties"] = ["dt", "sign"]
+    words = said.replace("HALF", "half the time step")
+    data = data_of(case, found, a=verdict_of())
+    assert f" {sentence(words)} " in dict(conclusion.list_facts(data))["depends on"]
+    other = range_of(0.02, 0.02, motion="b")
+    of_motion = words if said.startswith("no ") else f"under 'a': {words}"
+    assert outcomes.say_what_decides([found, other]) == [of_motion]
+
+
+def test_the_head_has_the_least_margin_where_it_is_that_of_a_check(case):
+    """First falls of 1.3 × are beyond 1.1 ×, up to which it stands."""
+    data = data_of(case, a=verdict_of())
+    for ratio, said in (1.05, True), (1.15, False):
+        check = state("assessment", answers.Ratios("linear", ["right"], ratio, ratio))
+        searched = state("scale", scales("a", 1.1, falls=1.3))
+        vars(data)["statements"] = {"assessment": check, "scale": searched}
+        words = dict(conclusion.list_facts(data))["margin"]
+        least = f" The least margin is {ratio}, on the spectrum of the motion, by linear, right"
+        assert words.startswith("It first falls at 0.26 g, 1.30 × the motion.")
+        assert (least in words) == said == ("least margin" in words)
+
+
+@pytest.mark.parametrize(
+    ("norm", "demand", "others"),
+    [
+        ("NTC 2018", "LM1", "Eurocodes"),
+        ("NTC 2018 and EN 1991-2", "LM1", ""),
+        ("SIA 269", "LM1", "others"),
+        ("BD 21", "lorry by CS 454", ""),
+        ("NTC 2018", "lorry", "others"),
+        ("", "LM1", ""),
+    ],
+)
+def test_a_rating_by_another_norm_than_that_of_the_report_is_noted(case, norm, demand, others):
+    data = ReportData(af.Case.of({**case.settings, "report": {"norm": norm}}), {})
+    row = answers.Row("rating", demand, "passes", "1.5", {"passes": True, "least": 1.5})
+    vars(data)["statements"] = {"rating": answers.Statement([], [row])}
+    noted = [f"archfem has no rating by {norm}: {others} stand for it"] * bool(others)
+    assert doubts.list_notes(data).get("rating", []) == noted
 
 
 def test_single_changes_are_tabulated_the_worst_first(case):
@@ -1303,7 +1363,10 @@ def test_the_factor_without_a_code_and_its_place_stand_beside_that_of_the_norm(
     margins = dict(conclusion.list_joint_facts({"A": data, "B": data}))["margin"]
     short = by.partition(" (")[0]  # the table has the partial factors
     of = f"{format_ratio(margin)} times the vehicle, lorry{short}, with neither"
-    assert margins == f"The least margins are of A {of}; of B {of}."
+    by_norm = f", ratings for {norm}," * bool(norm)
+    assert margins == f"The least margins{by_norm} are of A {of}; of B {of}."
+    noted = "archfem has no rating by NTC 2018: Eurocodes stand for it"
+    assert doubts.list_notes(data) == ({"rating": [noted]} if norm == "NTC 2018" else {})
     # a state that may have less bounds it from above
     part = "all unfavourable at once not computed"
     numbers = {"passes": True, "least": margin, "state": part}

@@ -1,6 +1,5 @@
 """Demands and capacities of a report: one row for each check, with its factor and doubt."""
 
-import re
 from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
@@ -18,6 +17,7 @@ from archfem.cases.report.doubts import (
     list_doubts,
     spans_run,
 )
+from archfem.cases.report.motion_rules import is_of_norm
 from archfem.cases.report.report_data import ReportData
 from archfem.cases.run import CASE_FILE
 from archfem.dynamics.collapse_state import FALLEN_STATES
@@ -32,12 +32,6 @@ from archfem.view.pages.document import Grid
 # Fidelity of the variations of a verdict
 VARIED_FIDELITY = "rigid"
 
-# Words of a rating by a norm, by what the norm is called
-_NORMS_OF_RATINGS = {
-    **dict.fromkeys(("EUROCODE", "EN199", "NTC"), "by Eurocodes|^LM(1|2|71)"),
-    **dict.fromkeys(("CS45", "BD21"), "by CS 454|^CS454"),
-}
-
 # What the factors of results are, as multiples of their demands
 _FACTORS = {
     "assessment": "a check is just passed",
@@ -46,14 +40,6 @@ _FACTORS = {
     "thickness": "of a thickness, the given over the least",
     "risk": "half a probability of a fall",
 }
-
-
-def is_of_norm(data: ReportData, text: str) -> bool:
-    """Return whether a text on a rating is of the norm of the report; of no code without one."""
-    norm = data.case.report.get("norm", "").upper().replace(" ", "")
-    if not norm:
-        return not any(words in text for words in (" by Eurocodes", " by CS 454", "from memory"))
-    return any(x in norm and re.search(words, text) for x, words in _NORMS_OF_RATINGS.items())
 
 
 def tabulate_capacities(parts: Mapping[str, ReportData]) -> list[Grid]:

@@ -17,7 +17,7 @@ from archfem.cases.defaults import (
 from archfem.cases.push_factors import PushFactors
 from archfem.cases.rating_text import NOT_COMPUTED
 from archfem.cases.report import margins, outcomes
-from archfem.cases.report.capacities import is_of_norm, tabulate_capacities
+from archfem.cases.report.capacities import tabulate_capacities
 from archfem.cases.report.demands import list_demands, tabulate_demands
 from archfem.cases.report.doubts import (
     HISTORIES,
@@ -31,16 +31,15 @@ from archfem.cases.report.doubts import (
     list_unvaried,
     spans_run,
 )
-from archfem.cases.report.motion_rules import find_missed, find_rule, name_norm
+from archfem.cases.report.motion_rules import find_missed, find_rule, is_of_norm, name_norm
 from archfem.cases.report.outcomes import sentence
 from archfem.cases.report.report_data import SHOWN_RESULTS, ReportData
 from archfem.cases.report.scales import find_first_failures, say_fragile
 from archfem.cases.report.study_findings import MAX_TIE_DIFFERENCE, say_what_changes
 from archfem.dynamics.collapse_state import COLLAPSE_STATES, RANGE_REMEDY
-from archfem.dynamics.verdict_range import UNVARIED, VerdictRange
 from archfem.masonry.structure import Structure, join_names, join_words
 from archfem.models.model import Doubt
-from archfem.units import Ends, format_mm, format_ratio
+from archfem.units import Ends, format_ratio
 from archfem.view.pages.document import Grid, Section, TextBlock
 
 # Doubts of a result that the conclusion states; the others stand in the section of the result
@@ -137,7 +136,9 @@ def list_joint_facts(parts: Mapping[str, ReportData]) -> list[tuple[str, str]]:
     else:
         name = next(iter(worst), min(ranks, key=lambda x: ranks[x][0]))
         facts.append((answer, f"The worst of {len(parts)} cases is {name}: {said.pop(name)}"))
-    facts.append((margin, f"The least margins are {'; '.join(listed)}."))
+    norms = {x.case.report.get("norm", ""): x for x in parts.values() if "rating" in x.statements}
+    of = f", ratings for {join_words([*filter(None, norms)])}," * any(norms)
+    facts.append((margin, f"The least margins{of} are {'; '.join(listed)}."))
     unchecked = dict[str, list[str]]()
     for name, head in heads.items():
         for text in (text for key, text in head if key == left):
@@ -221,7 +222,8 @@ def _say_plainly(data: ReportData, doubtful: Sequence[str]) -> Iterator[tuple[st
     if data.runs:
         failing = [*assessed * bool(failed), *unchecked * overturns]
         yield from ((answer, x) for x in _say_survival(data, doubtful, failing))
-        yield from ((margin, x) for x in [*_say_first_failures(data), *say_fragile(data)])
+        margin_texts = _say_first_failures(data), margins.say_least_check(data), say_fragile(data)
+        yield from ((margin, x) for x in chain(*margin_texts))
         yield from ((depends, x) for x in _say_conditions(data))
     items = list_materials_and_contacts(data.case)
     keys = [key for item in items for key in list_default_keys(data.case, item)]
@@ -252,11 +254,9 @@ def _say_unchecked(data: ReportData) -> tuple[list[str], bool]:
     push, demand = found
     beside = f" (demand {demand:.3g} g)" * (demand > 0.0)
     falls = f", where it may overturn from {push:.3g} g on{beside}" * (push > 0.0)
-    way = (
-        "perpendicular to this section, as along a wall,"
-        if np.isnan(push)
-        else "across the plane of the drawing"
-    )
+    way = "across the plane of the drawing"
+    if np.isnan(push):
+        way = "perpendicular to this section, as along a wall,"
     return [f"{way} it was not checked{falls}"], push < demand
 
 
@@ -345,11 +345,8 @@ def _say_survival(
 def _say_conditions(data: ReportData) -> Iterator[str]:
     """Yield rules that the motions miss, how often it falls otherwise, and what decides."""
     missed = [(x.rule.partition(",")[0], x.found.partition("; ")[2]) for x in find_missed(data)]
-    if listed := join_words(
-        [f"{rule} ({without})" if without else rule for rule, without in missed]
-    ):
-        norm = name_norm(find_rule(data))
-        yield f"the motions do not meet {norm} by their {listed}"
+    if rules := [f"{rule} ({without})" if without else rule for rule, without in missed]:
+        yield f"the motions do not meet {name_norm(find_rule(data))} by their {join_words(rules)}"
     if len(data.runs) + len(data.missing) == 1 and outcomes.find_worst(data)[1] == "survives":
         yield "one motion was run, and others of its size may do otherwise"
     ranges = sorted(data.verdict_ranges, key=lambda x: (x.falls.sum(), x.dislocated.sum()))
@@ -359,7 +356,7 @@ def _say_conditions(data: ReportData) -> Iterator[str]:
         yield f"with other plausible properties it {found.count}{under}"
     every = [(each.name, text) for each in data.own_studies for text in say_what_changes(each)]
     if ranges or not every:
-        yield _say_what_decides(ranges[::-1])
+        yield from outcomes.say_what_decides(ranges[::-1])
     # the verdict has these
     below = {study for least, _, study in margins.say_less(data) if least < 1.0}
     # the section of a study names its cases
@@ -377,21 +374,6 @@ def _say_why_undecided(data: ReportData) -> str:
     if loose := sum(fall is not None and fall.lacks_joints for fall in falls):
         words.append(f"in {loose} of {count} runs joints were not followed through strong motion")
     return join_words(words)
-
-
-def _say_what_decides(ranges: Sequence[VerdictRange]) -> str:
-    """Say which of the properties that were varied decides, or displaces it most."""
-    names = [name for each in ranges if each.is_mixed for name in each.deciding]
-    if names:
-        return f"of what was varied, {join_words([*dict.fromkeys(names)])} decides"
-    for found in ranges:
-        changes = [each for each in found.single_changes if each.outcome in COLLAPSE_STATES[:2]]
-        given = next((each for each in changes if each.name == UNVARIED), None)
-        if given and (changes[0].rank > given.rank or found.is_beyond_steps(changes[0], given)):
-            most, own = (format_mm(found.measure(each)) for each in (changes[0], given))
-            ends = f"{most} in place of {own}" + " at the end" * found.is_dislocation_worst
-            return f"of what was varied, {changes[0].name} displaces it most: {ends}"
-    return "no property that was varied decides" if ranges else "no property was varied"
 
 
 def build_conclusion(data: ReportData) -> Section:
@@ -447,7 +429,8 @@ def _build_paragraphs(data: ReportData, doubtful: Sequence[str]) -> dict[str, li
         ordered = (sorted(x.sentences, key=lambda y: not is_of_norm(data, y)) for x in told)
         answer += chain.from_iterable(ordered)
     answer += [*outcomes.describe_ends(data), *_describe_ranges(data)]
-    changes = [*_say_causes(data.verdict_ranges)]
+    causes = ([*[x.where] * x.is_mixed, *x.what_changes] for x in data.verdict_ranges)
+    changes = [*outcomes.say_by_motion(data.verdict_ranges, causes)]
     if not data.runs:  # the head has them beside runs
         changes += [text for study in data.own_studies for text in say_what_changes(study)]
     if fill := join_names(list_elastic_fill(data)):
@@ -481,16 +464,6 @@ def _describe_ranges(data: ReportData) -> Iterator[str]:
         far = max(moved, key=lambda x: np.nanmax(x.dataset["displacement"].values[~x.falls]))
         most = f"it moves farthest under '{far.dataset.attrs.get('motion')}': " * (len(ranges) > 1)
         yield f"{most}largest displacements are {far.displacement_ends}"
-
-
-def _say_causes(ranges: Sequence[VerdictRange]) -> Iterator[str]:
-    """Yield what separates falls in variations, and what single changes do, equal ones once."""
-    texts: dict[str, list[str]] = {}
-    for each in ranges:
-        for text in [*[each.where] * each.is_mixed, *each.what_changes]:
-            texts.setdefault(text, []).append(f"'{each.dataset.attrs.get('motion')}'")
-    for text, motions in texts.items():
-        yield f"under {join_words(motions)}: {text}" if len(ranges) > 1 else text
 
 
 def build_signatures(report: Mapping[str, str]) -> Grid:

@@ -9,7 +9,7 @@ from archfem._display import NOTE_MARK
 from archfem._files import read_sealed_json
 from archfem.cases.answers import MATCHED, RESULTS, Ratios, read_numbers
 from archfem.cases.defaults import note_loads_left_out
-from archfem.cases.report.motion_rules import check_motions, note_checks
+from archfem.cases.report.motion_rules import check_motions, note_checks, note_rating
 from archfem.cases.report.report_data import ReportData
 from archfem.cases.report.study_findings import list_studied
 from archfem.cases.result_text import OF_GIVEN_FILL
@@ -181,13 +181,14 @@ def spans_run(data: ReportData, found: VerdictRange) -> bool:
 
 
 def list_notes(data: ReportData) -> dict[str, list[str]]:
-    """Return the notes of each result, with that on the rules of a norm for motions."""
+    """Return the notes of each result, with those on the norm: of motions, and of ratings."""
     notes = {
         RESULTS[name]: own
         for name, each in data.statements.items()
+        for notes in [[*(note_rating(data) if name == "rating" else ()), *each.notes]]
         # what is not about the least factor of a push stands in its text alone, and a paragraph
         # has what is not checked across
-        if (own := [x for x in each.notes if not x.startswith((OF_GIVEN_FILL, UNCHECKED_ACROSS))])
+        if (own := [x for x in notes if not x.startswith((OF_GIVEN_FILL, UNCHECKED_ACROSS))])
     }
     left_out = [x.removeprefix(NOTE_MARK) for x in note_loads_left_out(data.case)]
     missed = [*note_checks(data), *left_out * bool(data.runs)]

@@ -122,6 +122,14 @@ def build_transverse(data: ReportData) -> list[TextBlock]:
     return [TextBlock(sentence(text), manner, lead="Across its plane?")]
 
 
+def say_least_check(data: ReportData) -> Iterator[str]:
+    """Yield the least margin, if it is that of a check."""
+    least = min((x for x, is_margin, _ in list_margins(data) if is_margin), default=np.nan)
+    checks = read_numbers(Ratios, data.statements.get("assessment"))
+    if any(_describe_check(data, each)[0] == least for each in checks):
+        yield next(describe_margin(data))
+
+
 def describe_margin(data: ReportData) -> Iterator[str]:
     """Yield the factors on the demands of an earthquake: margins, the least first, then pushes."""
     found = rank_margins(data)
@@ -156,9 +164,8 @@ def list_margins(
     factor.
     """
     checks = read_numbers(Ratios, data.statements.get("assessment"))
-    for least, texts in sorted(_describe_check(data, each) for each in checks)[:1]:
-        yield least, True, texts
-    for least, texts in describe_scales(data):
+    ratios = sorted(_describe_check(data, each) for each in checks)
+    for least, texts in [*ratios[:1], *describe_scales(data)]:
         yield least, True, texts
     for least, at, _, body in sorted(say_across(data))[:across]:
         text = f"below {at}: {body} across the plane as one rigid body, held by nothing else"

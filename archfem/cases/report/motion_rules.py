@@ -1,4 +1,4 @@
-"""Rules of a norm for suites of motions: what is required, what is found, and whether it is met."""
+"""Rules of a norm for suites of motions, what is found and whether it is met; ratings by it."""
 
 import re
 from collections.abc import Iterator
@@ -22,6 +22,12 @@ from archfem.view.pages.document import Grid, TextBlock
 
 # Rules by the words of norms in [report], without spaces
 _NORMS = {"EN1998": "EC8", "EC8": "EC8", "EUROCODE8": "EC8", "NTC": "NTC-2018"}
+
+# Words of a rating by a norm, by what the norm is called
+_NORMS_OF_RATINGS = {
+    **dict.fromkeys(("EUROCODE", "EN199", "NTC"), "by Eurocodes|^LM(1|2|71)"),
+    **dict.fromkeys(("CS45", "BD21"), "by CS 454|^CS454"),
+}
 
 # Years of editions whose rules are others
 _OTHER_EDITIONS = ("2008", "2024")
@@ -214,3 +220,19 @@ def note_checks(data: ReportData) -> list[str]:
     found = [f"{x.rule}, {x.required}, is {x.found}" for x in find_missed(data)]
     norm = name_norm(find_rule(data))
     return [f"motions do not meet {norm} (from memory): {each}" for each in found]
+
+
+def is_of_norm(data: ReportData, text: str) -> bool:
+    """Return whether a text on a rating is of the norm of the report; of no code without one."""
+    norm = data.case.report.get("norm", "").upper().replace(" ", "")
+    if not norm:
+        return not any(words in text for words in (" by Eurocodes", " by CS 454", "from memory"))
+    return any(x in norm and re.search(words, text) for x, words in _NORMS_OF_RATINGS.items())
+
+
+def note_rating(data: ReportData) -> list[str]:
+    """Return a note where archfem has no rating by the norm of a report, and others stand."""
+    norm = data.case.report.get("norm", "")
+    of_norm = any(is_of_norm(data, row.demand) for row in data.statements["rating"].rows)
+    words = f"archfem has no rating by {norm}: {'Eurocodes' if of_norm else 'others'} stand for it"
+    return [words] * bool(norm and not re.search("EN ?199|EUROCODE|CS ?45|BD ?21", norm.upper()))

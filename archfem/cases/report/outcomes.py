@@ -8,9 +8,9 @@ from archfem.cases.report.report_data import ReportData
 from archfem.dynamics.collapse_state import COLLAPSE_STATES, CollapseState
 from archfem.dynamics.history import History
 from archfem.dynamics.verdict import Verdict
-from archfem.dynamics.verdict_range import HALF_STEP, UNVARIED
+from archfem.dynamics.verdict_range import HALF_STEP, UNVARIED, VerdictRange
 from archfem.masonry.structure import Structure, join_words
-from archfem.units import Ends
+from archfem.units import Ends, format_mm
 
 # Words of a sentence
 MAX_WORDS = 25
@@ -126,3 +126,39 @@ def sentence(text: str) -> str:
     if len(text.split()) > MAX_WORDS and clause != text and ": " not in clause:  # no list
         return " ".join(map(sentence, text.split("; ")))
     return text[:1].upper() + text[1:] + ("" if text.endswith((".", "?")) else ".")
+
+
+def say_by_motion(ranges: Sequence[VerdictRange], said: Iterable[Sequence[str]]) -> Iterator[str]:
+    """Yield what is said of each of some variations with their motions, equal texts once."""
+    motions: dict[str, list[str]] = {}
+    for each, texts in zip(ranges, said, strict=True):
+        for text in texts:
+            motions.setdefault(text, []).append(f"'{each.dataset.attrs.get('motion')}'")
+    for text, names in motions.items():
+        yield f"under {join_words(names)}: {text}" if len(ranges) > 1 else text
+
+
+def say_what_decides(ranges: Sequence[VerdictRange]) -> list[str]:
+    """Say which of the properties that were varied decides, also alone, or displaces it most."""
+    names = dict.fromkeys(name for each in ranges if each.is_mixed for name in each.deciding)
+    said = [f"of what was varied, {join_words([*names])} decides"] * bool(names)
+    said += say_by_motion(ranges, map(_say_changed, ranges))
+    for found in () if said else ranges:  # single changes have the outcome of the unvaried
+        changes = found.single_changes
+        given = next((x for x in changes if x.name == UNVARIED and x.rank in (0, 1)), None)
+        if given and found.is_beyond_steps(changes[0], given):
+            most, own = (format_mm(found.measure(each)) for each in (changes[0], given))
+            ends = f"{most} in place of {own}" + " at the end" * found.is_dislocation_worst
+            return [f"of what was varied, {changes[0].name} displaces it most: {ends}"]
+    return said or ["no property that was varied decides" if ranges else "no property was varied"]
+
+
+def _say_changed(found: VerdictRange) -> list[str]:
+    """Say with which single changes it falls, or does not, or else is dislocated, or is not."""
+    ranks = {each.name: min(each.rank, 2) for each in found.single_changes if each.rank >= 0}
+    given = ranks.get(UNVARIED, 3)
+    verbs = {2: ("does not fall", "falls"), 1: ("is not dislocated", "is dislocated")}
+    for rank, words in verbs.items():
+        if names := [name for name, x in ranks.items() if x != given and max(x, given) == rank]:
+            return [f"it {words[given < rank]} {join_words([f'with {x}' for x in names])}"]
+    return []

@@ -47,8 +47,8 @@ def find_first_failures(data: ReportData) -> Iterator[str]:
     searches = [x for x in list_scales(data) if x.held or "tension" not in x.states]
     unscaled, least = _list_unscaled(data), np.inf
     several, count = len(searches) + len(unscaled) > 1, len(data.runs)
-    was = _was(len(searches))
-    some = f"; {len(searches)} of {count} motions {was} scaled" * (len(searches) < count)
+    beyond = f"{_was(len(searches))} scaled: under others it may fail at less"
+    some = f"; {len(searches)} of {count} motions {beyond}" * (len(searches) < count)
     unfinished = any(x.unfinished for x in searches)
     some += "; the search is unfinished: at less it may, too" * unfinished
     for state in ("falls", "dislocated", "mechanism"):
@@ -62,20 +62,18 @@ def find_first_failures(data: ReportData) -> Iterator[str]:
         ends = [(scale, scale * pga) for scale, pga, _ in made]
         steps = (x for x in searches if state == "falls")
         ends += [(x.all_steps, x.all_steps * x.pga) for x in steps if x.all_steps]
-        wide, over = "", " and ".join(["motions"] * (len(searches) > 1) + ["time steps"])
-        if name not in unscaled:  # the least is of those that were searched
-            scale_ends, peaks = map(Ends.of, zip(*ends, strict=True))
-            said = f"{scale_ends:#.3g} ×", f"{peaks:.3g} g"
-            wide = ", ".join(x for x in said if " to " in x)
+        over = " or ".join(["motions"] * (len(searches) > 1) + ["time steps"])
+        # the least is of those that were searched, or has no range
+        top = map(max, zip(*ends, strict=True)) if name not in unscaled else (at, least)
+        own, most = ([f"{x:#.3g} ×", f"{y:.3g} g"] for x, y in ((at, least), top))
+        wide = ", ".join(x for x in most if x not in own)
         motion = f"'{name}'" if several or count > 1 else "the motion"
-        beside = f" ({wide} over {over})" * bool(wide)
+        beside = f" (by other {over} up to {wide})" * bool(wide)
         does = _STATES[state][1].replace("first ", "" if unfinished else "first ")
-        # one that was not searched may fail at less
-        most = " at most" * (len(searches) < count)
         # of unlike peaks another motion may have a smaller scale
         peak, scale, other = min(first, key=lambda x: x[1])
         beside += f"; the least scale is {scale:#.3g} × '{other}', of {peak:.3g} g" * (scale < at)
-        yield f"{does} at {least:.3g} g{most}, {at:#.3g} × {motion}{beside}{some}"
+        yield f"{does} at {least:.3g} g, {at:#.3g} × {motion}{beside}{some}"
         some = ""  # once
 
 
