@@ -22,7 +22,7 @@ from archfem.cases import run as case_run
 from archfem.cases.analysis_keys import name_vehicles, parse_rating, rate_case
 from archfem.cases.answers import RESULTS
 from archfem.cases.case import Case, sign
-from archfem.cases.run import CASE_FILE, RATING_FILE, DeadLoadResult, Result, Run, replace_run
+from archfem.cases.run import RATING_FILE, DeadLoadResult, Result, Run, replace_run
 from archfem.cases.structure_keys import read_survey
 from archfem.cases.toml_file import format_tables, parse_change
 from archfem.commands.tools import doubt_code, print_motions, show_both_senses
@@ -114,8 +114,8 @@ def write_results(
         print(text)
         return
     name, inputs, place = name_group(command, pair), case.hash_inputs(), PurePath(pair or "")
-    owner = _files.group_of(_files.intact_file_list(Path(out)), CASE_FILE)
-    if owner is not None and owner.inputs != inputs:
+    listed = _files.intact_file_list(Path(out)).items()
+    if any(each.inputs != inputs for key, each in listed if key != name):
         others = f"{NOTE_MARK}{out} has results of another case, drawing or version of archfem"
         remedy = "a report shows those of one alone: give all the same `--set`, or name another"
         text += f"\n{others}: {remedy}"

@@ -1023,6 +1023,24 @@ def test_a_command_renews_who_signs_the_case_of_a_run(changed, author, undrawn, 
     assert ("give all the same `--set`, or name another" in said) == (changed == "2.0")
 
 
+def test_results_that_a_command_replaces_are_not_of_another_case_beside_it(
+    undrawn, tmp_path, capsys
+):
+    path, folder = tmp_path / "case.toml", tmp_path / "out"
+    spectrum = BRIDGE.partition("[assessment]")[2].partition("[suite")[0]
+    path.write_text(f"{CASE.partition('[suite]')[0]}[assessment]{spectrum}", encoding="utf-8")
+
+    def is_noted(command, load):
+        given = [command, str(path), "--out", str(folder), "--set", f"limit.horizontal={load}"]
+        assert af.commands.main(given) in (0, 3)
+        return "has results of another case" in capsys.readouterr().out
+
+    assert [is_noted("limit", load) for load in (1.0, 2.0)] == [False, False]
+    assert [is_noted("assess", load) for load in (2.0, 3.0)] == [False, True]
+    # beside those of the assessment, whether the case is of one or the other
+    assert [is_noted("limit", load) for load in (4.0, 3.0)] == [True, False]
+
+
 def test_a_kinematic_assessment_alone_has_a_report(unplotted, tmp_path, capsys):
     path, folder = tmp_path / "case.toml", tmp_path / "out"
     spectrum = BRIDGE.partition("[assessment]")[2].partition("[suite")[0]
