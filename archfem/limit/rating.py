@@ -165,6 +165,7 @@ class Rating(ResultDisplay):
             return [words]
         if self.missing:
             most = f" if {codes} is at most {self.factor:.4g}"
+            most += "".join(f", {of} {x:.4g}" for x, of in self.list_losses() if _PRESSURE in of)
             words += most if self.passes else f" even without {codes}"
         left = f"left out: {self.vehicle.left_out}" if self.vehicle.left_out else ""
         return [*filter(None, [words, self.say_range(), left, self._rule_text()])]

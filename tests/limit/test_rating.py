@@ -474,6 +474,9 @@ def test_less_than_the_rule_is_stated_beside_the_verdict(monkeypatch):
     ends = f"the factor is {least:.4g} to {found.full_pressure:.4g} {over}"
     left = "left out: the 80 kN/m beside the axles (LM71-train)"
     most = f"passes if the code's impact is at most {found.factor:.4g}"
+    # that of a rating of its own, without any fill to press
+    most += f", without the pressure of the fill {found.without_pressure:.4g}"
+    assert found.without_pressure < found.factor
     assert repr(found).endswith(f"{most}; {ends}; {left}")
     assert found.short_outcome == "passes, without impact"
 
