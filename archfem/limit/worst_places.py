@@ -64,15 +64,14 @@ def refine_worst_places(
     """Return the worst place of a vehicle on a fill in each direction, between those known [m]."""
     stones, dead = self_weight_programme(structure, **options)
     strips = {strip: stones.load([strip]) for strip in cut_road(structure, area_load)}
-    worst = dict[float, None]()
+    near = list[_Place]()
     for way in DRIVING_DIRECTIONS:
         factors = moving.factors["factor"].sel(direction=way)
         least = factors.values <= _NEARLY_LEAST * min(factors.values.min(), 1e9)
         at = factors["position"].values[least].tolist()
-        if near := [(k, way, x) for k in range(len(vehicles)) for x in at]:
-            place, _ = _search_between(structure, places, vehicles, near, stones, dead, strips)
-            worst[place[-1]] = None
-    return sorted(worst)
+        near += [(k, way, x) for k in range(len(vehicles)) for x in at]
+    _, worst = _search_between(structure, places, vehicles, near, stones, dead, strips)
+    return sorted({x for *_, x in worst.values()})
 
 
 def _search_between(
@@ -83,49 +82,33 @@ def _search_between(
     stones: BlocksWithFill,
     dead: Programme,
     strips: Mapping[PointLoad, Array],
-) -> tuple[_Place, dict[AxleRow, Array]]:
-    """Return the worst place beside places of nearly the least factor, and its rows of axles.
+) -> tuple[dict[AxleRow, Array], dict[AxleRow, _Place]]:
+    """Return rows of axles beside places of nearly the least factor, and the worst of each way.
 
     A fill spreads the axles, so that the factor is continuous there, and smooth but where the
     mechanism changes. Mechanisms of some places bound the factors at all others from above.
     """
-    known, rows = np.unique(places), dict[AxleRow, Array]()
-    fine = 0.1 * float(np.median(np.diff(known))) if len(known) > 1 else 0.0
-    for _ in range(2):  # to a tenth of the step between places, then to a hundredth
-        tried = {
-            (k, way, round(float(np.clip(x + by * fine, known[0], known[-1])), 9)): by == 0
-            for by in (*range(-10, 0), *range(1, 11), 0)
-            for k, way, x in near
-        }
-        # of places that mirror each other the first one, whatever the rounding
-        order = sorted(tried, key=lambda place: (DRIVING_DIRECTIONS.index(place[1]), place))
-        at = {axles_on_structure(structure, vehicles[x[0]], *x[1:]): x for x in order}
-        loads = {row: stones.load(row) for row in at if row}
-        guide = np.array([0.0 if tried[at[row]] else np.inf for row in loads])
-        rows, factors = find_worst_rows(dead, loads, strips, guide)
-        first = int(np.argmax(factors <= (1.0 + 1e-6) * factors.min()))
-        near, fine = [at[[*loads][first]]], 0.1 * fine
-    return near[0], rows
-
-
-def _search_each_way(
-    structure: Structure,
-    places: Sequence[float],
-    vehicles: Sequence[Array],
-    near: Sequence[_Place],
-    stones: BlocksWithFill,
-    dead: Programme,
-    strips: Mapping[PointLoad, Array],
-) -> tuple[dict[AxleRow, Array], dict[AxleRow, _Place]]:
-    """Return rows of axles, and places of the worst in each direction, between those known."""
-    rows, at_row = dict[AxleRow, Array](), dict[AxleRow, _Place]()
+    known, rows, worst = np.unique(places), dict[AxleRow, Array](), dict[AxleRow, _Place]()
+    step = float(np.median(np.diff(known))) if len(known) > 1 else 0.0
     for way in DRIVING_DIRECTIONS:
-        if beside := [place for place in near if place[1] == way]:
-            given = structure, places, vehicles, beside, stones, dead, strips
-            place, found = _search_between(*given)
-            rows |= found
-            at_row |= dict.fromkeys(islice(found, 1), place)
-    return rows, at_row
+        beside, found = [place for place in near if place[1] == way], dict[AxleRow, Array]()
+        # to a tenth of the step between places, then to a hundredth
+        for fine in (0.1 * step, 0.01 * step) if beside else ():
+            tried = {
+                (k, way, round(float(np.clip(x + by * fine, known[0], known[-1])), 9)): by == 0
+                for by in (*range(-10, 0), *range(1, 11), 0)
+                for k, _, x in beside
+            }
+            at = {axles_on_structure(structure, vehicles[x[0]], *x[1:]): x for x in sorted(tried)}
+            loads = {row: stones.load(row) for row in at if row}
+            guide = np.array([0.0 if tried[at[row]] else np.inf for row in loads])
+            found, factors = find_worst_rows(dead, loads, strips, guide)
+            # of places that mirror each other the first one, whatever the rounding
+            first = int(np.argmax(factors <= (1.0 + 1e-6) * factors.min()))
+            beside = [at[[*loads][first]]]
+        rows |= found
+        worst |= zip(islice(found, 1), beside, strict=False)
+    return rows, worst
 
 
 def find_least_factors(
@@ -166,8 +149,7 @@ def find_least_factors(
         if isinstance(given["fill"], Fill) and worst and not several:
             low = guides[name] <= _NEARLY_LEAST * min(guides[name].min(), 1e9)
             near = [place_of[row] for row, is_low in zip(axles, low, strict=True) if is_low]
-            given_road = structure, places, vehicles
-            worst, at_row = _search_each_way(*given_road, near, stones, dead, strips)
+            worst, at_row = _search_between(structure, places, vehicles, near, stones, dead, strips)
         else:  # rows have adverse strips behind their axles
             first = islice(worst, 3 if several else 1)
             at_row = {x: next(place_of[a] for a in axles if x[: len(a)] == a) for x in first}
