@@ -10,10 +10,7 @@ import numpy as np
 
 from archfem.cases.answers import RESULTS, Ratios, Statement, read_numbers
 from archfem.cases.case import REPORT_KEYS
-from archfem.cases.defaults import (
-    list_default_keys,
-    list_materials_and_contacts,
-)
+from archfem.cases.defaults import list_default_keys, list_materials_and_contacts
 from archfem.cases.push_factors import PushFactors
 from archfem.cases.rating_text import NOT_COMPUTED
 from archfem.cases.report import margins, outcomes
