@@ -317,7 +317,7 @@ def test_rows_are_in_doubt_that_a_doubt_is_about_by_its_motion_or_its_check(case
         return [row[2].endswith("in words (in doubt)") for row in own]
 
     def checks(name):
-        ratios = answers.Ratios(name, ["right"], 1.5, 1.5)
+        ratios = answers.Ratios(name, ["right"], 1.5, 1.5, linear=name == "linear")
         row = f"assessment: {name}, right", "1 m", "in words", "1.5", ratios._asdict()
         return answers.Row(*row)
 
@@ -327,6 +327,9 @@ def test_rows_are_in_doubt_that_a_doubt_is_about_by_its_motion_or_its_check(case
     assert mark(every, [split], "assessment") == [False, True]
     for own in ([of_all], [split, of_all]):
         assert mark(every, own, "assessment") == [True, True]
+    # how far a tie is stretched says nothing of accelerations
+    stretched = Doubt("the tie is stretched: the displacement check is {}", "", (UPPER_BOUND,))
+    assert mark(every, [stretched], "assessment") == [False, True]
     every = [
         answers.Row("scale", f"'{x}', PGA 0.20 g", "in words", "1", scales(x, 1.0)._asdict())
         for x in "ab"
@@ -730,6 +733,23 @@ def test_a_part_of_the_motions_that_are_needed_decides_no_survival(
 TIE = [{"block": "block 1", "point": [0.0, 1.0], "force": [-1e3, 0.0], "passive": True}]
 
 
+def test_what_no_check_shows_is_said_and_not_that_another_sense_withstands():
+    """Pushed to the left a path by an upper bound alone, and to the right one that passes."""
+    floor = {"code": "floor", "height": 5.0, "storeys": 1, "ground_spectrum": SPECTRUM["spectrum"]}
+    data = ReportData(ring(assessment={"spectrum": floor}), {})
+    shown = answers.Ratios("SLV", ["right"], 1.5, 1.5)
+    vars(data)["statements"] = {"assessment": state("assessment", shown)}
+    of = f"the floor spectrum above ground of PGA {demands.find_demand(data):.3g} g"
+    assert f"it withstands {of}" in head_of(conclusion.list_facts(data))
+    other = answers.Ratios("SLV", ["left"], 1.2, 1.2, bounded=True)
+    vars(data)["statements"] = {"assessment": state("assessment", shown, other)}
+    verdict = head_of(conclusion.list_facts(data))
+    assert f"it is not shown to withstand {of}, as its ratio, 1.2, is an upper bound" in verdict
+    assert "it withstands" not in verdict
+    methods = dict(sections.build_method_section(data).pieces[0].rows)
+    assert methods["floor spectrum"].startswith("Circolare 7/2019, C7.2.3")
+
+
 @pytest.mark.parametrize(
     ("change", "outcome", "says"),
     [
@@ -913,6 +933,10 @@ def test_cases_are_ranked_by_the_kind_of_their_demand(case, fails):
         f"vale (2 {push}) and road (4 times the vehicle, LM1)."
     )
     assert {*parts} < {*facts}
+    doubtful = parts["hill"].statements["limit"]._replace(doubts=[Doubt("it is not known")])
+    vars(parts["hill"])["statements"] = {"limit": doubtful}
+    verdict = dict(conclusion.list_joint_facts(parts))["verdict"]
+    assert verdict.startswith("All that was checked is passed, some of it in doubt: the worst of 3")
 
 
 def test_the_least_margins_of_several_cases_are_at_most_what_is_an_upper_bound(case):

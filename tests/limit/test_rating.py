@@ -972,8 +972,7 @@ def test_factors_of_codes_are_stated_with_outcome_and_range(monkeypatch):
     at_once = ["all unfavourable at once", f"{0.1 * given.factor:.6g}"]
     worst = varied._replace(rows=[at_once, ["all unfavourable at once, by CS 454", "0.0123"]])
     numbers = [x.numbers for x in state_ratings([(given, [])], worst).rows if "CS" in x.demand]
-    passes = bool(of_code.passes)
-    assert numbers == [{"passes": passes, "least": 0.0123, "state": at_once[0]}]
+    assert numbers == [{"passes": bool(by_cs454.passes), "least": 0.0123, "state": at_once[0]}]
     for row in state_ratings([(given, [])], varied._replace(rows=[at_once])).rows:
         x = next(x for name, x, _ in stated if name == row.demand)
         by_axle = "CS 454" in row.demand
