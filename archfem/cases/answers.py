@@ -136,7 +136,7 @@ class Ratios(NamedTuple):
         texts |= {"with the weights apart": apart}
         each = [f"{format_ratio(x)} {words}" for words, x in texts.items() if x is not None]
         rest = " until it moves" * (self.moved is not None)
-        return " with e* = 1" * bool(found) + rest + f" ({'; '.join(each)})" * bool(each)
+        return " with e* = 1" * bool(found) + rest + f" ({', '.join(each)})" * bool(each)
 
     def __str__(self) -> str:
         """Return all ratios in words."""
@@ -280,13 +280,16 @@ def state_assessments(
 def list_ratios(found: KinematicAssessment) -> list[tuple[AssessmentCheck, Ratios]]:
     """List the checks of an assessment with their ratios; with one weight a body if it is less."""
     listed = []
-    for check in found.checks:
+    for number, check in enumerate(found.checks):
         over, split = check.over_fill, check.bodies
-        moved = check.moved if check.at_rest and not over else None
         floor = None if check.floor is None else check.decisive
         split = check.decisive if split and floor is None else split
         bodies = split if (split or np.inf) < 0.999 * check.ratio else None
         least = check.decisive if bodies is floor is None else check.ratio
+        moved = check.moved if check.at_rest and not over else None
+        if bodies is not None and moved is not None and floor is None:
+            whole = found.of_bodies.checks[number]
+            moved = whole.moved if whole.at_rest else None
         most = np.inf if check.unshown else over.ends[1] if over else least
         needed, linear = over.needed if over else "", check.unit != "m"
         bounded = check.bounded and not check.unshown

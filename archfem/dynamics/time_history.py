@@ -318,10 +318,10 @@ def _run_steps(
             time = recorder.state.time
             progress.show(f"{time:.3g} of {motion.duration:.3g} s", round(time - before, 6))
             if reason is not None:
-                when = f"at {recorder.state.time:.4g} s"
+                when = f"{recorder.state.time:.4g} s"
                 if ending.is_loose:
-                    when = f"with joints {when}, and went on with loose blocks,"
-                return ending, f"ended {when} by {reason}"
+                    return ending, f"went on with loose blocks from {when} on, due to {reason}"
+                return ending, f"ended at {when} by {reason}"
             if not begun:
                 begun, since = monotonic(), recorder.state.time
             spent, done = monotonic() - begun, recorder.state.time - since

@@ -247,7 +247,8 @@ def test_a_check_of_what_begins_to_move_is_one_of_displacements_where_it_moves(c
     expected = [
         "the least margin is 1.1 until it moves (0.842 by displacements), on the EC8 spectrum of "
         "PGA 0.2 g, by code, right",
-        "1.1 times the spectrum begins to move it",
+        "1.1 times the spectrum begins to move it, at the acceleration of the mechanism divided by "
+        "FC",
         "if it moved, it could be displaced by 0.842 times the demand",
     ]
     if verified:
@@ -623,7 +624,7 @@ def test_the_answer_has_displacements_the_first_fall_and_the_checks(case):
     assert "as its ratio, 1.04, is" in verdict
     data.statements["assessment"] = state("assessment", ratios)._replace(doubts=[bound])
     said = " ".join(say_margin(data, assessment=data.statements["assessment"]))
-    ratios = "1.04 until it moves (0.842 by displacements; 1.1 with the weights apart)"
+    ratios = "1.04 until it moves (0.842 by displacements, 1.1 with the weights apart)"
     assert f"the least margin is {ratios}, on" in said
     assert "by damage, right, an upper bound 1.04 times the spectrum" in said
     assert "is an upper bound. The runs do not decide, for 3 at least are needed." in verdict

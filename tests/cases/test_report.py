@@ -310,11 +310,25 @@ def test_a_check_that_passes_at_rest_says_so():
     assert answers.Ratios(**row.numbers) == expected
 
 
+def test_displacements_until_it_moves_are_of_the_split_of_weights_that_decides():
+    """They are the quotient of the capacity and the demand that the table shows."""
+    ring = af.circular_arch(radius=2.81, thickness=0.42, embrace=180.0, voussoirs=19, width=3.0)
+    spectrum = af.Eurocode8(ag=0.25, ground="B")
+    found = af.kinematic_assessment(ring, spectrum)
+    (row,) = answers.state_assessments({"right": found}, []).rows[1:]
+    capacity, demand = (float(x.split(" m")[0]) for x in (row.outcome, row.demand))
+    assert "with one weight a body" in row.outcome
+    split = answers.Ratios(**row.numbers)
+    assert split.bodies < split.least
+    # four digits are shown
+    assert split.moved == pytest.approx(capacity / demand, rel=2e-4)
+
+
 def test_capacity_is_that_of_the_ratio_with_all_weight_in_motion_where_it_decides():
     check = replace(CHECKS[0], capacity=10.0, demand=2.5, ratio=4.0, floor=3.0, bodies=3.5)
     found = SimpleNamespace(checks=[check], direction=1.0, notes=(), doubts=(), of_bodies=None)
     (row,) = answers.state_assessments({"right": found}, []).rows
-    factor = "3 with e* = 1 (3.5 of the mechanism found; 4 with the weights apart)"
+    factor = "3 with e* = 1 (3.5 of the mechanism found, 4 with the weights apart)"
     assert row[1:4] == ("2.5 m/s²", "7.5 m/s², passes", factor)
 
 

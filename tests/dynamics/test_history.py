@@ -286,7 +286,7 @@ def test_blocks_that_were_loose_in_strong_motion_and_did_not_fall_are_in_doubt(
     ended, kind, share, doubted, run
 ):
     fall = CollapseState(kind, None, (), 0.0, 0.0, True, loose_share=share)
-    outcome = "ended with joints, and went on with loose blocks, by stones meeting: 'a' met 'b'"
+    outcome = "went on with loose blocks from 1 s on, due to stones meeting: 'a' met 'b'"
     dataset = run.dataset.assign_attrs(ended=ended, outcome=outcome, displacement=0.0)
     loose = with_fall(History(dataset, run.structure), fall)
     found = [doubt for doubt in loose.doubts if doubt.words == LOOSE_BLOCKS]

@@ -129,8 +129,8 @@ def test_stones_without_a_joint_do_not_pass_through_each_other(build, peak, met)
     run = af.time_history(model, motion, dt=0.005, record=af.Record(fields_every=1))
     assert run.ending is af.dynamics.Ending.MET
     assert run.ending.is_complete
-    said = " s, and went on with loose blocks, by stones meeting outside their joints: "
-    assert run.outcome.startswith("ended with joints at ")
+    said = " s on, due to stones meeting outside their joints: "
+    assert run.outcome.startswith("went on with loose blocks from ")
     assert said in run.outcome
     assert met in run.outcome
     assert f"the run {run.outcome}" in run.verdict.remarks

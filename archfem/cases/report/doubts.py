@@ -1,6 +1,6 @@
 """Doubts and notes of the results in a report, and what was not varied."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -238,8 +238,7 @@ def list_unvaried(data: ReportData) -> list[str]:
     else:
         single.append("lengths")
         varied = {each.dataset.attrs.get("motion", "") for each in data.verdict_ranges}
-        left = [f"'{name}'" for name in data.runs if name not in varied and len(data.runs) > 1]
-        single += [f"properties under {join_words(left)}"] if left and "" not in varied else []
+        single += _list_unvaried_under(data, data.runs.keys() - varied) if "" not in varied else []
     single += ["stiffness and strength of the fill"] if list_elastic_fill(data) else []
     # the samples of a rate were scaled until they fell
     single += [] if {"scale", "risk"} & data.statements.keys() else ["size of the motions"]
@@ -251,6 +250,18 @@ def list_unvaried(data: ReportData) -> list[str]:
         single += ["fidelity"] if stepped else ["time step", "fidelity"]
     alone = " (varied in statics alone)"
     return [f"{each}{alone * (each in static)}" for each in single if each not in studied]
+
+
+def _list_unvaried_under(data: ReportData, left: Collection[str]) -> list[str]:
+    """List the properties that were varied under other motions of several than those left."""
+    found = dict[str, list[str]]()
+    for name in (x for x in data.runs if x in left and len(data.runs) > 1):
+        studies = [x for x in data.own_studies if name in x.motions and not x.is_static]
+        studied = set[str]().union(*map(list_studied, studies))
+        properties = [x for x in ("stiffness", "friction", "damping") if x not in studied]
+        words = join_words(properties) if len(properties) < 3 else "properties"
+        found.setdefault(words, []).append(f"'{name}'")
+    return [f"{words} under {join_words(names)}" for words, names in found.items() if words]
 
 
 def peak_of_ground(run: History) -> float:

@@ -221,7 +221,8 @@ def _describe_check(data: ReportData, check: Ratios) -> tuple[float, list[str]]:
     _, fails = judge_check(data, check)
     texts = [f"{check.range}{check.beside}, {by}{fails}{over}"]
     if check.moved is not None:
-        texts.append(f"{check.range} times the spectrum begins to move it")
+        of_fc = "at the acceleration of the mechanism divided by FC"
+        texts.append(f"{check.range} times the spectrum begins to move it, {of_fc}")
         texts.append(f"if it moved, it could be displaced by {check.moved:.3g} times the demand")
     return check.decisive, texts
 

@@ -119,10 +119,15 @@ class StudyFindings:
         return idle
 
     @property
+    def motions(self) -> list[str]:
+        """Motions of a suite under which the cases were run, each once; empty without a suite."""
+        found = [self.table[name].values for name in _MOTIONS if name in self.table.coords]
+        return [*dict.fromkeys(str(name) for each in found for name in each.ravel().tolist())]
+
+    @property
     def under(self) -> str:
         """Under which motions of a suite the cases were run, in words; "" without a suite."""
-        found = [self.table[name].values for name in _MOTIONS if name in self.table.coords]
-        names = [*dict.fromkeys(f"'{name}'" for each in found for name in each.ravel().tolist())]
+        names = [f"'{name}'" for name in self.motions]
         if len(names) > MAX_NAMES:
             return f" under {len(names)} motions"
         return f" under {join_words(names)}" if names else ""
