@@ -1216,6 +1216,22 @@ def test_what_was_not_varied_names_displacements(case):
 
 
 @pytest.mark.parametrize(
+    ("studied", "unvaried"),
+    [
+        ({"friction", "damping"}, "stiffness under 'b'"),
+        ({"stiffness", "friction", "damping"}, None),
+        (set(), "properties under 'b'"),
+    ],
+)
+def test_what_a_study_varied_under_a_motion_is_not_unvaried(monkeypatch, case, studied, unvaried):
+    data = data_of(case, range_of(0.1, 0.1, motion="a"), a=verdict_of(), b=verdict_of())
+    vars(data)["studies"] = [SimpleNamespace(motions=["b"], is_static=False, is_own=True)]
+    monkeypatch.setattr(doubts, "list_studied", lambda study: studied)
+    found = [each for each in doubts.list_unvaried(data) if "under" in each]
+    assert found == [unvaried] * (unvaried is not None)
+
+
+@pytest.mark.parametrize(
     ("period", "matched", "noted"),
     [(2.04, True, True), (1.9, True, False), (2.04, False, False), (np.nan, True, False)],
 )
