@@ -481,7 +481,7 @@ def test_scales_of_the_pairs_of_a_suite_stand_side_by_side(searched, tmp_path, c
     assert " 'middle' was not scaled." in words
     for pair in ("strong", "weak"):
         assert f"Residual displacement under '{pair}' over the scale" in words
-        assert f"Runs of the search under '{pair}'" in words
+        assert f"at the top; each run is a row of {pair}/scale.csv." in words
     # without a pair each is searched that has no result of the same case
     capsys.readouterr()
     assert af.commands.main(given) in (0, 3)

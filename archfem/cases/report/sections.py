@@ -420,25 +420,19 @@ def _define_assessment(data: ReportData, text: str, moves: bool) -> Grid:
 
 
 def _build_scale(data: ReportData) -> list[Any]:
-    """Build text and picture of each search of scales, with its runs by time step and outcome."""
+    """Build text and picture of each search of scales, without the table of its runs."""
     built = list[Any]()
     for pair, place in data.list_parts("scale.txt").items():
         name, under = place.removesuffix(".txt"), f" under '{pair}'" if pair else ""
         caption = (
-            f"Residual displacement{under} over the scale of the motion; falls are at the top."
+            f"Residual displacement{under} over the scale of the motion; falls are at the top; "
+            f"each run is a row of {name}.csv."
         )
         text, *figures = data.read_result(name, caption)
-        if (runs := data.read_text(f"{name}.csv")) is None:  # nor a figure that has any
-            built.append(text)
-            continue
-        scales: dict[tuple[str, str], list[str]] = {}
-        for step, scale, _, outcome, *_ in [*reader(runs.splitlines())][1:]:
-            scales.setdefault((step, outcome.partition(" (")[0]), []).append(scale)
-        rows = [(*key, ", ".join(found)) for key, found in scales.items()]
-        head = ("time step", "the structure", "at the scales [× the motion]")
-        table = Grid(head, rows, f"Runs of the search{under}", "words")
-        answered = any(outcome != NO_ANSWER for _, outcome in scales)
-        built += [replace(text, text=text.text.rpartition("\n\n")[0]), table, *figures * answered]
+        runs = data.read_text(f"{name}.csv") or ""
+        answered = {row[3] for row in [*reader(runs.splitlines())][1:]} - {NO_ANSWER}
+        shown = text.text.rpartition("\n\n")[0] if runs else text.text
+        built += [replace(text, text=shown), *figures * bool(answered)]
     return built
 
 
