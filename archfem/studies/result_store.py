@@ -424,7 +424,11 @@ def format_table(table: xr.Dataset, max_rows: int = 50) -> str:
         pushed = f", with a least push of {least:.5g}" * bool(least == least)
         text += [f"… {len(frame) - max_rows} more points{pushed}"]
     shared = "; ".join(f"{name} = {text}" for name, text in same.items() if text)
-    return "\n".join([*text, *([f"the same at all points: {shared}"] if shared else [])])
+    text += [f"the same at all points: {shared}"] * bool(shared)
+    if "ended" in frame and frame["ended"].isin(("parted", "met")).any():
+        words = "of a point that ended 'parted' or 'met', joints are those before its blocks were"
+        text.append(f"{words} loose, displacements those to its end")
+    return "\n".join(text)
 
 
 def _format_cell(value: Any) -> str:

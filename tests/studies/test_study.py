@@ -395,6 +395,10 @@ def test_a_long_table_is_cut_and_equal_findings_are_stated_once(small_ring):
     lines = result_store.format_table(pushed, max_rows=1).splitlines()
     least = f"{float(table['b'][1:].min()):.5g}"
     assert lines[2] == f"… 2 more points, with a least push of {least}"
+    for ended, loose in ("parted", True), ("finished", False):
+        of_runs = table.assign(ended=table["c"].astype(str).where(table["c"] == 0.0, ended))
+        text = result_store.format_table(of_runs)
+        assert ("joints are those before its blocks were loose" in text) == loose
 
 
 def test_a_table_that_no_sheet_can_hold_is_not_written_for_excel(tmp_path, monkeypatch):
