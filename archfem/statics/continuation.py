@@ -15,7 +15,6 @@ import numpy as np
 from scipy import sparse
 from scipy.linalg import lapack
 from scipy.sparse.csgraph import connected_components
-from scipy.sparse.linalg import splu
 
 from archfem._typing import Array
 from archfem.errors import ArchfemError, DidNotConverge, InvalidInput
@@ -26,6 +25,7 @@ from archfem.models.model import Model
 from archfem.statics import relaxation
 from archfem.statics.equilibrium import Equilibrium, self_weight
 from archfem.statics.newton import MAX_ROUND_OFF_RESIDUAL, EquilibriumSolver, load_magnitude
+from archfem.statics.newton_iteration import factorise
 
 # Residual relative to the sum of all loads, and of the added equation relative to the step [-]
 RESIDUAL_TOLERANCE = 1e-9
@@ -130,7 +130,7 @@ class LoadPath(EquilibriumPath):
         load = GrowingLoad.of(model, actions)
         live = load.forces(start.q)
         displacement = FIRST_DISPLACEMENT * model.structure.size
-        compliance = float(live @ splu(model.tangent(start.q).tocsc()).solve(live)) / load.size
+        compliance = float(live @ factorise(model.tangent(start.q)).solve(live)) / load.size
         unit, forces = (displacement, displacement / compliance), [model.resultants(start.q)]
         return cls(model, self_weight(model), unit, [start.q], forces, [0], load, [0.0], held)
 
@@ -320,7 +320,7 @@ def _solve_bordered(
     try:
         matrix = _border(tangent, load, row)
         dense = isinstance(matrix, np.ndarray)
-        step = np.linalg.solve(matrix, right) if dense else splu(matrix).solve(right)
+        step = np.linalg.solve(matrix, right) if dense else factorise(matrix).solve(right)
     except (RuntimeError, np.linalg.LinAlgError):  # from SuperLU, from LAPACK
         return None
     return np.asarray(step) if np.isfinite(step).all() else None
@@ -352,7 +352,7 @@ def _determinant_sign(tangent: sparse.csr_matrix, load: Array, row: Array) -> fl
         pivots, exchanges = factors.diagonal(), np.count_nonzero(swaps != places)
     else:
         try:
-            lu = splu(matrix)
+            lu = factorise(matrix)
         except RuntimeError:
             return 0.0
         x, y, pivots, exchanges = lu.solve(b), lu.solve(c, "T"), lu.U.diagonal(), 0

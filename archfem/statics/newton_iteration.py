@@ -12,7 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy import sparse
 from scipy.optimize import brentq
-from scipy.sparse.linalg import splu
+from scipy.sparse.csgraph import structural_rank
+from scipy.sparse.linalg import SuperLU, splu
 
 from archfem._typing import Array
 
@@ -45,6 +46,16 @@ class Attempt(NamedTuple):
     iterations: int  # of Newton's method
     residual: float  # Euclidean norm
     failure: str  # reason; "" where it has converged
+
+
+def factorise(matrix: sparse.spmatrix) -> SuperLU:
+    """Return the factors of a matrix; RuntimeError where it is singular, or not finite."""
+    # SuperLU writes beyond its arrays where its columns leave no row for a pivot, as of a loose
+    # block, or where entries are not finite: then it may end the process
+    columns = matrix.tocsc()
+    if not np.isfinite(columns.data).all() or structural_rank(columns) < columns.shape[0]:
+        raise RuntimeError("rows or columns without entries of their own, or entries not finite")
+    return splu(columns)
 
 
 class ScipyNewton:
@@ -84,7 +95,7 @@ class ScipyNewton:
         # a tangent that is the same object as the last one keeps its factor
         if tangent is not self._tangent or self._inverse is None:
             try:
-                self._inverse = splu(tangent.tocsc()).solve
+                self._inverse = factorise(tangent).solve
             except RuntimeError:  # SuperLU: a pivot is zero
                 return residual, Failure.SINGULAR_TANGENT
             self._tangent = tangent

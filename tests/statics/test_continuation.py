@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 from scipy import sparse
+from scipy.sparse.linalg import splu
 
 import archfem as af
-from archfem.statics import continuation
+from archfem.statics import continuation, newton_iteration
 from archfem.statics.continuation import GrowingLoad
 
 ACTIONS = [af.BodyForce(0.3, -0.4), af.PointLoad(0.2, (3e3, -4e3))]
@@ -112,6 +113,30 @@ def test_a_matrix_of_steps_that_overflow_has_no_solution(size):
     tangent = sparse.diags(np.append(1e-320, np.ones(size - 1))).tocsr() @ tangent
     load[0] = 0.0
     assert continuation._solve_bordered(tangent, load, row, np.ones(size + 1)) is None
+
+
+@pytest.mark.parametrize("kind", ["a block without joints", "not a number", "infinite"])
+def test_superlu_is_given_no_matrix_on_which_it_may_end_the_process(kind, monkeypatch):
+    """Of 3 coordinates without stiffness, only one has a pivot in the column of the load.
+
+    Of 250 such matrices SuperLU gave BLAS illegal arguments in 18, and in a natural order it ended
+    the process. A regular matrix reaches it.
+    """
+    given = []
+    monkeypatch.setattr(
+        newton_iteration, "splu", lambda matrix: given.append(matrix) or splu(matrix)
+    )
+    tangent, load, row = steps_matrix(402, 0)
+    assert continuation._solve_bordered(tangent, load, row, np.ones(403)) is not None
+    assert len(given) == 1
+    if kind == "a block without joints":
+        tangent = sparse.block_diag([tangent[:399, :399], sparse.csr_matrix((3, 3))], "csr")
+    else:
+        tangent.data[7] = np.nan if kind == "not a number" else np.inf
+    assert continuation._solve_bordered(tangent, load, row, np.ones(403)) is None
+    assert continuation._determinant_sign(tangent, load, row) == 0.0
+    assert newton_iteration.ScipyNewton()._step(None, tangent, None, load, "basic")[1] != ""
+    assert len(given) == 1
 
 
 @pytest.mark.parametrize("size", [8, 401])
