@@ -47,6 +47,7 @@ from archfem.limit.collapse import Collapse, stands
 from archfem.limit.fill_strength import Fill
 from archfem.masonry.loads import describe_forces
 from archfem.masonry.stiffness_ratio import soften_joints
+from archfem.masonry.structure import list_first
 from archfem.models.model import Doubt
 from archfem.motion.motion import Motion
 from archfem.motion.suite import Suite
@@ -166,9 +167,11 @@ class DeadLoadResult:
                 words = "limit analysis with the fill of [limit] finds no equilibrium at rest"
                 lost.append(Doubt(words, "check the thickness of rings and piers, and the fill"))
         loads = (*limit.dead, *self.case.assessment.options.get("loads", ()))
-        if self.case.has_motion and (forces := describe_forces(loads)):
+        ties = [f"the tie at {load.block}" for load in loads if getattr(load, "passive", False)]
+        left = ", ".join([each for each in (describe_forces(loads), list_first(ties, 3)) if each])
+        if self.case.has_motion and left:
             words = "left out of runs, which have no loads but weights: {}"
-            lost.append(Doubt(words, "a limit analysis or an assessment counts it", (forces,)))
+            lost.append(Doubt(words, "a limit analysis or an assessment counts it", (left,)))
         return (*self.dead.model.doubts, *lost, *dead_load_doubts(self.dead, friction))
 
     @cached_property

@@ -98,7 +98,8 @@ class MechanismPath:
         holds: last place up to which no other mechanism has a lower factor; beyond it the factors
             are upper bounds. None where that was not examined.
         pulls: largest force of each tie on the way, while it keeps its length (n_ties,) [N].
-        met: names of the blocks that run into each other at the end, or of the tie that breaks.
+        met: names of the blocks that run into each other at the end, or of the tie that breaks,
+            slackens or yields there.
     """
 
     blocks: PlacedBlocks
@@ -415,6 +416,7 @@ class PathFollower:
             except NoEquilibrium:
                 # without the length that a tie kept, two motions are free, and no factor holds them
                 if self.events and self.events[-1].of_tie:
+                    self.met = (self.events[-1].text,)
                     raise _Stop(PathEnd.RELEASED) from None
                 continue
             if mechanism is None:

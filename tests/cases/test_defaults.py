@@ -345,7 +345,7 @@ def test_a_given_backing_has_no_default_of_the_other_key_but_a_strength(key):
 
 
 def test_forces_that_a_run_leaves_out_are_doubted_once():
-    """A thrust of 5 kN in both sections, a tie and a mass, which are no forces to be left out."""
+    """A thrust of 5 kN in both sections, and a tie; a mass is no force to be left out."""
     thrust = {"block": "block 1", "point": [-0.3, 1.0], "force": [4e3, -3e3]}
     loads = [thrust, thrust | {"force": [-9e3, 0.0], "passive": True}]
     loads.append({"block": "block 1", "point": [0.0, 1.0], "weight": 1e3})
@@ -356,5 +356,6 @@ def test_forces_that_a_run_leaves_out_are_doubted_once():
         case = af.Case.of({"structure": COLUMN, **rigid, **motion})
         at_rest = af.cases.DeadLoadResult.of(case)
         said = [str(doubt) for doubt in at_rest.doubts if "left out of runs" in str(doubt)]
-        words = "left out of runs, which have no loads but weights: 5 kN at x = -0.3 m; a limit "
-        assert said == [f"{words}analysis or an assessment counts it"] * bool(motion)
+        words = "left out of runs, which have no loads but weights: 5 kN at x = -0.3 m, the tie at "
+        words += "block 1; a limit analysis or an assessment counts it"
+        assert said == [words] * bool(motion)

@@ -596,6 +596,8 @@ def test_a_tie_holds_its_point_along_the_motion():
         dx, dy = fold(turn + step) - fold(turn - step)
         assert factor == pytest.approx(dy / dx, abs=1e-4)
     assert found.path.end is PathEnd.RELEASED  # the tie slackens as it falls
+    tie = "the tie at block 2 slackens"
+    assert found.path.ending == f"{PathEnd.RELEASED.sentence}: {tie}"
     assert turns[-1] > 0.1
     assert found.path.factors[-1] < 2e-3
     assert assess_tied(4.0, 5e3).alpha_0 == pytest.approx((10.0 + 5.0 * 4.0) / 80.0, rel=1e-4)
