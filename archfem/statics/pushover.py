@@ -37,6 +37,9 @@ FEW_STEPS = 15
 # Begin of the outcome of such a path
 CRAWLS = "it crawls"
 
+# Begin of the outcome of one that was not followed further
+NOT_FOUND = "no equilibrium was found past"
+
 # Outcome of a path whose load would have to turn round
 LOST = "it bears no load any more"
 
@@ -86,7 +89,7 @@ class Pushover(ResultDisplay):
         hinge_steps: step at which each of them first hinges.
         outcome: rule that ended the pushover, as text.
         limit: limit of the factor, by extrapolation of the curve [-]; undefined (NaN) where it is
-            still too steep, or crawls as joints slide.
+            still too steep, crawls as joints slide, or is lost under large displacements.
         uncertainty: distance of `limit` from the last factor [-].
     """
 
@@ -369,10 +372,15 @@ def failure_message(path: Path, control: str, criteria: Criteria) -> str:
         raise DidNotConverge("no equilibrium just after the dead load: the structure hardly stands")
     slides = sliding_joints(path, criteria) if isinstance(path, LoadPath) else []
     is_limit = control == "force" or (slides and control != "path")
-    message = "the load cannot grow beyond" if is_limit else "no equilibrium was found past"
+    message = "the load cannot grow beyond" if is_limit else NOT_FOUND
     message += f" a factor of {path.factors[-1]:.5g}"
     if slides:
         message += f", at which {len(slides)} joints slide, such as '{slides[0]}'"
+    if control == "path" and not slides and path.model.large_displacements:
+        message += (
+            "; between stiff joints a hinge moves so abruptly that the path folds back: integrate "
+            "joints exactly (quadrature), or give softer ones"
+        )
     if slides and any(block.grain for block in path.model.structure.blocks):
         message += "; pieces of fill flow where little holds them: cohesion does, or a wall"
     return message
@@ -422,8 +430,9 @@ def _label_result(path: Path, criteria: Criteria, outcome: str) -> Pushover:
         {"step": np.arange(count)},
     )
     limit, uncertainty = np.nan, np.nan
-    # sliding has its limit at once, and no asymptote of hinges; no load has none
-    if not outcome.startswith((CRAWLS, LOST)):
+    # sliding has its limit at once, and no asymptote of hinges; no load has none, nor has a curve
+    # that bends down by large displacements, and was lost there
+    if not outcome.startswith((CRAWLS, LOST, *[NOT_FOUND] * large)):
         limit, uncertainty = _extrapolate_limit(path.displacements, factors)
         sliding = bool(joints["slide"][-1].any())
         if np.isnan(limit) and sliding and isinstance(path, LoadPath) and _has_reached_bound(path):

@@ -13,6 +13,7 @@ from repeats import each_once
 import archfem as af
 from archfem import pushover
 from archfem.limit.linear_programme import RigidBlocks
+from archfem.masonry.structure import with_contacts
 from archfem.statics import Stop
 from archfem.statics.pushover import (
     _extrapolate_limit,
@@ -541,3 +542,19 @@ def test_a_strip_on_soil_turns_under_a_smaller_push(stiffness, factor):
     turn = 2.0 * strip.weight / (9.0 * stiffness * 0.4**2 * left**2)
     assert ((0.5 - left) * 0.4 - 2.0 * turn) / 2.0 == pytest.approx(factor, rel=1e-4)
     assert found == pytest.approx(factor, rel=5e-3)
+
+
+@pytest.mark.parametrize("stiffer", [100.0, pytest.param(1000.0, marks=pytest.mark.slow)])
+def test_a_path_that_folds_between_stiff_joints_names_the_remedy_and_no_limit(stiffer):
+    """Springs at points carry the peak of rigid blocks, whose factor limit analysis gives.
+
+    The curve turns there within a hundredth of a millimetre: an extrapolation gave 0.535.
+    """
+    contact = af.Contact(stiffer * 1.48e9, stiffer * 0.30e9)
+    stiff = with_contacts(RING, lambda _: contact)
+    model = af.build(stiff, fidelity="rigid", displacements="large", quadrature="trapezoidal")
+    found = af.pushover(model, af.BodyForce(1.0, 0.0), control="path")
+    peak = af.collapse_factor(stiff, live=af.BodyForce(1.0, 0.0), friction=None).factor
+    assert found.factor == pytest.approx(peak, rel=1e-3)
+    assert "folds back: integrate joints exactly (quadrature), or give softer" in found.outcome
+    assert np.isnan(found.limit)
