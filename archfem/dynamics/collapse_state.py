@@ -4,7 +4,7 @@ Positions of the blocks over time decide, whether joints or loose blocks were si
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf
 
 import numpy as np
@@ -13,6 +13,7 @@ from archfem._typing import Array, Flags
 from archfem._validation import validate_arguments
 from archfem.dynamics.rigid_body.bodies import FallFrame, LooseBlocks
 from archfem.errors import InvalidInput
+from archfem.limit.displaced_blocks import PlacedBlocks, bears_dead_load
 from archfem.masonry.block import rotate
 from archfem.masonry.standing import list_own_stones
 from archfem.masonry.stiffness_ratio import find_soft_blocks, list_stones
@@ -39,22 +40,39 @@ RANGE_REMEDY = "state a range, `archfem verdict CASE.toml`"
 # Kinds of collapse with lost blocks
 FALLEN_STATES = COLLAPSE_STATES[2:]
 
+# Kind of a run that ends while blocks are out of their places and may still come to rest there
+UNDECIDED = "unknown"
+
+# Share of the steps of a fall whose impulses need not settle [-]
+MAX_UNSETTLED = 0.02
+
+# Words of the doubt of what is undecided
+STILL_MOVES = "it is not decided whether blocks fall: {} still moved out of place at {:.2f} s"
+
+# Distance of faces that touch at rest, over the size of the structure: 0.5 mm of one of 5 m, by
+# which blocks at rest may still move [-]
+TOUCHING_AT_REST = 1e-4
+
 
 @dataclass(frozen=True)
 class CollapseState:
     """State of collapse at the end of a run.
 
     A loose block is out of its place where its centroid has sunk by more than half the root of its
-    area, or it has turned by more than 45°. It is *lost* if it stays so to the end, wherever it
-    rests: a ring that sags as far and closes again has lost none. Fill does not count, and bodies
-    that stand on the structure are not displaced with it. The structure
+    area, or it has turned by more than 45°. It is *lost* if it stays so to the end, unless all
+    stones bear their weight where they are, by contacts of their joints with friction (limit
+    analysis of the last shape, without fill): a ring that sags and closes again, or jams, has lost
+    none. Fill does not count, and bodies that stand on the structure are not displaced with it.
+    The structure
 
     - *stands*: no block is lost, and none is displaced by more than a tenth of the median joint
       depth of the shallowest ring or pier;
     - is *dislocated*: no block is lost, but some are displaced further;
     - is *partly fallen*: blocks are lost, but a ring retains all of its own;
     - is *fallen*: every ring has lost a block. Where there is no ring, the piers count instead,
-      and where there is none, all blocks as one.
+      and where there is none, all blocks as one;
+    - is *unknown*: blocks still move at the end, out of their places for less time than a free fall
+      by the size of the structure takes, or in a shape that bears its weight.
 
     Blocks fall by far more than the limit or by far less, so that the kind is insensitive to the
     limits; the time is sensitive, by about the time in which a stone falls by its own size. Whether
@@ -62,10 +80,11 @@ class CollapseState:
     restitution. State it as a range of scales, from runs at two steps.
 
     Attributes:
-        kind: "stands", "dislocated", "partly fallen" or "fallen".
+        kind: "stands", "dislocated", "partly fallen", "fallen" or "unknown".
         time: time of the first frame from which on a block was lost, None without [s].
-        blocks: names of the lost blocks, in the order of the structure; of a dislocated one those
-            of the stones displaced beyond the limit, the farthest first.
+        blocks: names of the lost blocks, in the order of the structure, or of those out of place
+            where it is unknown; of a dislocated one those of the stones displaced beyond the limit,
+            the farthest first.
         displacement: largest displacement of any corner of a free stone, see `Verdict` [m].
         residual: the same at the end [m].
         resting: whether all blocks were at rest at the end, or vibrated too weakly to overturn; if
@@ -73,6 +92,8 @@ class CollapseState:
         admissible_step: time step that follows sliding; infinite where that of the run does [s].
         loose_share: share of the Arias intensity of the ground that loose blocks were followed
             through, without elastic joints [-].
+        unsettled: share of the steps, until blocks were out of place, in which impulses of rigid
+            blocks did not settle: beyond 2 % it is in doubt whether they fall [-].
         mechanism: joints of rings and piers that had failed when blocks became loose, of a fall, in
             words such as "by hinges (arch, joints 0 and 7) at 3.405 s, when blocks come loose".
     """
@@ -86,6 +107,7 @@ class CollapseState:
     admissible_step: float = inf
     loose_share: float = 0.0
     mechanism: str = ""
+    unsettled: float = 0.0
 
     @property
     def lacks_joints(self) -> bool:
@@ -100,7 +122,11 @@ class CollapseState:
     @property
     def text(self) -> str:
         """Kind of collapse, with the stones that are dislocated, or the time and those lost."""
+        if self.kind == UNDECIDED:
+            return f"not decided: still moving, out of place{name_stones(self.blocks)}"
         still = "" if self.resting else ", while blocks still move"
+        if self.unsettled > MAX_UNSETTLED:
+            still += f", in doubt: impulses did not settle in {self.unsettled:.0%} of the steps"
         if self.time is None:
             return f"{self.kind}{self.dislocated_stones}{still}"
         return f"{self.kind}, first at {self.time:.2f} s; lost: {join_names(self.blocks)}{still}"
@@ -135,8 +161,10 @@ def classify_collapse(
     start = np.zeros((len(structure.blocks), 3)) if start is None else start
     owner, corners = _place_corners(structure, list_own_stones(structure))
     origin, farthest, moved = corners(start), 0.0, np.zeros(len(owner))
-    find_lost, since, last = mark_lost(structure), np.full(len(free), inf), None
+    find_lost, since, last, early = mark_lost(structure), np.full(len(free), inf), None, 0.0
     for last in frames:
+        if isinstance(last, FallFrame) and np.isinf(since).all():
+            early = last.settling.unsettled_share
         moved = np.linalg.norm(corners(last.poses) - origin, axis=1)
         farthest = max(farthest, float(moved.max()))
         since = np.where(find_lost(last.poses), np.minimum(since, last.time), inf)
@@ -144,20 +172,25 @@ def classify_collapse(
         raise InvalidInput(
             "a run of no frames says nothing: give those of RigidBlockSimulation.frames"
         )
-    lost = np.isfinite(since) & (not joined)
+    away = np.isfinite(since) & (not joined)
+    borne = bool(away.any()) and _bears_weight(structure, last.poses)
+    rests = getattr(last, "resting", not last.velocities.any())
+    decided = rests or (not borne and last.time - since.min() >= _fall_duration(structure))
+    lost = away & (not borne or not rests)
     numbers = [number for number, gone in zip(free, lost, strict=True) if gone]
-    kind = _fallen_kind(structure, numbers)
+    kind = _fallen_kind(structure, numbers) if decided else UNDECIDED
     if not numbers:
         order, limit = np.argsort(-moved), DISLOCATION * shallowest_part(structure)[0]
         numbers = [*dict.fromkeys(owner[order][moved[order] > limit].tolist())]
         kind = COLLAPSE_STATES[len(numbers) > 0]
     return CollapseState(
         kind,
-        float(since[lost].min()) if lost.any() else None,
+        float(since[lost].min()) if lost.any() and decided else None,
         tuple(structure.blocks[number].name for number in numbers),
         farthest,
         float(moved.max()),
         bool(getattr(last, "resting", False)),
+        unsettled=early,
     )
 
 
@@ -168,16 +201,32 @@ def follow_until_lost(
 ) -> Iterator[FallFrame]:
     """Yield frames until a stone is lost for good; `restore` returns those of the structure.
 
-    It is once lost for as long as a free fall by the size of the structure takes.
+    It is once out of its place for as long as a free fall by the size of the structure takes, in a
+    shape that does not bear its weight.
     """
-    # stones of an arch 4.5 m across, which fall by that in 1 s, sank for 0.5 s and came back
     find_lost, since = mark_lost(structure), np.array(inf)
-    duration = np.sqrt(2.0 * structure.size / structure.gravity)
     for frame in frames:
         yield frame
-        since = np.where(find_lost(restore(frame).poses), np.minimum(since, frame.time), inf)
-        if frame.time - since.min() >= duration:
+        poses = restore(frame).poses
+        since = np.where(find_lost(poses), np.minimum(since, frame.time), inf)
+        long = frame.time - since.min() >= _fall_duration(structure)
+        if long and not _bears_weight(structure, poses):
             return
+
+
+def _fall_duration(structure: Structure) -> float:
+    """Return the time of a free fall by the size of the structure [s]."""
+    # stones of an arch 4.5 m across, which fall by that in 1 s, sank for 0.5 s and came back
+    return float(np.sqrt(2.0 * structure.size / structure.gravity))
+
+
+def _bears_weight(structure: Structure, poses: Array) -> bool:
+    """Return whether stones bear their weight at poses of all blocks, by contacts of joints."""
+    # fill is not rigid, and what of it has fallen where is not known here
+    if len(list_stones(structure)) < len(structure.free):
+        return False
+    placed = replace(PlacedBlocks.at_rest(structure), near=TOUCHING_AT_REST)
+    return bears_dead_load(placed.moved(poses))
 
 
 def mark_lost(structure: Structure) -> Callable[[Array], Flags]:

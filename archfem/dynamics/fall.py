@@ -16,8 +16,13 @@ from archfem._display import ProgressReport
 from archfem._typing import Array
 from archfem._validation import validate_arguments
 from archfem.dynamics.collapse_state import (
+    COLLAPSE_STATES,
     FALLEN_STATES,
+    MAX_UNSETTLED,
     RANGE_REMEDY,
+    STILL_MOVES,
+    UNDECIDED,
+    CollapseState,
     classify_collapse,
     doubt_collapse,
     doubt_soft_blocks,
@@ -60,9 +65,6 @@ RIGID_STAND = (
 GROUND_BESIDE = (
     'draw the ground farther, of a shape without ground by `shape = "blocks"`: it may not fall then'
 )
-
-# Share of the steps of a fall whose impulses need not settle [-]
-MAX_UNSETTLED = 0.02
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +110,8 @@ def follow_fall(
 
     The states are those at the start, from which displacements count, and at the end of the run.
     Not whole, the fall ends once a block is lost for good, and is not compared with rigid blocks.
-    Where it could not be followed to its end and no block was lost, there is no state of collapse.
+    Where it could not be followed to its end and no block was lost, or blocks still move out of
+    their places, there is no state of collapse.
     Ctrl-C and SIGTERM end it with what was computed.
     """
     (start, state), structure, ending = states, model.structure, history.ending
@@ -123,17 +126,14 @@ def follow_fall(
             return mark_interrupted(history, f"{state.time:.4g} s")
         fall = classify_collapse(structure, frames, origin)
         fall = replace(fall, loose_share=_measure_share_left(motion, state.time))
-        until_lost = [each for each in frames if fall.time is None or each.time <= fall.time]
-        dataset.attrs["fall_unsettled_early"] = until_lost[-1].settling.unsettled_share
+        dataset.attrs["fall_unsettled_early"] = fall.unsettled
         history = History(history.dataset.merge(dataset, combine_attrs="no_conflicts"), structure)
         doubts += _doubt_fall(structure, dataset)
         if (failure := dataset.attrs["fall_failure"]) == "interrupted":
             history = mark_interrupted(history, f"{frames[-1].time:.4g} s, in a fall")
-        elif failure:
-            words = "loose blocks were followed until {:.2f} s alone, and what comes after is not"
-            remedy = "compare with another dt, or with archfem.dynamics.RigidBlockSimulation"
-            doubts.append(Doubt(f"{words} known: {{}}", remedy, (frames[-1].time, failure)))
-        if failure and fall.time is None:
+        else:
+            doubts += _doubt_end(fall, frames[-1].time, failure)
+        if fall.kind == UNDECIDED or (failure and fall.time is None):
             return history.with_doubts((*history.doubts, *doubts))
     else:
         frame = LooseBlocks(state.time, *model.rigid_motions(state.q, state.velocity))
@@ -153,6 +153,17 @@ def follow_fall(
     if fall.kind not in FALLEN_STATES or not whole or history.ending is Ending.INTERRUPTED:
         return history
     return _compare_rigid_blocks(history, structure, motion, start.time)
+
+
+def _doubt_end(fall: CollapseState, time: float, failure: str) -> Iterator[Doubt]:
+    """Yield the doubt of a fall that was followed to a time, and not for long enough."""
+    if failure:
+        words = "loose blocks were followed until {:.2f} s alone, and what comes after is not known"
+        remedy = "compare with another dt, or with archfem.dynamics.RigidBlockSimulation"
+        yield Doubt(f"{words}: {{}}", remedy, (time, failure))
+    elif fall.kind == UNDECIDED:
+        remedy = "follow them longer: let the ground rest at the end, `--set motion.rest=60`"
+        yield Doubt(STILL_MOVES, remedy, (join_names(fall.blocks), time))
 
 
 def _measure_share_left(motion: Motion, time: float) -> float:
@@ -288,7 +299,8 @@ def _doubt_joints(structure: Structure, motion: Motion, start: float) -> Iterato
     with suppress(DidNotConverge), ProgressReport("compared", None, rarely=True) as progress:
         progress.show("rigid blocks from rest")
         frames = simulation.frames(at_rest, end, motion, spacing=0.02)
-        if classify_collapse(structure, follow_until_lost(structure, frames)).time is None:
+        found = classify_collapse(structure, follow_until_lost(structure, frames))
+        if found.kind in COLLAPSE_STATES[:2]:
             yield Doubt(
                 RIGID_STAND,
                 f"{RANGE_REMEDY}, and check the stiffness of the joints",
@@ -333,19 +345,12 @@ def _doubt_fall(structure: Structure, dataset: xr.Dataset) -> Iterator[Doubt]:
     share, early = (dataset.attrs[f"fall_{key}"] for key in ("unsettled", "unsettled_early"))
     unsettled = "impulses of loose blocks did not settle in"
     if early > MAX_UNSETTLED:
-        yield Doubt(
-            f"it is in doubt whether blocks fall: {unsettled} {{:.0%}} of the steps before the "
-            "first was lost",
-            RANGE_REMEDY,
-            (early,),
-        )
+        words = f"it is in doubt whether blocks fall: {unsettled} {{:.0%}} of the steps before the "
+        yield Doubt(f"{words}first was lost", RANGE_REMEDY, (early,))
     elif share > MAX_UNSETTLED:
-        yield Doubt(
-            "it is in doubt where blocks come to rest, and not that they fall: "
-            f"{unsettled} {{:.0%}} of the steps, of those before the first was lost {{:.0%}}",
-            "state that it falls, and not how its blocks lie",
-            (share, early),
-        )
+        words = "it is in doubt where blocks come to rest, and not that they fall: "
+        words += f"{unsettled} {{:.0%}} of the steps, of those before the first was lost {{:.0%}}"
+        yield Doubt(words, "state that it falls, and not how its blocks lie", (share, early))
     if (gained := dataset.attrs["fall_gained_share"]) > MAX_ENERGY_GAIN:
         words = "loose blocks gained {:.2g} of the energy exchanged, by errors of the steps"
         yield Doubt(words, RANGE_REMEDY, (gained,))

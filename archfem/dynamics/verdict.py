@@ -12,6 +12,7 @@ from archfem._typing import Array
 from archfem.dynamics.collapse_state import (
     DISLOCATION,
     FALLEN_STATES,
+    STILL_MOVES,
     CollapseState,
     shallowest_part,
 )
@@ -77,8 +78,8 @@ class Verdict:
 
     Attributes:
         outcome: "stands", "dislocated", "partly fallen" or "fallen" with large displacements, see
-            `CollapseState`, and "unknown" where such a run was broken off; "mechanism" or "no
-            mechanism" with small ones, by any of the definitions.
+            `CollapseState`, and "unknown" where such a run was broken off, or ended while that was
+            not decided; "mechanism" or "no mechanism" with small ones, by any of the definitions.
         doubts: reasons why the result may be wrong, each with its remedy.
         displacement: largest displacement of any corner of a block relative to the ground, from its
             place at the start of the run, under dead load [m]. Backfill and bodies that stand on
@@ -138,7 +139,8 @@ class Verdict:
         if self.fall is not None:
             return self.fall.text
         if self.outcome != "mechanism":
-            return self.outcome
+            moves = any(doubt.words == STILL_MOVES for doubt in self.doubts)
+            return self.outcome + ", not decided: still moving" * moves
         met = {name: found is not None for name, found in self.mechanisms.items()}
         text = f"mechanism by {join_names([name for name in met if met[name]])}"
         if all(met.values()):

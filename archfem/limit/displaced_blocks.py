@@ -98,6 +98,7 @@ class PlacedBlocks:
     # by which faces end before each joint, where it crushes (n_joints,) [m]
     setback: Array = field(default_factory=lambda: np.zeros(0))
     longest: float | Array = 0.0  # largest stretch of each tie so far (n_ties,) [m]
+    near: float = TOUCHING  # distance of points that touch, over the structure's size [-]
 
     @classmethod
     def at_rest(
@@ -244,7 +245,7 @@ class PlacedBlocks:
 
         First axis: corners of the lower, of the higher block. Infinite beside the face.
         """
-        near = TOUCHING * self.structure.size
+        near = self.near * self.structure.size
         gaps = np.full((2, len(self.structure.joints), 2), np.inf)
         for side in (0, 1):
             face, corners = self.faces[1 - side], self.faces[side]
@@ -259,7 +260,7 @@ class PlacedBlocks:
 
     def touching(self, joints: Sequence[int]) -> list[Contact]:
         """Return the contacts at some joints; corners that coincide are one contact."""
-        near, contacts = TOUCHING * self.structure.size, []
+        near, contacts = self.near * self.structure.size, []
         for joint in joints:
             pair = self.structure.pairs[joint]
             apart = np.linalg.norm(self.faces[1, joint] - self.faces[0, joint], axis=1)
@@ -476,6 +477,15 @@ def find_mechanism(
     dilates = np.zeros(len(contacts)) if flat else coefficient
     found = classify_motion(blocks, joints, motion, dilates, contacts, factor)
     return replace(found, is_flat=flat)
+
+
+def bears_dead_load(blocks: PlacedBlocks) -> bool:
+    """Return whether forces at the contacts of all joints balance weights and constant forces."""
+    structure = blocks.structure
+    given = _select_bodies(blocks, range(len(structure.joints)), structure.friction)
+    with suppress(DidNotConverge):  # infeasible, or not known
+        return _solve_static(*given, fixed=0.0) is not None
+    return False
 
 
 def find_tie_shares(

@@ -27,6 +27,7 @@ from archfem.cases.toml_file import Table, format_key
 from archfem.cases.verdict_keys import DEFAULT_RANGES, NEUTRAL, check_ranges, default_ranges
 from archfem.dynamics.analysis import Analysis, with_one_facet
 from archfem.dynamics.collapse_state import (
+    UNDECIDED,
     CollapseState,
     classify_collapse,
     doubt_soft_blocks,
@@ -376,7 +377,10 @@ def _run_rigid_blocks(structure: Structure, motion: Motion, *, dt: float) -> Col
     simulation = RigidBlockSimulation(loose.structure, dt=min(dt / 2.5, 2e-3))
     end = motion.duration + 20.0  # time in which blocks settle [s]
     frames = simulation.frames(loose.start, end, motion, spacing=0.05)
-    return classify_collapse(structure, map(loose.restore, frames))
+    found = classify_collapse(structure, map(loose.restore, frames))
+    if found.kind == UNDECIDED:
+        raise DidNotConverge(f"by {end:.4g} s it is {found.text}", last=None)
+    return found
 
 
 def _build_dataset(

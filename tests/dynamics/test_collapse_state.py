@@ -1,11 +1,14 @@
 """State of collapse from positions of blocks, and doubts of what was near another kind."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from loose_blocks import G, floor
 
 import archfem as af
 from archfem.dynamics import LooseBlocks, RigidBlockSimulation, classify_collapse, collapse_state
+from archfem.masonry.structure import with_contacts
 
 
 def pulse(peak, duration=0.5):
@@ -169,6 +172,40 @@ def test_a_block_that_rocks_beyond_the_limit_is_lost_only_if_it_topples(share, k
     assert (len(brief) < len(frames)) == (kind == "fallen")
 
 
+@pytest.mark.parametrize(
+    ("spread", "end", "kind", "drop"),
+    [
+        (0.045, 3.0, "dislocated", np.sqrt(3.0) * 0.045),  # jammed, 78 mm below its place
+        (0.6, 3.0, "fallen", None),
+        (0.6, 0.16, "unknown", None),
+        (0.045, 0.3, "unknown", np.sqrt(3.0) * 0.045),  # it trembles in its new place
+    ],
+)
+def test_a_ring_of_thin_stones_that_sags_is_lost_only_where_nothing_bears_it(
+    spread, end, kind, drop
+):
+    """Springings at 60° move apart by `spread` each: a ring sinks by tan 60° times that.
+
+    Half the root of the area of its stones, 0.4 m by 0.05 m, is 71 mm.
+    """
+    thin = af.circular_arch(radius=3.0, thickness=0.4, embrace=60.0, voussoirs=62, chords=1)
+    start = LooseBlocks.as_built(thin)
+    start.poses[[0, -1], 0] = -spread, spread
+    frames = list(RigidBlockSimulation(thin, dt=1e-3).frames(start, end))
+    found = classify_collapse(thin, frames, start.poses)
+    assert found.kind == kind
+    assert found.text.startswith(
+        "not decided: still moving, out of place" if kind == "unknown" else kind
+    )
+    assert (found.time is None) == (kind != "fallen")
+    assert found.resting == (end > 1.0)
+    assert len(found.blocks) == 62
+    followed = list(collapse_state.follow_until_lost(thin, iter(frames)))
+    assert (len(followed) < len(frames)) == (kind == "fallen")
+    if drop:
+        assert -frames[-1].poses[31, 1] == pytest.approx(drop, rel=0.01)
+
+
 def test_a_fall_is_followed_until_a_stone_is_lost_for_good():
     """A free fall by the diagonal of 6 m by 8 m lasts 1.43 s; frames come each 0.1 s."""
     structure = floor((0.0, 0.0, 1.0, 7.0), floor=(0.0, 6.0))
@@ -187,6 +224,39 @@ def test_a_fall_is_followed_by_the_blocks_that_are_restored():
     fallen.poses[1, 2] = 1.0
     found = collapse_state.follow_until_lost(structure, iter(frames), lambda _: fallen)
     assert [each.time for each in found] == [0.0, 1.0, 2.0]
+
+
+@pytest.mark.parametrize("friction", [0.6, pytest.param(1.0, marks=pytest.mark.slow)])
+def test_steep_friction_leaves_in_doubt_where_stones_lie_and_not_that_they_fall(friction):
+    """A ring under 1.4 g for half a second, whose stones hit the ground from 0.64 s on.
+
+    In a tenth of all steps impulses do not settle, and in none before the first stone is lost.
+    """
+    contact = af.Contact(1e9, 4e8, friction)
+    ring = af.circular_arch(radius=2.95, thickness=0.55, embrace=159.0, voussoirs=17, chords=1)
+    ring = with_contacts(ring, lambda _: contact)
+    start, motion = LooseBlocks.as_built(ring), pulse(1.4)
+    frames = list(RigidBlockSimulation(ring, dt=1e-3).frames(start, 10.0, motion))
+    found = classify_collapse(ring, frames)
+    assert (found.kind, found.unsettled) == ("fallen", 0.0)
+    assert found.time == pytest.approx(0.36, abs=0.02)
+    assert frames[-1].settling.unsettled_share > 0.02
+    assert "in doubt" not in found.text
+
+
+def test_a_fall_whose_impulses_did_not_settle_before_it_is_in_doubt():
+    """In 2 of 10 steps up to the loss at 2 s, and in none after it."""
+    structure = floor((0.0, 0.0, 0.5, 2.0))
+    start = LooseBlocks.as_built(structure)
+    simulation = RigidBlockSimulation(structure, dt=1e-3)
+    (first, *_), frames = simulation.frames(start, 1.0), []
+    for time, steps, sunk in ((0.0, 1, 0.0), (2.0, 10, 0.6), (5.0, 100, 0.6)):
+        settling = replace(first.settling, unsettled=2 * (steps > 1), steps=steps)
+        frames.append(replace(first, time=time, settling=settling, poses=first.poses.copy()))
+        frames[-1].poses[1, 1] = -sunk
+    found = classify_collapse(structure, [*frames[:-1], replace(frames[-1], resting=True)])
+    assert found.unsettled == 0.2
+    assert found.text.endswith("in doubt: impulses did not settle in 20% of the steps")
 
 
 def test_a_run_without_frames_is_refused():

@@ -134,7 +134,8 @@ def test_what_still_moves_is_judged_by_the_rest_that_its_motion_has(monkeypatch)
     ("whole", "followed", "outcome"),
     [
         (True, 0.2, "unknown"),
-        (True, 0.6, "fallen"),
+        (True, 0.6, "unknown"),  # 0.28 s after it was out of its place, for less than 0.71 s
+        (True, 1.1, "fallen"),
         (False, 0.2, "unknown"),
         (False, 9.0, "fallen"),
     ],
@@ -168,11 +169,32 @@ def test_a_fall_that_cannot_be_followed_keeps_what_is_known(whole, followed, out
     assert doubted == (whole or outcome == "unknown")
 
 
+@pytest.mark.parametrize(("after", "decided"), [(0.6, False), (1.2, True)])
+def test_a_fall_that_ends_while_blocks_move_is_decided_after_a_free_fall(
+    after, decided, monkeypatch
+):
+    """The column of the test above, 0.28 s and 0.88 s after it was out of its place."""
+    simulate = fall.simulate_fall
+
+    def stop(*given):
+        dataset, frames = simulate(*given)
+        return dataset, [each for each in frames if each.time < 0.67 + after]
+
+    monkeypatch.setattr(fall, "simulate_fall", stop)
+    column = af.column(breadth=0.6, heights=[2.4], contact=af.Contact(1e9, 4e8, 0.6))
+    analysis = af.Analysis(column, fidelity="rigid", displacements="large", dt=2e-3)
+    run = analysis.run(af.Motion(np.full(100, 0.4 * G), 0.01))
+    assert run.verdict.outcome == ("fallen" if decided else "unknown")
+    words = "not decided whether blocks fall: block 1 still moved out of place at 1.2"
+    assert any(words in doubt.cause for doubt in run.doubts) != decided
+    assert run.verdict.headline.startswith("unknown, not decided: still moving; ") != decided
+
+
 @pytest.mark.parametrize(
     ("followed", "compared", "outcome"),
     [
         (0.2, False, "unknown"),
-        (0.6, False, "fallen"),
+        (1.1, False, "fallen"),
         (99.0, True, "fallen"),
         (-1.0, False, "unknown"),
     ],
