@@ -377,7 +377,7 @@ def failure_message(path: Path, control: str, criteria: Criteria) -> str:
     if slides:
         message += f", at which {len(slides)} joints slide, such as '{slides[0]}'"
     if control == "path" and not slides and path.model.large_displacements:
-        message += "; hinges jump between stiff joints: give quadrature = 'exact', or softer ones"
+        message += "; hinges jump between stiff joints: give softer ones, or quadrature = 'exact'"
     if slides and any(block.grain for block in path.model.structure.blocks):
         message += "; pieces of fill flow where little holds them: cohesion does, or a wall"
     return message
