@@ -37,8 +37,8 @@ from archfem.view.style import Colour, Size
 # Share of the largest turn of a hinge from which one is drawn [-]
 LEAST_TURN = 0.05
 
-# Hinges of a mechanism that have the numbers of their joints beside them
-MAX_NAMED = 8
+# Hinges of a mechanism that have the names of their joints beside them, and letters of a name
+MAX_NAMED, MAX_LETTERS = 8, 24
 
 
 @validate_arguments
@@ -377,8 +377,11 @@ def _draw_ties(axes: Axes, blocks: PlacedBlocks) -> None:
         end = tie.point + size * np.array(tie.force) / np.hypot(*tie.force)
         ends = np.array([tie.point, end if tie.anchor_point is None else tie.anchor_point])
         axes.plot(*ends.T, color=Colour.LOAD, lw=1.4, marker=".", zorder=9, label=label)
-        name = blocks.structure.blocks[blocks.structure.block_number(tie.block)].name
-        style.write_name(axes, name, ends.mean(axis=0), (0.0, 1.0))
+        ways = [*(ends - ends.mean(axis=0)) / (0.5 * np.hypot(*np.diff(ends, axis=0)[0]))]
+        for anchored, place, way in zip((tie.block, tie.anchor), ends, ways, strict=True):
+            if anchored is not None:
+                name = blocks.structure.blocks[blocks.structure.block_number(anchored)].name
+                style.write_name(axes, name, place, way)
         label = ""
 
 
@@ -480,7 +483,7 @@ def _mark_hinges(
     clear = np.flatnonzero(turns >= LEAST_TURN * turns.max())
     joints = [structure.joints[numbers[k]] for k in clear]
     names = [style.short_name(joint.name, joint.part) for joint in joints]
-    if len(names) <= MAX_NAMED:
+    if len(names) <= MAX_NAMED and len(max(names, key=len)) <= MAX_LETTERS:
         for name, joint, point in zip(names, joints, points[clear], strict=True):
             way = point - joint.ends.mean(axis=0)
             style.write_name(axes, name, point, way / np.hypot(*way))

@@ -61,7 +61,7 @@ def draw_dead_load(dead: Equilibrium, *, criteria: Criteria | None = None) -> Fi
         # the symbol of an entry takes 0.6 inch
         letters = int((figure.get_figwidth() - 0.6) / style.text_width(1))
         label = fill(f"{joint.name}: {', '.join(texts)}", letters)
-        look = {"marker": f"${letter}$", "color": Colour.TEXT, "ms": 5, "mew": 0.4}
+        look = {"marker": style.glyph_marker(letter), "color": Colour.TEXT, "ms": 5, "mew": 0.4}
         axes.plot([], [], ls="", label=label, **look)
     # the legend is made anew: entries were added after that of the structure
     for legend in figure.legends:

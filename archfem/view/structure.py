@@ -288,7 +288,7 @@ def draw_marks(axes: Axes, marks: Marks, when: str = "") -> None:
     if len(marks.slips):
         look = {"edge": "white", "width": 0.4, "zorder": 6, "gid": "slips"}
         style.add_polygons(axes, list(marks.slips), Colour.SLIDING, **look)
-        look = {"marker": style.harpoons(), "ms": 13.6, "mew": 0.5, "color": Colour.SLIDING}
+        look = {"marker": style.glyph_marker(), "ms": 13.6, "mew": 0.5, "color": Colour.SLIDING}
         axes.plot([], [], ls="", label="sliding joint", **look)
     if len(marks.gaps):
         edge = [withStroke(linewidth=3.8, foreground=Colour.EDGE)]
@@ -437,32 +437,35 @@ def _number_stones(axes: Axes, structure: Structure, part: str, inch: float, sig
 
 def _name_part(axes: Axes, joints: Sequence[Joint], inch: float, top: float) -> None:
     """Write the names of a part and of its joints, as many as fit in legible type below a top."""
-    look: dict[str, Any] = {"zorder": 8, "path_effects": style.white_halo(1.6)}
-    outward = -np.array([joint.tangent for joint in joints])
-    # names stand upright in an opening, where they are nearer to one another than joints
-    places = np.array([joint.ends[0] for joint in joints]) + Size.NOTE / 72.0 * inch * outward
-    apart = np.linalg.norm(np.diff(places, axis=0), axis=1).min() if len(joints) > 1 else np.inf
-    # two figures, or a line of type, take 0.65 of the spacing
-    fitting = 0.65 * 72.0 * apart / inch
-    every = max(1, int(np.ceil(Size.NOTE / fitting)))
-    size = min(every * fitting, Size.LABEL)
+    faces, outward = (np.array([(j.ends[0], -j.tangent) for j in joints])).swapaxes(0, 1)
     names = [style.short_name(joint.name, joint.part) for joint in joints]
     if max(map(len, names)) > MAX_NAME_LETTERS:  # they would be written over each other
         names = [str(k) for k in range(len(names))]
-    for joint, name, way in list(zip(joints, names, outward, strict=True))[::every]:
-        # from the face to the middle of a name, of which a figure is 0.64 of its size wide
-        reach = size * (0.5 + abs(way) @ [0.32 * len(name), 0.4]) * way
-        reach[1] += 0.5 * size * (name == "base")  # above the line of the ground
-        look |= {"ha": "center", "va": "center_baseline", "fontsize": size}
-        style.annotate(axes, name, joint.ends[0], reach, **look)
+
+    def are_apart(every: int, size: float) -> bool:
+        """Return whether every so many names are apart: upright ones in an opening are nearer."""
+        offsets = [style.reach_name(*each, size) for each in zip(names, outward, strict=True)]
+        wide = 0.32 * size * np.array([*map(len, names)])[::every]
+        gaps = np.abs(np.diff((72.0 / inch * faces + offsets)[::every], axis=0))
+        beside = (gaps[:, 0] > wide[1:] + wide[:-1] + 1.0) | (gaps[:, 1] > 1.2 * size)
+        return bool(np.all(beside & (0.65 * np.hypot(*gaps.T) > size)))
+
+    tried = [(n, size) for n in range(1, len(names) + 1) for size in (Size.LABEL, Size.NOTE)]
+    every, size = next(one for one in tried if are_apart(*one))
+    for name, face, way in list(zip(names, faces, outward, strict=True))[::every]:
+        note = style.write_name(axes, name, face, way, size)
+        note.set_gid("at")
+        x, y = note.xyann
+        note.xyann = x, y + 0.5 * size * (name == "base")  # above the line of the ground
     if not joints[0].name.startswith(f"{joints[0].part}, "):
         return
     is_ring = joints[0].role == "ring"
     corners = np.array([joint.ends for joint in joints]).reshape(-1, 2)
     above = is_ring and corners[:, 1].max() > top - 1e-6  # a deck would strike the name through
     place = corners[:, 0].mean(), corners[:, 1].max() if above else corners[:, 1].min()
-    look |= {"fontsize": Size.LABEL, "va": "bottom" if above else "top"}
-    style.annotate(axes, joints[0].part, place, (0.0, 2.0 if above else -1.5 * Size.LABEL), **look)
+    way = 0.0, 1.0 if above else -1.8
+    part = style.write_name(axes, joints[0].part, place, way, Size.LABEL)
+    part.set_gid("at" if is_ring else "beside")  # within an opening nothing else is struck
 
 
 @validate_arguments

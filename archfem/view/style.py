@@ -16,12 +16,13 @@ from matplotlib.collections import PolyCollection
 from matplotlib.colorbar import Colorbar
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
-from matplotlib.layout_engine import PlaceHolderLayoutEngine
+from matplotlib.layout_engine import LayoutEngine, PlaceHolderLayoutEngine
 from matplotlib.path import Path as Outline
 from matplotlib.patheffects import withStroke
 from matplotlib.text import Annotation, Text
 from matplotlib.textpath import TextPath
-from matplotlib.ticker import LogFormatter, MaxNLocator
+from matplotlib.ticker import LogFormatter, LogFormatterMathtext, MaxNLocator
+from matplotlib.transforms import Bbox
 
 from archfem._files import atomic_write
 from archfem._typing import Array
@@ -83,7 +84,20 @@ class Page(Figure):
             engine = self.get_layout_engine()
             if engine is not None and any(axes.get_aspect() != "auto" for axes in self.axes):
                 engine.execute(self)
+                self._trim(engine)
+            for axes in self.axes:
+                place_names(axes)
         super().draw(renderer)
+
+    def _trim(self, engine: LayoutEngine) -> None:
+        """Cut the height that a single drawing, true to scale and less high, leaves empty."""
+        drawn = [axes for axes in self.axes if axes.get_label() != "<colorbar>"]
+        if len(drawn) == 1 and drawn[0].axison:
+            drawn[0].apply_aspect()
+            place = drawn[0].get_position(original=True).y0 * self.get_figheight()
+            below = drawn[0].get_tightbbox().y0 / self.dpi
+            self.set_figheight(self.get_figheight() - max(below - place, 0.0))
+            engine.execute(self)
 
 
 def letter_panels(figure: Figure) -> None:
@@ -135,21 +149,30 @@ def _change_width(millimetres: float) -> Iterator[None]:
         Size.COLUMN, Size.PAGE = kept
 
 
+class PowersOfTen(LogFormatter):
+    """Labels of a logarithmic axis, such as 10⁻² and 2×10⁻², in plain text."""
+
+    def __call__(self, value: float, pos: int | None = None) -> str:
+        """Return the label of a value, empty where the axis has no room for one."""
+        if not super().__call__(value, pos):
+            return ""
+        factor, exponent = f"{value:.0e}".split("e")
+        power = "10" + str(int(exponent)).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+        return power if factor == "1" else f"{factor}×{power}"
+
+
 def disable_math(drawing: Artist) -> None:
-    """Show all texts as plain text, except the powers of ten at logarithmic axes."""
+    """Show all texts as plain text, also the powers of ten at logarithmic axes."""
     # one search for both kinds: each visits thousands of artists
-    found = drawing.findobj(lambda artist: isinstance(artist, Text | Axes))
-    powers = {
-        label
-        for axes in found
-        if isinstance(axes, Axes)
-        for axis in (axes.xaxis, axes.yaxis)
-        if isinstance(axis.get_major_formatter(), LogFormatter)
-        for label in axis.get_ticklabels(which="both")
-    }
-    for text in found:
-        if isinstance(text, Text) and text not in powers:
-            text.set_parse_math(False)
+    for artist in drawing.findobj(lambda artist: isinstance(artist, Text | Axes)):
+        if isinstance(artist, Text):
+            artist.set_parse_math(False)
+        elif isinstance(artist, Axes):
+            for axis in (artist.xaxis, artist.yaxis):
+                if isinstance(axis.get_major_formatter(), LogFormatterMathtext):
+                    axis.set_major_formatter(PowersOfTen())
+                if isinstance(axis.get_minor_formatter(), LogFormatterMathtext):
+                    axis.set_minor_formatter(PowersOfTen(labelOnlyBase=False))
 
 
 def text_width(letters: float, size: float = Size.LABEL) -> float:
@@ -246,10 +269,10 @@ def style_colour_bar(bar: Colorbar, label: str, size: float = Size.LABEL) -> Non
     bar.outline.set(edgecolor=Colour.EDGE, linewidth=0.8)
 
 
-def harpoons() -> Outline:
-    """Return two opposite harpoons as a marker, the symbol of a sliding joint in legends."""
-    # the same glyph as mathematical text would load its parser
-    glyph = TextPath((0.0, 0.0), "⇌")
+def glyph_marker(letter: str = "⇌") -> Outline:
+    """Return a letter as a marker, by default two harpoons, the symbol of a sliding joint."""
+    # as mathematical text it would load a parser, and fonts that may be missing
+    glyph = TextPath((0.0, 0.0), letter)
     return Outline(glyph.vertices - glyph.get_extents().get_points().mean(axis=0), glyph.codes)
 
 
@@ -276,11 +299,54 @@ def short_name(name: str, part: str) -> str:
     return own.removeprefix("joint ") or own
 
 
-def write_name(axes: Axes, name: str, point: Any, way: Any = (0.0, 0.0)) -> None:
-    """Write a name on a white halo at a point, or beside it in a direction (2,)."""
-    reach = (4.0 + Size.NOTE * (0.4 + 0.28 * abs(way[0]) * len(name))) * np.asarray(way)
-    look: dict[str, Any] = {"ha": "center", "va": "center", "zorder": 9, "fontsize": Size.NOTE}
-    annotate(axes, name, point, reach, path_effects=white_halo(1.6), **look)
+def write_name(
+    axes: Axes, name: str, point: Any, way: Any = (0.0, 0.0), size: float = Size.NOTE
+) -> Annotation:
+    """Write a name on a white halo at a point, or beside it, best in a direction (2,)."""
+    look: dict[str, Any] = {"ha": "center", "va": "center", "zorder": 9, "fontsize": size}
+    # the halo covers the line of a block within a word
+    look |= {"path_effects": white_halo(2.6), "gid": "beside" if np.any(way) else "at"}
+    note = annotate(axes, name, point, reach_name(name, np.asarray(way), size), **look)
+    note.set_in_layout(not np.any(way))  # a layout moves what it would be placed by
+    return note
+
+
+def reach_name(name: str, way: Array, size: float = Size.NOTE) -> Array:
+    """Return the offset of the middle of a name beside its point, in a direction (2,) [points]."""
+    return (4.0 + size * (0.4 + 0.28 * abs(way[0]) * len(name))) * way
+
+
+def place_names(axes: Axes) -> None:
+    """Turn names about their points where they would cover others, hinges, ties or edges."""
+    names = [text for text in axes.texts if text.get_gid() == "beside"]
+    if not names:
+        return
+    axes.apply_aspect()
+    points, taken = axes.figure.dpi / 72.0, list[Bbox]()
+    taken += [text.get_window_extent() for text in axes.texts if text not in names]
+    for line in axes.lines:
+        half = 0.4 * line.get_markersize() * points
+        if line.get_marker() != "None" and half > 1.5 * points:  # not the points of thrust
+            places = line.get_transform().transform(line.get_xydata())
+            taken += [Bbox([place - half, place + half]) for place in places]
+    edges = [line.get_transform().transform_path(line.get_path()) for line in axes.lines]
+    for drawn in axes.collections:
+        edges += map(drawn.get_transform().transform_path, drawn.get_paths())
+    turns = np.exp(1j * np.deg2rad([0.0, 45.0, -45.0, 90.0, -90.0, 135.0, -135.0, 180.0]))
+    for name in names:
+        first, box = np.array(name.xyann), name.get_window_extent()
+        ways = complex(*first) / np.hypot(*first) * turns
+        reaches = [reach_name(name.get_text(), np.array([w.real, w.imag])) for w in ways]
+        offsets = [*reaches, *(1.8 * reach for reach in reaches)]
+        boxes = [box.translated(*(points * (offset - first))) for offset in offsets]
+
+        def cost(box: Bbox) -> int:
+            covered = sum(map(box.overlaps, taken)) + (axes.bbox.count_contains(box.corners()) < 4)
+            return 8 * covered + sum(edge.intersects_bbox(box, filled=False) for edge in edges)
+
+        best = int(np.argmin([*map(cost, boxes)]))
+        name.xyann = tuple(offsets[best])
+        taken.append(boxes[best])
 
 
 def add_polygons(

@@ -3,6 +3,7 @@
 from dataclasses import replace
 from functools import partial
 from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -27,8 +28,9 @@ from archfem.view import (
     draw_structure,
     draw_worst_places,
 )
-from archfem.view.collapse import _draw_ties
+from archfem.view.collapse import _draw_ties, _mark_hinges
 from archfem.view.structure import draw_loads
+from archfem.view.style import structure_axes
 
 
 def lines_of(axes):
@@ -223,8 +225,28 @@ def test_an_assessment_shows_ties_to_the_ground_and_between_blocks():
     between, down = (line.get_xydata() for line in axes.lines)
     assert [*lines_of(axes)] == ["tie"]
     np.testing.assert_allclose(between, ends)
+    # each end of a bar has the name of its block, not the middle, where no block is
+    written = {text.get_text(): text.xy for text in axes.texts}
+    assert {*written} == {one, other}
+    np.testing.assert_allclose(written[other], ends[1])
     size = 0.2 * np.ptp(np.concatenate([b.drawn() for b in piers.blocks]), axis=0).max()
     np.testing.assert_allclose(down, [ends[0], ends[0] - [0.0, size]])
+
+
+def test_long_names_of_hinges_leave_room_for_the_drawing():
+    """'course 1, stone 7 to course 2, stone 8' took the width of the page, and more."""
+    wall = bonded_wall(3, half=1.0)
+    long = [k for k, joint in enumerate(wall.joints) if len(joint.name) > 24][:3]
+    motion = np.random.default_rng(3).normal(size=(len(wall.blocks), 3))
+    path = SimpleNamespace(velocity=motion)
+    found = SimpleNamespace(hinges=[(k, "intrados") for k in long], path=path)
+    axes = structure_axes(wall)
+    draw_structure(wall, axes=axes)
+    _mark_hinges(axes, wall, found, label="hinge")
+    axes.figure.draw_without_rendering()
+    assert len(long) == 3
+    assert not axes.texts
+    assert axes.get_position().width > 0.6
 
 
 @pytest.mark.slow

@@ -11,6 +11,7 @@ import matplotlib
 import numpy as np
 import pytest
 from matplotlib.text import Text
+from matplotlib.transforms import Bbox
 from pictures import history
 
 import archfem as af
@@ -21,7 +22,9 @@ from archfem.view.style import (
     add_legend,
     new_figure,
     set_title,
+    structure_axes,
     structure_figure,
+    write_name,
 )
 
 
@@ -83,13 +86,64 @@ def test_names_are_words_wherever_they_are_drawn(name, tmp_path):
     assert escape(name) in (tmp_path / "page.svg").read_text(encoding="utf-8")
 
 
-def test_powers_of_ten_at_an_axis_stay_powers(tmp_path):
+def test_powers_of_ten_at_an_axis_and_letters_of_a_legend_need_no_mathematical_fonts(
+    ring, low_resolution, monkeypatch, tmp_path
+):
+    """Those of matplotlib may be missing, which took 21 lines of a log."""
+
+    def refuse(*_, **options):
+        raise AssertionError("mathematical text")
+
+    monkeypatch.setattr("matplotlib.mathtext.MathTextParser.parse", refuse)
     page = Page()
-    axes = page.subplots()
-    axes.set(yscale="log", ylim=(1e-3, 1e3), title="worth $5 or $6")
+    left, right = page.subplots(1, 2)
+    left.set(yscale="log", ylim=(1e-3, 1e3), title="worth $5 or $6")
+    right.set(yscale="log", ylim=(2.0, 30.0))
     page.savefig(tmp_path / "page.png")
-    assert {label.get_parse_math() for label in axes.get_yticklabels()} == {True}
-    assert not axes.title.get_parse_math()
+    written = [text.get_text() for text in left.get_yticklabels()]
+    assert written[1:-1] == ["10⁻³", "10⁻²", "10⁻¹", "10⁰", "10¹", "10²", "10³"]
+    assert right.get_yticklabels(minor=True)[0].get_text() == "2×10⁰"
+    save(af.view.draw_dead_load(af.dead_load(af.build(ring, fidelity="rigid"))), tmp_path / "d.png")
+
+
+def boxes_of_marks(axes):
+    """Boxes of the marks of a line of hinges [pixels]."""
+    half = 0.4 * axes.lines[0].get_markersize() * axes.figure.dpi / 72.0
+    places = axes.transData.transform(axes.lines[0].get_xydata())
+    return [Bbox([place - half, place + half]) for place in places]
+
+
+def test_names_beside_points_cover_neither_each_other_nor_hinges():
+    """Three near hinges of one stone, and a fourth at the edge of the axes."""
+    stones = af.column(breadth=4.0, heights=[1.0, 1.0])
+    axes = structure_axes(stones)
+    places = {"stone 1": 0.0, "7": 0.12, "base": 0.24, "stone 22": -2.0}
+    axes.plot([*places.values()], [1.0] * 4, "o", ms=7.0)
+    names = [write_name(axes, name, (x, 1.0), (-1.0, 0.0)) for name, x in places.items()]
+    for kind, covered in (("at", True), ("beside", False)):
+        for name in names:
+            name.set_gid(kind)
+        axes.figure.draw_without_rendering()
+        boxes, marks = [name.get_window_extent() for name in names], boxes_of_marks(axes)
+        pairs = [*combinations(boxes, 2), *((box, mark) for box in boxes for mark in marks)]
+        assert any(a.overlaps(b) for a, b in pairs) is covered
+    assert all(axes.bbox.containsx(x) for box in boxes for x in (box.x0, box.x1))
+    placed = [name.xyann for name in names]
+    axes.figure.draw_without_rendering()
+    assert [name.xyann for name in names] == placed
+
+
+def test_no_room_is_left_below_a_drawing_that_is_less_high():
+    """The legend of a long low structure follows the axis; the title of a report is removed."""
+    page = af.column(breadth=12.0, heights=[1.0]).plot()
+    axes = page.axes[0]
+    axes.plot([], [], label="thrust line")
+    add_legend(axes)
+    page.suptitle("")
+    axes.set_title("")
+    page.draw_without_rendering()
+    room = axes.xaxis.label.get_window_extent().y0 - page.legends[0].get_window_extent().y1
+    assert 0.0 <= room < 0.15 * page.dpi
 
 
 def test_long_titles_take_several_lines():
