@@ -273,7 +273,9 @@ def _label_joints(axes: Axes, names: Sequence[str]) -> None:
         axes.set_xlabel("joint number [-]")
         names = [str(k) for k in range(len(names))]
     labels = {float(k): name for k, name in enumerate(names)}
-    axes.xaxis.set_major_locator(MaxNLocator(max(2, min(6, len(names) // 3)), integer=True))
+    # an axis takes a dozen of numbers, and half as many names
+    most = 12 if max(map(len, names), default=0) < 3 else max(2, min(6, len(names) // 3))
+    axes.xaxis.set_major_locator(MaxNLocator(most, integer=True))
     axes.xaxis.set_major_formatter(lambda place, _: labels.get(round(place, 6), ""))
 
 

@@ -35,14 +35,16 @@ def draw_motion(motion: Motion) -> Figure:
     names = motion.components
     figure = style.new_figure(Size.COLUMN * (0.4 + 0.6 * len(names)), 3.4)
     axes = figure.subplots(3, len(names), sharex=True, squeeze=False)
-    for column, name in zip(axes.T, names, strict=True):
+    for number, (column, name) in enumerate(zip(axes.T, names, strict=True)):
         rows = (
-            (motion.component(name) / STANDARD_GRAVITY, "acceleration [g]"),
-            (motion.velocity(name), "velocity [m/s]"),
-            (motion.displacement(name), "displacement [m]"),
+            (motion.component(name) / STANDARD_GRAVITY, "acceleration\n[g]"),
+            (motion.velocity(name), "velocity\n[m/s]"),
+            (motion.displacement(name), "displacement\n[m]"),
         )
         for axis, (values, label) in zip(column, rows, strict=True):
             _draw_history(axis, motion.times(name), values)
+            # components share the quantity of a row
+            label = label if number == 0 else ""
             style.style_axes(axis, "time [s]" if axis is column[-1] else "", label)
         if len(names) > 1:  # a single component may have any direction
             column[0].set_title(name, fontsize=Size.TITLE)
@@ -233,7 +235,10 @@ def _draw_history(axis: Axes, times: Array, values: Array) -> None:
     axis.plot(times, values, Colour.LINES[0], lw=0.7)
     peak = int(np.argmax(np.abs(values)))
     axis.plot(times[peak], values[peak], "o", ms=3.5, color=Colour.HINGE)
-    style.annotate(axis, f"{values[peak]:.3g}", (times[peak], values[peak]), (5, 0), va="center")
+    axis.margins(y=0.15)  # the number is above the axis of time
+    text, halo = f"{values[peak]:.3g}".replace("-", "−"), style.white_halo(1.6)
+    place = times[peak], values[peak]
+    style.annotate(axis, text, place, (5, 0), va="center", path_effects=halo)
 
 
 def _label_panel(axis: Axes, component: str) -> None:

@@ -38,6 +38,15 @@ def comes_loose(run: History) -> bool:
     return "fall_pose" in run.dataset and (fallen or run.ending is not Ending.FINISHED)
 
 
+def mechanism_instant(run: History) -> float | None:
+    """Return the time of the first mechanism, verified or else by count, or None [s]."""
+    # enough joints may fail while no block can move: a verified motion comes first
+    if (verified := run.mechanisms.get("verified")) is not None:
+        return (verified.decisive or verified).time
+    found = counted_mechanism(leave_out_walls(run.joints))
+    return None if found is None else found.time
+
+
 def first_motion_instant(run: History) -> float:
     """Return the time of the first mechanism, else of the largest |e| of a joint [s].
 
@@ -45,11 +54,9 @@ def first_motion_instant(run: History) -> float:
     count: they say nothing of the motion. No joint of a wall in bond counts: a wall alone has the
     instant at which a joint is farthest open or has slid farthest.
     """
-    # enough joints may fail while no block can move: a verified motion comes first
-    verified, counted = run.mechanisms.get("verified"), leave_out_walls(run.joints)
-    found = counted_mechanism(counted) if verified is None else verified.decisive or verified
-    if found is not None and found.time is not None:
-        return found.time
+    if (time := mechanism_instant(run)) is not None:
+        return time
+    counted = leave_out_walls(run.joints)
     joints = assessed_joints(counted)
     if not joints.sizes["joint"]:
         joints = assessed_joints(run.joints)

@@ -27,6 +27,14 @@ def test_envelope_shows_extremes_faces_and_dead_load(run):
     assert crosses[0].get_xdata().tolist() == APART
 
 
+def test_each_joint_of_a_low_column_has_its_number_at_the_axis():
+    column = af.column(breadth=0.6, heights=[0.3] * 8)
+    figure = draw_envelope({"run": history(column, 0.3)})
+    figure.draw_without_rendering()
+    written = [label.get_text() for label in figure.axes[0].get_xticklabels()]
+    assert [text for text in written if text] == [str(k) for k in range(8)]
+
+
 def test_envelopes_of_runs_have_their_own_colours(run):
     figure = draw_envelope({"one": run, "other": run})
     names = [text.get_text() for text in figure.legends[0].get_texts()]

@@ -1,13 +1,14 @@
 """Content of the pictures of motions, read back from the drawn lines."""
 
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 import pytest
 
 import archfem as af
 from archfem.motion import Match
-from archfem.view import draw_accelerograms, draw_motion, draw_spectra, draw_suite
+from archfem.view import draw_accelerograms, draw_motion, draw_spectra, draw_suite, limit_width
 
 
 @pytest.fixture(scope="module")
@@ -24,6 +25,21 @@ def test_accelerogram_shows_all_components_and_integrals(shaking, low_resolution
     assert axes[4].get_lines()[0].get_ydata() == pytest.approx(shaking.displacement())
     figure.savefig(tmp_path / "motion.png")
     assert (tmp_path / "motion.png").stat().st_size > 10_000
+
+
+def test_peaks_and_labels_of_a_half_page_cover_no_axis(shaking):
+    """As a report draws it; a quantity stands once in its row."""
+    with limit_width(84.0):
+        figure = draw_motion(replace(shaking, horizontal=-np.abs(shaking.horizontal)))
+    figure.draw_without_rendering()
+    for axes in figure.axes:
+        (peak,) = axes.texts
+        assert "-" not in peak.get_text()
+        assert peak.get_window_extent().y0 > axes.bbox.y0
+    labels = [axes.yaxis.label for axes in figure.axes]
+    assert [bool(label.get_text()) for label in labels] == [True, False] * 3
+    boxes = [label.get_window_extent() for label in labels[::2]]
+    assert not any(a.overlaps(b) for a, b in combinations(boxes, 2))
 
 
 def test_spectra_show_horizontal_and_vertical(shaking):

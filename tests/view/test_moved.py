@@ -9,7 +9,7 @@ from mechanisms import twitching
 import archfem as af
 from archfem.masonry.structure import join_joint_names
 from archfem.view.joint_marks import joint_marks
-from archfem.view.positions import FallingBlocks, decisive_instant, rotate
+from archfem.view.positions import FallingBlocks, decisive_instant, mechanism_instant, rotate
 
 
 def placed(structure, number, points, pose):
@@ -141,6 +141,7 @@ def test_the_instant_that_decides_is_the_fall_or_else_a_motion(toppled, ring):
     dataset = af.joints.joint_dataset(ring, resultants, np.arange(4.0))
     assert decisive_instant(af.History(dataset, ring)) == 2.0
     assert decisive_instant(af.History(dataset)) == 1.0  # by count alone
+    assert mechanism_instant(af.History(dataset, ring)) == 2.0
     assert decisive_instant(af.History(dataset.isel(time=[0, 3]), ring)) == 0.0
 
 
@@ -161,6 +162,7 @@ def test_a_wall_shows_the_instant_at_which_it_is_farthest_apart():
     slip[2, 4] = -1e-3
     dataset = dataset.assign(slip=slip, opening=still)
     assert af.History(dataset, wall).mechanism.time == 0.0  # by count, which says nothing
+    assert mechanism_instant(af.History(dataset, wall)) is None  # nor does a page or a film
     assert decisive_instant(af.History(dataset, wall)) == 2.0
     assert decisive_instant(af.History(dataset)) == 2.0
     dataset["opening"][3, 5] = 1.5e-3

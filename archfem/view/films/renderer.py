@@ -29,8 +29,8 @@ from archfem.view.films.frames import Frame, corner_values, frame_layers
 from archfem.view.films.settings import Scale, Setup
 from archfem.view.histories import draw_ground
 from archfem.view.joint_marks import joint_pairs
-from archfem.view.positions import comes_loose, ground_acceleration
-from archfem.view.style import Colour, annotate, harpoons, style_colour_bar
+from archfem.view.positions import comes_loose, ground_acceleration, mechanism_instant
+from archfem.view.style import Colour, annotate, glyph_marker, style_colour_bar
 
 
 class Canvas:
@@ -230,8 +230,8 @@ class FrameLayout:
         axes.set_xlabel("time [s]", fontsize=self.font_size)
         state = "blocks loose" if comes_loose(run) else "blocks rocking"
         instants = [(run.time[-1], state)] if len(times) > len(run.time) else []
-        if run.mechanism is not None and run.mechanism.time is not None:
-            instants.append((run.mechanism.time, "mechanism"))
+        if (mechanism := mechanism_instant(run)) is not None:
+            instants.append((mechanism, "mechanism"))
         width = axes.get_position().width * self._inches[0]
         style: dict[str, Any] = {"xycoords": "axes fraction", "ha": "center", "va": "bottom"}
         style |= {"fontsize": self.font_size, "color": Colour.EDGE}
@@ -264,7 +264,7 @@ def _legend_symbols(joints: xr.Dataset, film: bool, mechanism: bool) -> list[Lin
     """Return the legend's symbols of the marks that occur at joints, and of a mechanism."""
     hinges, slides = (bool(((joints[k] != 0) & joints["judged"]).any()) for k in ("hinge", "slide"))
     hinge = {"ls": "", "marker": "o", "ms": 9.0, "color": Colour.HINGE}
-    sliding = {"ls": "", "marker": harpoons(), "ms": 17.0, "color": Colour.SLIDING}
+    sliding = {"ls": "", "marker": glyph_marker(), "ms": 17.0, "color": Colour.SLIDING}
     symbols = {
         "thrust line": {"color": Colour.THRUST, "lw": 2.4},
         "hinge": hinge if hinges else None,

@@ -315,7 +315,6 @@ class Scene:
         """All data of the page."""
         pack, every = self.packed
         run, structure, falls = self.run, self.structure, self.falls
-        mechanism = run.mechanism
         return {
             "title": self.title or str(run.dataset.attrs.get("title", structure.name)),
             "box": _round(self.box),
@@ -333,7 +332,7 @@ class Scene:
             "loose": None if falls is None else float(falls.times[0]),
             "state": None if falls is None else falls.state,
             "level": None if falls is None else falls.level,
-            "mechanism": None if mechanism is None else mechanism.time,
+            "mechanism": positions.mechanism_instant(run),
             "peak": positions.peak_instant(self.run),
             "note": self.note,
             "pack": pack.head,
