@@ -1333,6 +1333,21 @@ def test_long_tables_of_joints_stand_in_two_halves(kept, monkeypatch):
     assert [row[5] for row in first.rows] == [*(f"joint {k}" for k in range(7, 13)), ""]
 
 
+def test_a_table_of_very_many_joints_has_those_that_failed_longest(kept, monkeypatch):
+    """Joint 70 hinged; of the others the largest |e| are those of the last."""
+    found = af.cases.open_results(kept)
+    data = report_data.ReportData(found.case, found.runs)
+    head = ["joint", "e dead", "e min", "e max", "max V/N", "hinge from", "hinge for"]
+    numbers = [
+        [f"joint {k}", "0.0", f"-{k / 500:.3f}", "open", "0.1", "-", "-"] for k in range(176)
+    ]
+    numbers[70][5:] = "1.000 s", "0.010 s"
+    monkeypatch.setattr(result_text, "tabulate_joints", lambda *_: ResultTable(head, numbers))
+    table = _tabulate_joints(data, data.runs["first"])
+    assert [row[0] for row in table.rows] == [f"joint {k}" for k in (70, *range(117, 176))]
+    assert table.caption.endswith("The 60 of 176 that failed longest, then by largest |e|.")
+
+
 def test_a_history_alone_has_a_report_and_a_film_by_the_command_line(
     kept, unplotted, tmp_path, capsys
 ):

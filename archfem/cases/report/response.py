@@ -31,6 +31,9 @@ from archfem.view.style import Colour, limit_width
 # Width of figures of which two stand side by side [mm]
 HALF_WIDTH = 84.0
 
+# Rows of a table of joints, of which a bridge of several spans has as many
+MAX_JOINTS = 60
+
 
 def build_ground_section(data: ReportData) -> Section:
     """Build the section on ground motions and spectra."""
@@ -114,7 +117,7 @@ def _build_response(data: ReportData, name: str, players: int) -> list[Any]:
     if not run.ending.is_complete:
         blocks.append(TextBlock(f"The run is not complete: {run.outcome}.", "doubt"))
     if case.suite is None:
-        blocks += [*_build_envelopes(data), _tabulate_joints(data, run)]
+        blocks += [_tabulate_joints(data, run), *_build_envelopes(data)]
     blocks.append(TextBlock(sentence(utilisation_text(case.structure, run.joints))))
     return [*blocks, *_build_mechanism(data, run), build_player(case, run, title, players)]
 
@@ -152,6 +155,10 @@ def _tabulate_joints(data: ReportData, run: History) -> Grid:
     )
     caption = " ".join([caption, *(note for flag, note in notes.items() if flag in empty)])
     caption += f" {sentence(assessed)}" if assessed else ""
+    if len(rows) > MAX_JOINTS:  # as in a wall of courses: each has a line or two
+        ranked = sorted(range(len(rows)), key=lambda k: _rank_joint(rows[k]))
+        caption += f" The {MAX_JOINTS} of {len(rows)} that failed longest, then by largest |e|."
+        rows = [rows[k] for k in sorted(ranked[:MAX_JOINTS])]
     if until := run.verdict.until:
         caption += f" All are of the time{until}, before blocks were loose."
     head, cells = [head[k] for k in filled], [[row[k] for k in filled] for row in rows]
@@ -161,6 +168,12 @@ def _tabulate_joints(data: ReportData, run: History) -> Grid:
         right = cells[half:] + blank
         head, cells = [*head, *head], [a + b for a, b in zip(cells[:half], right, strict=True)]
     return Grid(head, cells, caption)
+
+
+def _rank_joint(row: Sequence[str]) -> tuple[float, float]:
+    """Return minus the time for which a joint of the table failed, and minus its largest |e|."""
+    failed = sum(float(cell.split()[0]) for cell in row[6::2] if cell != "-")
+    return -failed, -max((abs(float(e)) for e in row[2:4] if e != "open"), default=0.5)
 
 
 def summarise_outcome(data: ReportData, run: History) -> str:

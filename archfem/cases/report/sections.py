@@ -215,6 +215,9 @@ def build_structure_section(data: ReportData) -> Section:
         if data.dead is not None:
             criteria = case.analysis.failure_criteria
             thrust = draw_structure(structure, data.dead, criteria=criteria)
+            drawn = figures[0].figure if figures else None
+            for own, other in zip(thrust.axes, drawn.axes if drawn else (), strict=False):
+                own.set(xlim=other.get_xlim(), ylim=other.get_ylim())  # both at one scale
             figures.append(_untitle(thrust, _THRUST))
         else:
             figures += data.read_figure("dead.png", _THRUST)

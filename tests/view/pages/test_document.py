@@ -20,7 +20,7 @@ def test_words_of_users_are_escaped_and_numbers_typeset():
     pieces = [
         TextBlock(f"{evil} and `a < b`", "missing"),
         TextBlock(evil, "lines"),
-        Grid([evil, "x"], [[evil, "-0.5"], ["-", "a-b"]], evil),
+        Grid([evil, "x"], [[evil, "-0.5"], ["-", "a-b"], ["`c < d`", "e"]], evil),
         Grid((), [(evil, evil)]),
         FigureBlock.of(Figure(figsize=(2.0, 1.0)), evil),
     ]
@@ -28,7 +28,7 @@ def test_words_of_users_are_escaped_and_numbers_typeset():
     read = read_page(page)
     assert evil not in page
     assert read.words.count(evil) >= 10
-    assert {"−0.5", "–", "a-b", "a < b"} <= set(read.words)
+    assert {"−0.5", "–", "a-b", "a < b", "c < d"} <= set(read.words)
     assert page.count("data:image/svg+xml;base64,") == 1
     assert "width:2.04in" in page
 
@@ -77,6 +77,12 @@ def test_text_in_columns_breaks_anywhere(lines, kept):
     page = Document("", "", [], [Section("", [TextBlock(f"title\n\n{table}", "lines")])]).page
     assert page.count('<span class="table">') == kept
     assert page.count('<pre class="long">') == 1 - kept
+
+
+@pytest.mark.parametrize(("lines", "kept"), [(8, 1), (12, 0)])
+def test_a_few_lines_of_text_are_kept_whole(lines, kept):
+    page = Document("", "", [], [Section("", [TextBlock("a\n" * lines, "lines")])]).page
+    assert page.count('<pre class="few">') == kept
 
 
 @pytest.mark.parametrize(("letters", "kept"), [(60, 1), (100, 0)])

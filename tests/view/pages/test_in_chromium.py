@@ -6,12 +6,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from chromium import BROWSER, browser, complaints, opened, printed
+from matplotlib.figure import Figure
 
 import archfem as af
 from archfem.cases.result_text import tabulate_motions
 from archfem.cases.run import carry_out, replace_run
 from archfem.view.pages.document import (
     Document,
+    FigureBlock,
     Grid,
     Section,
     TextBlock,
@@ -269,6 +271,20 @@ return [...document.querySelectorAll(".player-ground .name")].map((each) => {
 """
 
 
+WIDTHS = """
+const lines = [...document.querySelectorAll(".player-stage .stone, .player-stage .link")];
+return [...new Set(lines.map((each) => getComputedStyle(each).vectorEffect))];
+"""
+
+
+def test_lines_of_a_tall_structure_are_as_wide_as_those_of_others(column, toppled, tmp_path):
+    """Its picture is smaller than its own units: a printed thrust line was hardly seen."""
+    path = af.view.player(toppled, column).save(tmp_path / "player.html")
+    with browser() as driver:
+        opened(driver, path)
+        assert driver.execute_script(WIDTHS) == ["non-scaling-stroke"]
+
+
 def test_names_of_instants_do_not_overlap(column, hinged_late, tmp_path):
     """On paper, whose type is twice as large, near ones are one text, and none leaves the chart."""
     path = af.view.player(hinged_late, column).save(tmp_path / "player.html")
@@ -324,6 +340,30 @@ def test_no_page_is_left_blank_before_a_listing_or_after_a_short_table(tmp_path)
     assert len(listed) > 1
     assert "Listing" in listed[0]
     assert all(len(text.split()) > 20 for text in texts)
+
+
+def test_no_few_rows_of_a_table_and_no_heading_stand_alone_on_a_page(tmp_path):
+    """Tables of 11 to 16 rows end anywhere; a figure follows the heading of each section."""
+    pypdf = pytest.importorskip("pypdf")
+    if BROWSER is None:
+        pytest.skip("there is no chromium")
+    figure = FigureBlock.of(Figure(figsize=(4.0, 1.5)), "nothing")
+    sections = [
+        Section(f"Heading {n}", [figure, Grid((), [(f"T{n}R{k}", "w " * 30) for k in range(rows)])])
+        for n, rows in enumerate([11, 12, 13, 14, 15, 16] * 3)
+    ]
+    page = write_page(tmp_path / "page.html", Document("", "", [], sections).page)
+    pages = pypdf.PdfReader(print_page(page, tmp_path / "page.pdf")).pages
+    texts = [each.extract_text() for each in pages]
+    broken = 0
+    for text in texts:
+        tables = re.findall(r"\bT(\d+)R\d+", text)
+        counts = [tables.count(table) for table in dict.fromkeys(tables)]
+        broken += min(counts) < 11
+        assert min(counts) >= 3
+        for heading in re.findall(r"Heading (\d+)", text):
+            assert heading in tables
+    assert broken > 3
 
 
 def test_a_report_is_printed_as_pdf(small, tmp_path):
