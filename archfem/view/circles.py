@@ -64,8 +64,5 @@ def draw_circle_fit(curves: Structure | Mapping[str, Array]) -> Figure:
 
 def _find_intrados(structure: Structure) -> dict[str, Array]:
     """Return the ends of the joints of each ring on its intrados (n, 2) [m]."""
-    rings = dict.fromkeys(joint.part for joint in structure.joints if joint.role == "ring")
-    return {
-        ring: np.array([joint.intrados for joint in structure.joints if joint.part == ring])
-        for ring in rings
-    }
+    ends = [(joint.part, joint.intrados) for joint in structure.joints if joint.role == "ring"]
+    return {ring: np.array([end for own, end in ends if own == ring]) for ring, _ in ends}

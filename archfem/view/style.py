@@ -15,7 +15,7 @@ from matplotlib.backend_bases import RendererBase
 from matplotlib.collections import PolyCollection
 from matplotlib.colorbar import Colorbar
 from matplotlib.colors import LinearSegmentedColormap
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure, FigureBase
 from matplotlib.layout_engine import LayoutEngine, PlaceHolderLayoutEngine
 from matplotlib.path import Path as Outline
 from matplotlib.patheffects import withStroke
@@ -161,18 +161,15 @@ class PowersOfTen(LogFormatter):
         return power if factor == "1" else f"{factor}×{power}"
 
 
-def disable_math(drawing: Artist) -> None:
+def disable_math(drawing: FigureBase) -> None:
     """Show all texts as plain text, also the powers of ten at logarithmic axes."""
-    # one search for both kinds: each visits thousands of artists
-    for artist in drawing.findobj(lambda artist: isinstance(artist, Text | Axes)):
-        if isinstance(artist, Text):
-            artist.set_parse_math(False)
-        elif isinstance(artist, Axes):
-            for axis in (artist.xaxis, artist.yaxis):
-                if isinstance(axis.get_major_formatter(), LogFormatterMathtext):
-                    axis.set_major_formatter(PowersOfTen())
-                if isinstance(axis.get_minor_formatter(), LogFormatterMathtext):
-                    axis.set_minor_formatter(PowersOfTen(labelOnlyBase=False))
+    for text in drawing.findobj(Text):
+        text.set_parse_math(False)
+    for axis in (axis for axes in drawing.axes for axis in (axes.xaxis, axes.yaxis)):
+        if isinstance(axis.get_major_formatter(), LogFormatterMathtext):
+            axis.set_major_formatter(PowersOfTen())
+        if isinstance(axis.get_minor_formatter(), LogFormatterMathtext):
+            axis.set_minor_formatter(PowersOfTen(labelOnlyBase=False))
 
 
 def text_width(letters: float, size: float = Size.LABEL) -> float:
@@ -322,8 +319,8 @@ def place_names(axes: Axes) -> None:
     if not names:
         return
     axes.apply_aspect()
-    points, taken = axes.figure.dpi / 72.0, list[Bbox]()
-    taken += [text.get_window_extent() for text in axes.texts if text not in names]
+    points = axes.figure.dpi / 72.0
+    taken = [text.get_window_extent() for text in axes.texts if text not in names]
     for line in axes.lines:
         half = 0.4 * line.get_markersize() * points
         if line.get_marker() != "None" and half > 1.5 * points:  # not the points of thrust
@@ -336,8 +333,8 @@ def place_names(axes: Axes) -> None:
     for name in names:
         first, box = np.array(name.xyann), name.get_window_extent()
         ways = complex(*first) / np.hypot(*first) * turns
-        reaches = [reach_name(name.get_text(), np.array([w.real, w.imag])) for w in ways]
-        offsets = [*reaches, *(1.8 * reach for reach in reaches)]
+        text, both = name.get_text(), [*ways, *(1.8 * ways)]
+        offsets = [reach_name(text, np.array([w.real, w.imag])) for w in both]
         boxes = [box.translated(*(points * (offset - first))) for offset in offsets]
 
         def cost(box: Bbox) -> int:
