@@ -84,18 +84,18 @@ class Page(Figure):
             engine = self.get_layout_engine()
             if engine is not None and any(axes.get_aspect() != "auto" for axes in self.axes):
                 engine.execute(self)
-                self._trim(engine)
+                self._trim(engine, renderer)
             for axes in self.axes:
-                place_names(axes)
+                place_names(axes, renderer)
         super().draw(renderer)
 
-    def _trim(self, engine: LayoutEngine) -> None:
+    def _trim(self, engine: LayoutEngine, renderer: RendererBase) -> None:
         """Cut the height that a single drawing, true to scale and less high, leaves empty."""
         drawn = [axes for axes in self.axes if axes.get_label() != "<colorbar>"]
         if len(drawn) == 1 and drawn[0].axison:
             drawn[0].apply_aspect()
             place = drawn[0].get_position(original=True).y0 * self.get_figheight()
-            below = drawn[0].get_tightbbox().y0 / self.dpi
+            below = drawn[0].get_tightbbox(renderer).y0 / self.dpi
             self.set_figheight(self.get_figheight() - max(below - place, 0.0))
             engine.execute(self)
 
@@ -313,14 +313,14 @@ def reach_name(name: str, way: Array, size: float = Size.NOTE) -> Array:
     return (4.0 + size * (0.4 + 0.28 * abs(way[0]) * len(name))) * way
 
 
-def place_names(axes: Axes) -> None:
+def place_names(axes: Axes, renderer: RendererBase) -> None:
     """Turn names about their points where they would cover others, hinges, ties or edges."""
     names = [text for text in axes.texts if text.get_gid() == "beside"]
     if not names:
         return
     axes.apply_aspect()
     points = axes.figure.dpi / 72.0
-    taken = [text.get_window_extent() for text in axes.texts if text not in names]
+    taken = [text.get_window_extent(renderer) for text in axes.texts if text not in names]
     for line in axes.lines:
         half = 0.4 * line.get_markersize() * points
         if line.get_marker() != "None" and half > 1.5 * points:  # not the points of thrust
@@ -331,7 +331,7 @@ def place_names(axes: Axes) -> None:
         edges += map(drawn.get_transform().transform_path, drawn.get_paths())
     turns = np.exp(1j * np.deg2rad([0.0, 45.0, -45.0, 90.0, -90.0, 135.0, -135.0, 180.0]))
     for name in names:
-        first, box = np.array(name.xyann), name.get_window_extent()
+        first, box = np.array(name.xyann), name.get_window_extent(renderer)
         ways = complex(*first) / np.hypot(*first) * turns
         text, both = name.get_text(), [*ways, *(1.8 * ways)]
         offsets = [reach_name(text, np.array([w.real, w.imag])) for w in both]

@@ -4,6 +4,7 @@ import re
 import struct
 from dataclasses import replace
 from html import escape
+from io import BytesIO
 from itertools import combinations
 from pathlib import Path
 
@@ -130,6 +131,8 @@ def test_names_beside_points_cover_neither_each_other_nor_hinges():
     assert all(axes.bbox.containsx(x) for box in boxes for x in (box.x0, box.x1))
     placed = [name.xyann for name in names]
     axes.figure.draw_without_rendering()
+    assert [name.xyann for name in names] == placed
+    axes.figure.savefig(BytesIO(), format="svg")  # of other pixels
     assert [name.xyann for name in names] == placed
 
 
