@@ -1,16 +1,6 @@
 """Mechanisms verified by kinematics: rigid-block motions that only the failed joints permit.
 
 The motion is the optimum of a linear programme over the block motions (`verified_mechanism`).
-Before it is solved, a smaller problem rules out most states. Blocks between which no joint has
-failed are one body; where all are joined to the ground, nothing moves. The gaps g of the joints
-between bodies, openings and slips, are compatible where every closed loop of bodies closes:
-Rᵀ g = 0, with R a basis of the self-stresses, Gᵀ R = 0. A motion that the failed joints permit is
-then a point of a small cone:
-
-    Rᵀ g = 0,   g >= 0 where a joint moves one way only,   g = 0 where it does not move.
-
-It has three equations a loop (Gordan's alternative: either such a point exists, or a self-stress
-that presses every failed joint shut).
 """
 
 from dataclasses import dataclass, replace
@@ -21,8 +11,6 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.optimize import nnls
-from scipy.sparse.csgraph import dijkstra
 
 from archfem._display import ProgressReport
 from archfem._recent import RecentResults
@@ -37,8 +25,6 @@ from archfem.joints.criteria import (
     with_failure_flags,
 )
 from archfem.joints.resultants import check_instant
-from archfem.joints.rigid_kinematics import jump_entries
-from archfem.limit.displaced_blocks import merge_blocks
 from archfem.limit.linear_programme import RigidBlocks, solve_linear
 from archfem.limit.mechanism_count import (
     Mechanism,
@@ -231,9 +217,8 @@ def first_verified_mechanism(
         def move() -> Mechanism | None:
             known = len(verifier.moves)
             progress.show(f"{times[instant]:.3g} of {times[-1]:.3g} s, {known} patterns")
-            permitted = verifier.loop_check.permits_motion(freedoms[instant])
-            motion = verifier.verify(joints.isel(time=instant)) if permitted else None
-            return motion.moved if motion and motion.kind != "none" else None
+            motion = verifier.verify_if_moving(joints.isel(time=instant))
+            return motion.moved if motion else None
 
         # instants with the same pattern of freedoms share the answer
         moved = verifier.moves.look_up(freedoms[instant].astype(np.int8).tobytes(), move)
@@ -278,11 +263,6 @@ class Verifier:
         roles = {rigid.blocks[n].part: rigid.blocks[n].role for n in rigid.free}
         return select_assessed_parts(roles)
 
-    @cached_property
-    def loop_check(self) -> "LoopCheck":
-        """Fast check that excludes most states in which the assessed parts cannot move."""
-        return LoopCheck(self.blocks, self.parts)
-
     def verify(self, joints: xr.Dataset) -> VerifiedMechanism:
         """Search for a motion at one instant, as `verified_mechanism` does.
 
@@ -298,7 +278,7 @@ class Verifier:
         check_instant(self.structure, joints)
         freedoms = self.freedoms(joints)
         scaled = self._motions.look_up(
-            freedoms.tobytes(), lambda: _largest_motion(self.blocks, freedoms)
+            freedoms.tobytes(), lambda: largest_motion(self.blocks, freedoms)
         )
         tolerance = 1e-6  # least motion, relative to the largest allowed, that counts as one
         gaps = (self.blocks.kinematics @ (self.blocks.coordinate_units * scaled)).reshape(3, -1)
@@ -328,7 +308,7 @@ class Verifier:
         return RecentResults(MAX_KNOWN_PATTERNS)
 
     def verify_if_moving(self, joints: xr.Dataset) -> VerifiedMechanism | None:
-        """Search for a motion as `verify` does, after the fast check of the loops.
+        """Search for a motion of rings and piers, as `verify` does.
 
         Args:
             joints: as for `verify`.
@@ -336,8 +316,6 @@ class Verifier:
         Returns:
             The motion and its class; None where no ring and no pier can move.
         """
-        if not self.loop_check.permits_motion(self.freedoms(joints)):
-            return None
         mechanism = self.verify(joints)
         return None if mechanism.kind == "none" else mechanism
 
@@ -382,7 +360,7 @@ def get_verifier(structure: Structure) -> Verifier:
     return Verifier(structure)
 
 
-def _largest_motion(blocks: RigidBlocks, freedoms: Array) -> Array:
+def largest_motion(blocks: RigidBlocks, freedoms: Array) -> Array:
     """Solve the programme of `verified_mechanism` for the scaled motion (3 n_free,)."""
     sense = np.where(freedoms == 2.0, 0.0, freedoms)
     gaps = blocks.kinematics @ sparse.diags(blocks.coordinate_units)
@@ -402,113 +380,3 @@ MAX_KNOWN_PATTERNS = 4096
 # Those whose mechanism is kept, or that there is none, of some hundred bytes each: a run of 30 s of
 # a gate of 52 stones has 14 000, and is searched again by other criteria and from its file
 MAX_KNOWN_MOVES = 100_000
-
-
-@dataclass(frozen=True, eq=False)
-class LoopCheck:
-    """Compatibility of gaps around all loops of bodies, for the motion of some parts.
-
-    A body is made of blocks between which no joint has failed.
-    """
-
-    blocks: RigidBlocks
-    parts: tuple[str, ...]  # names of the parts that must move
-
-    @cached_property
-    def judged(self) -> Numbers:
-        """Numbers of the free blocks of the parts."""
-        structure = self.blocks.structure
-        judged = [k for k in structure.free if structure.blocks[k].part in self.parts]
-        return np.array(judged, dtype=np.intp)
-
-    def find_bodies(self, failed: Flags) -> Numbers:
-        """Return the body of each block, -1 for the ground, where some joints have failed."""
-        return merge_blocks(self.blocks.structure, ~failed)
-
-    def self_stresses(self, joints: Numbers, bodies: Numbers) -> Array:
-        """Return an orthonormal basis R of the self-stresses of joints (3 n_joints, r) [-]."""
-        structure = self.blocks.structure
-        (intrados, extrados), normals = structure.ends[joints].swapaxes(0, 1), structure.normals
-        directions = normals[joints], normals[joints], structure.tangents[joints]
-        references = structure.centroids[np.unique(bodies, return_index=True)[1][1:]]
-        row, body, values = jump_entries(
-            np.concatenate(directions),
-            np.concatenate([intrados, extrados, intrados]),
-            np.tile(bodies[structure.pairs[joints]], (3, 1)),
-            references,
-        )
-        gaps = np.zeros((3 * len(joints), len(references), 3))
-        gaps[row, body] = values
-        gaps = gaps.reshape(len(gaps), -1)
-        basis = np.linalg.qr(gaps, mode="complete")[0][:, gaps.shape[1] :]
-        return np.where(np.abs(basis) > 1e-12, basis, 0.0)  # round-off: the joint is in no loop
-
-    @cached_property
-    def _answers(self) -> RecentResults[bool]:
-        """Answers of `permits_motion` by the freedoms: many histories share them."""
-        return RecentResults(MAX_KNOWN_PATTERNS)
-
-    def permits_motion(self, freedoms: Array) -> bool:
-        """Return whether the failed joints may permit a motion of the parts."""
-        return self._answers.look_up(
-            freedoms.tobytes(), lambda: self._closes_any_loops(freedoms.reshape(3, -1))
-        )
-
-    def _closes_any_loops(self, freedoms: Array, large: int = 50) -> bool:
-        """Return `permits_motion`, by the loops between bodies.
-
-        Where more than `large` joints between bodies have failed, the programme takes less time: in
-        a wall of 417 joints 14 ms, and the loops of 46, 81 and 113 joints 10 ms, 0.2 and 1.1 s.
-        """
-        bodies = self.find_bodies(freedoms.any(axis=0))
-        judged = np.unique(bodies[self.judged])
-        judged = judged[judged >= 0]
-        if not len(judged):
-            return False  # all parts are joined to the ground
-        one, other = bodies[self.blocks.structure.pairs].T
-        joints = np.flatnonzero(one != other)
-        if len(joints) > large:
-            return True
-        required = np.ones(3 * len(joints), dtype=bool)
-        if len(judged) <= bodies.max():  # others may move without them
-            required = np.tile(_find_paths(one[joints], other[joints], judged), 3)
-        freedoms = freedoms[:, joints].ravel()
-        # one column for each freedom, two for a slip in either sense
-        either = np.flatnonzero(freedoms == 2.0)
-        rows = np.concatenate([np.flatnonzero(freedoms), either])
-        sense = np.concatenate([np.sign(freedoms[freedoms != 0.0]), -np.ones(len(either))])
-        columns = self.self_stresses(joints, bodies)[rows].T * sense
-        # some required joint must move: any one-way gap, or a two-way slip in one of its senses
-        gaps = [np.where(required[rows] & (freedoms[rows] != 2.0), 1.0, 0.0)]
-        for slip in either[required[either]]:
-            gaps += [side * sense * (rows == slip) for side in (1, -1)]
-        return any(_closes_loops(columns, gap) for gap in gaps)
-
-
-def _find_paths(one: Numbers, other: Numbers, judged: Numbers) -> Flags:
-    """Return the joints, between bodies, on a path from the ground to each judged body."""
-    # A body whose path neither opens nor slips anywhere does not move. Weights make paths avoid
-    # joints between other bodies, whose own motion does not count.
-    near = np.isin(one, judged) | np.isin(other, judged)
-    size, vertices = int(max(one.max(), other.max())) + 2, (one + 1, other + 1)
-    weights = np.zeros((size, size))
-    weights[vertices] = weights[vertices[::-1]] = np.where(near, 1.0, float(len(one)))
-    before = dijkstra(weights, indices=0, return_predecessors=True)[1]
-    on_path, pending = np.zeros((size, size), dtype=bool), judged + 1
-    while len(pending := pending[pending > 0]):
-        on_path[pending, before[pending]] = on_path[before[pending], pending] = True
-        pending = np.unique(before[pending])
-    return on_path[vertices]
-
-
-def _closes_loops(columns: Array, gap: Array, tolerance: float = 1e-5) -> bool:
-    """Return whether movements x >= 0 with gap·x = 1 close every loop, columns x = 0."""
-    # The tolerance of the misfit is well above that of the linear programme (1e-7), so that the
-    # programme and not this check decides close cases.
-    if not gap.any():
-        return False
-    try:
-        misfit = nnls(np.vstack([columns, gap]), np.append(np.zeros(len(columns)), 1.0))[1]
-    except RuntimeError:  # no convergence: let the programme decide
-        return True
-    return bool(misfit < tolerance)

@@ -14,8 +14,9 @@ from typing import NamedTuple
 import numpy as np
 
 from archfem._typing import Array, Flags, Numbers
+from archfem.limit.displaced_blocks import merge_blocks
 from archfem.limit.linear_programme import RigidBlocks
-from archfem.limit.mechanism_kinematics import LoopCheck, find_rigid_regions
+from archfem.limit.mechanism_kinematics import find_rigid_regions
 from archfem.masonry.structure import Structure, join_joint_names, join_words
 
 # Motions below this share of the largest are round-off, or do not count for a name [-]
@@ -112,7 +113,7 @@ class NamedMotion:
     @cached_property
     def bodies(self) -> Numbers:
         """Body of each block, -1 for the ground."""
-        return LoopCheck(self.blocks, ()).find_bodies(abs(self.gaps).max(axis=0) > self.least)
+        return merge_blocks(self.structure, abs(self.gaps).max(axis=0) <= self.least)
 
     @property
     def is_chain(self) -> bool:
