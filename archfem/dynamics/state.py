@@ -1,6 +1,6 @@
 """States, steps and batches of steps, exchanged between solvers and the recorder of a run."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
@@ -119,21 +119,6 @@ class Batch:
         values = {field.name: getattr(self, field.name) for field in fields(self)}
         arrays: Any = {key: v[:steps] for key, v in values.items() if isinstance(v, np.ndarray)}
         return replace(self, **arrays)
-
-
-def join_batches(batches: Sequence[Batch]) -> Batch:
-    """Return consecutive batches with coordinates as one."""
-    parts = tuple(batches)
-    ends = np.cumsum([len(part.times) for part in parts])
-
-    def state(k: int) -> State:
-        number = int(np.searchsorted(ends, k, side="right"))
-        return parts[number].state(k - int(ends[number]) + len(parts[number].times))
-
-    names = ["times", "resultants", "iterations", "smallest_step", "energy", "q"]
-    names += [] if parts[0].faces is None else ["faces"]
-    arrays: Any = {name: np.concatenate([getattr(p, name) for p in parts]) for name in names}
-    return Batch(**arrays, state=state)
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,8 +17,7 @@ import numpy as np
 from archfem._typing import Array
 from archfem.dynamics.slip_error import SlipError, least_compression, second_derivatives
 from archfem.dynamics.solvers.integrator import Stepper
-from archfem.dynamics.state import Batch, State, join_batches
-from archfem.errors import DidNotConverge
+from archfem.dynamics.state import Batch, State
 
 # Error of the slip in one step over the joint's depth, and over the tolerance on |e| [-]. A block
 # that slides under ten motions then errs by at most 0.5 % of its way to and fro
@@ -50,32 +49,8 @@ class AdaptiveStepper:
         return self.unmet / max(self.taken, 1)
 
     def batches(self, start: State, end: float) -> Iterator[Batch]:
-        """Yield the steps from a state to a time [s], some hundred at a time."""
-        pending: list[Batch] = []
-        try:
-            for batch in self._yield_batches(start, end):
-                if batch.fallback or batch.q is None:
-                    yield from self._join_pending(pending)
-                    yield batch
-                    continue
-                pending.append(batch)
-                if sum(len(each.times) for each in pending) >= 256:
-                    yield from self._join_pending(pending)
-        except DidNotConverge:
-            yield from self._join_pending(pending)  # the record ends with the last step
-            raise
-        yield from self._join_pending(pending)
-
-    def _join_pending(self, pending: list[Batch]) -> Iterator[Batch]:
-        """Yield all pending batches as one, if there are any, and forget them."""
-        if pending:
-            batch = join_batches(pending)
-            pending.clear()
-            yield batch.with_readings(self.stepper.equation.model.observer())
-
-    def _yield_batches(self, start: State, end: float) -> Iterator[Batch]:
         """Yield the steps from a state to a time [s], between two checks of their errors."""
-        sample = self.stepper.equation.motion.dt
+        model, sample = self.stepper.equation.model, self.stepper.equation.motion.dt
         shortest, longest = 1e-4, 2e-2  # not halved, and not doubled, any more [s]
         finest = int(np.floor(np.log2(shortest / sample) + 0.5))
         coarsest = max(int(np.floor(np.log2(longest / sample))), finest)
@@ -97,7 +72,7 @@ class AdaptiveStepper:
                 continue
             done += 2**level * len(batch.times)
             state = batch.state(len(batch.times) - 1)
-            yield batch
+            yield batch if batch.q is None else batch.with_readings(model.observer())
             if len(batch.times) < count and level > 0:
                 level -= 1
             elif worst < 0.1 * self.tolerance and level < coarsest - finest:
