@@ -49,20 +49,12 @@ def jump_rates(
 
     A jump is the motion of the second body of a pair less that of the first; -1 does not move.
     """
-    row, body, values = jump_entries(directions, places, pairs, centres)
-    entries = np.repeat(row, 3), (3 * body[:, None] + np.arange(3)).ravel()
-    rates = sparse.csr_matrix((values.ravel(), entries), (len(pairs), 3 * len(centres)))
-    rates.eliminate_zeros()
-    return rates
-
-
-def jump_entries(
-    directions: Array, places: Array, pairs: Numbers, centres: Array
-) -> tuple[Numbers, Numbers, Array]:
-    """Return rows, bodies and values (n, 3) of the entries of `jump_rates`, by rows."""
     row, side = np.nonzero(pairs >= 0)
     body = pairs[row, side]
     motion: Array = rigid_motion_matrix(places[row], centres[body])
     motion[side == 0] *= -1.0
-    values: Array = np.einsum("na,nac->nc", directions[row], motion)
-    return row, body, values
+    values = np.einsum("na,nac->nc", directions[row], motion)
+    entries = np.repeat(row, 3), (3 * body[:, None] + np.arange(3)).ravel()
+    rates = sparse.csr_matrix((values.ravel(), entries), (len(pairs), 3 * len(centres)))
+    rates.eliminate_zeros()
+    return rates

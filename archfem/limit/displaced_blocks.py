@@ -19,7 +19,7 @@ from scipy.sparse import csgraph, csr_matrix
 
 from archfem._typing import Array, Flags, Numbers
 from archfem.errors import DidNotConverge
-from archfem.joints.rigid_kinematics import jump_entries, jump_rates
+from archfem.joints.rigid_kinematics import jump_rates
 from archfem.limit.linear_programme import HELD_SHARE, NoEquilibrium, solve_linear
 from archfem.masonry.block import rotate
 from archfem.masonry.loads import AttachedLoad
@@ -362,11 +362,7 @@ class Bodies:
 
     def rates(self, contacts: Sequence[Contact]) -> Array:
         """Return rates of the contacts' gaps and slips (2, n_contacts, 3 n_bodies)."""
-        # entry by entry: small sparse matrices take longer
-        row, body, values = jump_entries(*self._jumps(contacts))
-        rates = np.zeros((2 * len(contacts), self.count, 3))
-        np.add.at(rates, (row, body), values)
-        return rates.reshape(2, len(contacts), 3 * self.count)
+        return np.stack([rates.toarray() for rates in self.sparse_rates(contacts)])
 
     def sparse_rates(self, contacts: Sequence[Contact]) -> list[csr_matrix]:
         """Return the rates of gaps and of slips, each (n_contacts, 3 n_bodies)."""

@@ -202,12 +202,8 @@ class RigidBlocks:
     @cached_property
     def balance(self) -> sparse.csr_matrix:
         """Equilibrium matrix of free blocks in the programme's units (3 n_free, 3 n_joints)."""
-        # products of sparse matrices would take longer than a programme of a ring
-        balance = self.kinematics.T.tocsr()
-        row = np.repeat(np.arange(balance.shape[0]), np.diff(balance.indptr))
-        sign = np.repeat([-1.0, -1.0, 1.0], len(self.structure.depths))
-        balance.data *= self.coordinate_units[row] * sign[balance.indices]
-        return balance
+        signs = sparse.diags(np.repeat([-1.0, -1.0, 1.0], len(self.structure.depths)))
+        return (sparse.diags(self.coordinate_units) @ self.kinematics.T @ signs).tocsr()
 
     def reduce(
         self, columns: sparse.csr_matrix, friction: Array, coheres: Flags
