@@ -82,7 +82,8 @@ class NamedMotion:
     @cached_property
     def touching(self) -> Flags:
         """Whether each joint moves and stays in contact, with dilatancy by μ at most."""
-        friction = np.where(self.gaps[2] == 0.0, 0.0, self.structure.friction)
+        friction = self.structure.friction
+        friction = np.where(np.isfinite(friction), friction, 0.0)  # what never slides never dilates
         apart = self.gaps[:2].min(axis=0) - friction * abs(self.gaps[2]) > self.least
         return (abs(self.gaps).max(axis=0) > self.least) & ~apart
 

@@ -9,7 +9,8 @@ import pytest
 from bonded import bonded_wall
 
 import archfem as af
-from archfem.limit.mechanism_names import name_mechanism
+from archfem.limit.linear_programme import RigidBlocks
+from archfem.limit.mechanism_names import NamedMotion, name_mechanism
 
 PUSH = af.BodyForce(1.0)
 
@@ -150,6 +151,19 @@ def test_piers_that_rock_together_sway_and_do_not_slide():
             x, y = wall.centroids[k] - [points[:, 0].max(), 0.0]
             motion[k] = -turn * y, turn * x, turn
     assert name_mechanism(wall, motion) == "sway of all on ground"
+
+
+@pytest.mark.parametrize("friction", [None, 0.6])
+def test_a_joint_that_comes_apart_does_not_slide(friction):
+    """The upper of two blocks moves up by 1 and sideways by 0.2, less than μ allows at a touch."""
+    contact = af.Contact(1e9, 4e8, friction)
+    stack = af.column(breadth=1.0, heights=[1.0, 1.0], contact=contact)
+    motion = np.zeros((len(stack.blocks), 3))
+    motion[-1] = 0.2, 1.0, 0.0
+    found = NamedMotion(RigidBlocks(stack), motion)
+    assert not found.touching.any()
+    motion[-1] = 0.2, 0.0, 0.0
+    assert NamedMotion(RigidBlocks(stack), motion).sliding.sum() == 1
 
 
 def test_one_stone_has_its_name():
