@@ -248,27 +248,30 @@ def explain_defaults(case: Case) -> str:
 def _explain_finishes(case: Case) -> Iterator[str]:
     """Explain each finish of the case in a line: its key, its law with the range, and sources."""
     structure = case.structure
-    for contact, joint in {joint.contact: joint for joint in structure.joints}.items():
+    for contact in dict.fromkeys(joint.contact for joint in structure.joints):
         own = find_table(case.settings, contact)
         if (finish := own.given.get("finish")) is None:
             continue
         ranges = list_finish_ranges(structure, contact, finish)
         values = ", ".join(f"{word} {text}" for word, text in ranges.values())
-        sources = "; ".join(finish_range(structure, joint, finish).sources[:3])
-        yield f'{own.path}.finish = "{finish}": {values}; {sources}'
+        yield f'{own.path}.finish = "{finish}": {values}'
 
 
 def list_finish_ranges(
     structure: Structure, contact: Contact, finish: str
 ) -> dict[str, tuple[str, str]]:
-    """Return name and usual value with its range of each property that follows from a finish."""
+    """Return name, and value with range and source, of what follows from a finish, by key."""
     joint = next(joint for joint in structure.joints if joint.contact == contact)
     law = finish_range(structure, joint, finish)
-    found = {"normal_stiffness": ("k_n", f"{_range_text(law.initial, 1e9)} MPa/mm at first")}
+    # mortar has one source of both
+    along = [x for x in law.sources if x.startswith("k_s")] or law.sources
+    across = f" ({'; '.join(x for x in law.sources if not x.startswith('k_s'))})"
+    first = f"{_range_text(law.initial, 1e9)} MPa/mm at first{across}"
+    found = {"normal_stiffness": ("k_n", first)}
     if contact.closure:
-        found["closure"] = "closing", f"{_range_text(law.closure, mm)} mm at most"
+        found["closure"] = "closing", f"{_range_text(law.closure, mm)} mm at most{across}"
     depth = format_mm(usual_depth(structure, contact))
-    of = f"at {USUAL_STRESS / MPa:g} MPa on joints {depth} deep, their median"
+    of = f"at {USUAL_STRESS / MPa:g} MPa on joints {depth} deep, their median ({'; '.join(along)})"
     return found | {"shear_stiffness": ("k_s", f"{_range_text(law.shear, 1e9)} MPa/mm {of}")}
 
 

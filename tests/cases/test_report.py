@@ -717,7 +717,9 @@ def test_the_paper_is_cited_where_a_value_is_its_own_alone():
     found = [(name, value) for name, value, _ in rows if name.startswith("soil to stone")]
     name = f"soil to stone and {len(own) - 1} more"
     assert len(own) > 5
-    assert found[0] == (f"{name}: k_n", " to ".join(ends))
+    # of the joint and of the fill up to the centres of its pieces
+    series = "(1/k: that of the joint, plus d/E of the fill up to the centres of its pieces)"
+    assert found[0] == (f"{name}: k_n", f"{' to '.join(ends)} {series}")
     assert [x for x, _ in found] == [f"{name}: {word}" for word in ("k_n", "k_s", "μ")]
     # a given k_n is that of the joint alone, and in series with that of the fill it is less
     tables["contacts"] = {"soil to stone": {"normal_stiffness": "2 MPa/mm"}}
@@ -728,7 +730,7 @@ def test_the_paper_is_cited_where_a_value_is_its_own_alone():
     rows = tabulate_inputs(report_data.ReportData(case, {})).rows
     assert [row for row in rows if row[0].startswith(f"{name}: k_n")] == [
         (f"{name}: k_n", "2 MPa/mm", "given"),
-        (f"{name}: k_n with its pieces of fill", " to ".join(ends), "inferred"),
+        (f"{name}: k_n with its pieces of fill", f"{' to '.join(ends)} {series}", "inferred"),
     ]
 
 
@@ -863,9 +865,16 @@ def test_stiffness_by_a_finish_is_inferred_and_numbers_have_their_units():
     law = af.joint_stiffness(30e9, 1.0, "dressed")
     low, usual, high = (f"{each / 1e9:.2g}" for each in law.initial)
     said = f"{usual} ({low} to {high}) MPa/mm at first"
-    assert marks["stone to stone: k_n"] == (said, "inferred")
+    value, mark = marks["stone to stone: k_n"]
+    assert (value.partition(" (k_i")[0], mark) == (said, "inferred")
+    # each with the sources of its relations
+    assert "k_i and δ_m: Bandis, Lumsden and Barton (1983)" in value
+    assert "usual: 0.2 k_n, Demirel and Aldemir (2021)" in marks["stone to stone: k_s"][0]
+    assert "k_s, low: Barton and Choubey (1977)" not in value
     low, usual, high = (f"{each * 1e3:.2g}" for each in sorted(law.closure))
-    assert marks["stone to stone: closing"] == (f"{usual} ({low} to {high}) mm at most", "inferred")
+    value, mark = marks["stone to stone: closing"]
+    assert value.startswith(f"{usual} ({low} to {high}) mm at most (k_i and δ_m: Bandis")
+    assert mark == "inferred"
     assert marks["stone to stone: k_s"][1] == "inferred"
     # also of a structure from Python, whose stiffnesses are those of the finish
     made = write_structure(af.masonry.with_finish(af.Case.of(tables).structure, "dressed"))

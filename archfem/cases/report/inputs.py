@@ -69,6 +69,9 @@ _TABLE_KEYS = ("periods", "values", "vertical_values")
 # Quantities of which a row may state a range, by their words
 _VARIED = {_WEIGHT: "unit_weight", "k_n": "normal_stiffness", "k_s": "shear_stiffness"}
 
+# Formula of stiffnesses that follow from a fill
+_IN_SERIES = " (1/k: that of the joint, plus d/E of the fill up to the centres of its pieces)"
+
 # Properties that may be left out: name in texts, and unit
 _FURTHER_PROPERTIES = {
     "poisson": ("ν", 1.0, ""),
@@ -318,6 +321,7 @@ def _property_rows(data: ReportData) -> Iterator[Row]:
                     alone = defaults.value_text(key, in_unit(own.given[key], "Pa/m", key))
                     yield f"{name}: {word}", alone, mark, *path
                     word, mark = f"{word} with its pieces of fill", "inferred"
+                text += _IN_SERIES * (cls is Contact and mark == "inferred")
             yield f"{name}: {word}", text, mark, *path
 
 
@@ -352,6 +356,7 @@ def _list_properties(data: ReportData, item: Material | Contact) -> Iterator[Row
             text += f" ({reason if key == 'young' else reason.partition(';')[0]})"
         elif mark == "default" and value is not None:
             mark = "inferred"  # from the shape
+            text += _IN_SERIES * (word in ("k_n", "k_s"))
         if key not in unused | follows:
             yield word, text, mark, f"{path}.{key}"
     if "finish" in given.keys() - unused and isinstance(item, Contact):
