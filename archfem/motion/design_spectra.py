@@ -538,8 +538,8 @@ class FloorSpectrum:
 
     and nowhere below S(T, ξ), the spectrum of the ground, as the rule requires beyond T_1 alone.
     It has no vertical. With height and storeys in place of the amplification, this is
-    3 n / (2 n + 1) z / H at the foot z of each mechanism of an assessment, also above H;
-    `horizontal` is then that of the ground, z = 0.
+    3 n / (2 n + 1) z / H at the foot z of each mechanism of an assessment. Above H it is that of
+    z = H, where the mode is 1; `horizontal` is then that of the ground, z = 0.
 
     Args:
         ground_spectrum: spectrum of the ground, S.
@@ -613,7 +613,9 @@ class FloorSpectrum:
         """Return that of what stands at a height above the ground [m]; itself without `height`."""
         if self.height is None or self.storeys is None:
             return self
-        share = 3.0 * self.storeys / (2.0 * self.storeys + 1.0) * foot / self.height
+        # the mode of eq. C7.2.10 is 1 at the top of the building, and carries what is above it
+        mode = min(foot / self.height, 1.0)
+        share = 3.0 * self.storeys / (2.0 * self.storeys + 1.0) * mode
         return replace(self, period=self.own_period, amplification=share, height=None, storeys=None)
 
     def describe(self) -> str:

@@ -13,7 +13,7 @@ from archfem.limit.fill_range import FillAssumption, FillRange
 from archfem.masonry.block import Block
 from archfem.masonry.loads import AttachedLoad
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
-from archfem.masonry.structure import Structure
+from archfem.masonry.structure import Structure, list_stack
 from archfem.models.model import Doubt
 from archfem.motion.design_spectra import (
     DesignSpectrum,
@@ -28,6 +28,9 @@ from archfem.motion.design_spectra import (
 from archfem.motion.motion import Motion
 from archfem.motion.response_spectra import response_spectrum
 from archfem.units import STANDARD_GRAVITY, format_ratio
+
+# What a mechanism is compared with
+Demand = DesignSpectrum | Motion
 
 # Outcome of a check that passes with the weights of single blocks alone
 BY_SPLIT = "passes or fails by the split of weights"
@@ -87,10 +90,8 @@ class LimitState:
             options: Any = {"ends": "(]", "remedy": "give a ratio, such as 0.4 for 40 %"}
             check_between(getattr(self, key), f"{self.name}, {key} [-]", 0.0, most, **options)
 
-    def doubt(
-        self, spectrum: DesignSpectrum | Motion, structure: Structure, foot: float
-    ) -> list[Doubt]:
-        """Return doubts about a spectrum of another code than NTC, and about one of the ground.
+    def doubt(self, spectrum: Demand, structure: Structure, foot: float) -> list[Doubt]:
+        """Return doubts about a spectrum of another code than NTC, and about heights.
 
         Args:
             spectrum: spectrum of the demand; a table and a motion are of no code, and of the foot
@@ -105,6 +106,12 @@ class LimitState:
             words = f"the check is one of NTC, which was not made for a spectrum of {codes[0]}"
             remedy = "give limit_state with the rules of its code, or a spectrum of NTC-2018"
             found.append(Doubt(words, remedy))
+        stack = len(structure.free) == 1 or list_stack(structure)
+        if isinstance(spectrum, FloorSpectrum) and spectrum.height and stack:
+            words = "the height of its foot above the ground is not given, and taken as 0: what "
+            words += "moves is shaken as at z = {:.3g} m, and higher up by more"
+            remedy = "give `above`, the height of its foot, 0 on the ground"
+            found += [Doubt(words, remedy, (foot,))] * (structure.above is None)
         if above := find_height_left_out(spectrum, structure, foot):
             words = "the spectrum is that of the ground, and {:.3g} m above it, at the foot of what"
             words += " moves, it is larger: each ratio is {}"
@@ -114,12 +121,13 @@ class LimitState:
 
     def rate(
         self,
-        spectrum: DesignSpectrum | Motion,
+        spectrum: Demand,
         q: float,
         confidence: float,
         foot: float,
         moved: Array,
         curve: Array,
+        free_period: float | None = None,
     ) -> tuple[float, float]:
         """Return the ratios of the linear check and by displacements of what stands at a height.
 
@@ -130,13 +138,19 @@ class LimitState:
             foot: height above the ground [m].
             moved: spectral displacements (n,) [m].
             curve: accelerations there (n,) [m/s²].
+            free_period: T_0 of what vibrates freely [s]; None of what is held until it moves.
         """
         own = place_spectrum(spectrum, foot)
-        linear = q * float(curve[0]) / confidence / peak_acceleration(own)
-        return linear, self.check(own, confidence, moved, curve).ratio
+        linear = q * float(curve[0]) / confidence / first_acceleration(own, free_period)
+        return linear, self.check(own, confidence, moved, curve, free_period).ratio
 
     def check(
-        self, spectrum: DesignSpectrum | Motion, confidence: float, moved: Array, curve: Array
+        self,
+        spectrum: Demand,
+        confidence: float,
+        moved: Array,
+        curve: Array,
+        free_period: float | None = None,
     ) -> "AssessmentCheck":
         """Check the displacement of a capacity curve against a spectrum.
 
@@ -145,6 +159,7 @@ class LimitState:
             confidence: FC, which reduces the accelerations [-].
             moved: spectral displacements (n,) [m].
             curve: accelerations there (n,) [m/s²].
+            free_period: T_0 of what vibrates freely [s]; None of what is held until it moves.
         """
         capacity = self.share * float(moved[-1])
         secant = secant_period(moved, curve, self.secant_share * capacity)
@@ -154,7 +169,7 @@ class LimitState:
         acceleration = spectral_acceleration(spectrum, periods, self.damping)
         demand = float((acceleration * (periods / (2.0 * np.pi)) ** 2).max())
         # nor does it fail where the ground does not set it in motion
-        begins = float(curve[0]) / confidence / peak_acceleration(spectrum)
+        begins = float(curve[0]) / confidence / first_acceleration(spectrum, free_period)
         ratio = max(capacity / demand, begins)
         given = capacity, demand, "m", ratio, period, self.source
         return AssessmentCheck(self.name, *given, amplified=describe_floor(spectrum))
@@ -343,32 +358,48 @@ def _say_passing(decisive: float, apart: float) -> str:
     return "fails" if apart < 1.0 else "passes or fails, by the split of weights,"
 
 
-def place_spectrum(spectrum: DesignSpectrum | Motion, foot: float) -> DesignSpectrum | Motion:
+def place_spectrum(spectrum: Demand, foot: float) -> Demand:
     """Return the spectrum of what stands at a height above the ground [m]."""
     return spectrum.at(foot) if isinstance(spectrum, FloorSpectrum) else spectrum
 
 
-def describe_floor(spectrum: DesignSpectrum | Motion) -> str:
+def describe_floor(spectrum: Demand) -> str:
     """Describe how a floor amplifies the ground, in brackets; "" where it does not."""
     if not isinstance(spectrum, FloorSpectrum) or not spectrum.amplification:
         return ""
     return f" ({spectrum.describe()})"
 
 
-def note_free_elements(spectrum: DesignSpectrum | Motion) -> list[str]:
-    """Note that the linear check is of what does not vibrate by itself, where a floor shakes it."""
-    if not describe_floor(spectrum) or not isinstance(spectrum, FloorSpectrum):
-        return []
-    return [
+def judge_floor(
+    spectrum: Demand, foot: float, free_period: float | None, checks: Sequence["AssessmentCheck"]
+) -> tuple[list[str], list[Doubt]]:
+    """Return notes on the spectrum where a floor shakes a foot, and doubts of checks that pass.
+
+    The linear check is of what does not vibrate by itself: by T_0 those in doubt may fail.
+    """
+    if not isinstance(spectrum, FloorSpectrum) or not (floor := spectrum.at(foot)).amplification:
+        return [], []
+    height = spectrum.height or np.inf
+    words = f"its foot, z = {foot:.4g} m, is above H = {height:.4g} m of the spectrum: z = H is "
+    notes = [f"{words}taken, where the first mode of eq. C7.2.10 is 1"] * (foot > height + 1e-6)
+    if free_period is not None:
+        return notes, []
+    values = spectral_acceleration(floor, floor.own_period * np.linspace(0.0, 1.0, 21), 0.05)
+    times = float(values.max() / values[0])
+    notes.append(
         "the linear check takes a_Z, that of what cross walls hold until it moves; of what "
         "vibrates freely, as a parapet or a gable above its eaves, eq. C8.7.1.9 takes the spectrum "
-        f"at its own period T_0, up to {spectrum.resonance:.3g} times as much"
-    ]
+        f"at its own period T_0, up to {times:.3g} times as much"
+    )
+    # what passes once it moves does not depend on when it begins to
+    least = [(x, max(x.decisive / times, x.moved * (x.unit == "m"))) for x in checks]
+    words = "{} passes with a_Z, and of what vibrates freely its ratio may be {:.3g}, by T_0"
+    remedy = "give free_period, its T_0, or 0 if cross walls hold it until it moves"
+    turn = [Doubt(words, remedy, (x.name, low)) for x, low in least if x.decisive >= 1.0 > low]
+    return notes, turn
 
 
-def spectral_acceleration(
-    spectrum: DesignSpectrum | Motion, periods: Array, damping: float
-) -> Array:
+def spectral_acceleration(spectrum: Demand, periods: Array, damping: float) -> Array:
     """Return the horizontal pseudo-acceleration spectrum at a damping (n,) [m/s²]."""
     if isinstance(spectrum, Motion):
         return response_spectrum(spectrum, periods, damping)
@@ -381,9 +412,10 @@ def spectral_acceleration(
     return np.asarray(STANDARD_GRAVITY * own * beyond**2)
 
 
-def peak_acceleration(spectrum: DesignSpectrum | Motion) -> float:
-    """Return the acceleration of the ground [m/s²]."""
-    return float(spectral_acceleration(spectrum, np.zeros(1), 0.05)[0])
+def first_acceleration(spectrum: Demand, free_period: float | None) -> float:
+    """Return what sets a mechanism in motion: the ground's, or the spectrum's at T_0 [m/s²]."""
+    period = check_between(free_period or 0.0, "free_period [s]", 0.0, 4.0, ends="[]")
+    return float(spectral_acceleration(spectrum, np.array([period]), 0.05)[0])
 
 
 def secant_period(moved: Array, curve: Array, displacement: float) -> float:
@@ -451,9 +483,7 @@ def _check_place(
         )
 
 
-def find_height_left_out(
-    spectrum: DesignSpectrum | Motion, structure: Structure, foot: float
-) -> float:
+def find_height_left_out(spectrum: Demand, structure: Structure, foot: float) -> float:
     """Return how high a foot is above the ground of a spectrum [m], 0 where that matters little."""
     base, tall = structure.above or 0.0, float(np.ptp(structure.ends[..., 1]))
     is_of_foot = isinstance(spectrum, TableSpectrum | Motion)

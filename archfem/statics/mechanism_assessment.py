@@ -28,7 +28,7 @@ import xarray as xr
 
 from archfem._display import DOUBT_MARK, NOTE_MARK, ResultDisplay
 from archfem._files import align_columns
-from archfem._typing import Array, CrushingStrength
+from archfem._typing import Array, CrushingStrength, Seconds
 from archfem._validation import check_between, check_choice, validate_arguments
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.limit.backfill import attach_fill
@@ -62,9 +62,9 @@ from archfem.statics.assessment_checks import (
     describe_difference,
     describe_floor,
     find_height_left_out,
+    first_acceleration,
+    judge_floor,
     list_lower,
-    note_free_elements,
-    peak_acceleration,
     place_spectrum,
     secant_period,
     spectral_acceleration,
@@ -212,9 +212,8 @@ class KinematicAssessment(ResultDisplay):
             own = {"capacity": check.unit, "demand": check.unit, "ratio": "-"}
             rows += [(f"{check.name}: {key}", getattr(check, key), own[key]) for key in own]
         texts = [[name, f"{value:.4g}", unit] for name, value, unit in rows]
-        if self.linear.over_fill is not None:
-            for check in self.checks:
-                texts.append([f"{check.name}: ratio over the fill", check.ratios, "-"])
+        filled = [x for x in self.checks if x.over_fill is not None]
+        texts += [[f"{x.name}: ratio over the fill", x.ratios, "-"] for x in filled]
         return align_columns(["quantity", "value", "unit"], texts)
 
     def _summary(self) -> str:
@@ -295,6 +294,7 @@ def kinematic_assessment(  # noqa: PLR0913  (the factors of the codes are argume
     q: float = 2.0,
     confidence_factor: float = 1.35,
     strength: CrushingStrength = None,
+    free_period: Seconds | None = None,
 ) -> KinematicAssessment:
     """Assess the collapse mechanism under horizontal forces against a spectrum at the ground.
 
@@ -342,6 +342,10 @@ def kinematic_assessment(  # noqa: PLR0913  (the factors of the codes are argume
             not taken into account; Circolare 7/2019, C8.7.1.2.1.3. The value 1.35 of LC1
             is from memory (C8.5.4.1).
         strength: as for `collapse_factor`, where the joints crush [Pa]; in a case that of [limit].
+        free_period: T_0 of what vibrates freely until it moves, as a parapet or a gable above its
+            eaves [s]: the linear check of all that is assessed takes the spectrum there, and none
+            is at rest below it; Circolare 7/2019, eq. C8.7.1.9, and C8.7.1.7 for T_0. 0 where cross
+            walls hold it until it moves; None also, in doubt where a floor shakes it.
 
     Returns:
         Oscillator, capacity curve and checks.
@@ -375,7 +379,7 @@ def kinematic_assessment(  # noqa: PLR0913  (the factors of the codes are argume
     check_assessable(structure, friction, loads)
     search = _Search(
         *(structure, spectrum, float(direction), friction, part, blocks, tuple(loads), rules),
-        *(confidence_factor, q, check_options(structure, friction, strength)),
+        *(confidence_factor, q, check_options(structure, friction, strength), free_period),
     )
     lever = fill.lever if isinstance(fill, Fill) else 0.0
     found = search.assess(lever, fill)
@@ -404,6 +408,7 @@ class _Search:
     confidence_factor: float
     q: float
     strength: float = np.inf  # at which joints crush [Pa]
+    free_period: float | None = None  # T_0 [s]
     bed: int | None = None  # the one joint that moves at first
 
     def assess_above(
@@ -414,7 +419,8 @@ class _Search:
         That of the least ratio by displacements has in `above` that by the linear check.
         """
         lower, law = None, self.friction and "coulomb"  # flat, the whole alone is searched
-        rate = partial(self.rules.rate, self.spectrum, self.q, self.confidence_factor)
+        given = self.spectrum, self.q, self.confidence_factor
+        rate = partial(self.rules.rate, *given, free_period=self.free_period)
         bodies = find_weakest_bodies(self.structure, self.loads, self.direction, rate)
         for bed, blocks in bodies.items():
             if [bed] != [joint for joint, _ in found.hinges]:
@@ -594,7 +600,6 @@ class _Oscillator:
         if self.path is None:
             return []
         found = describe_loads(self.path, self.given.loads, self.ties, self.stretches)
-        found += note_free_elements(self.spectrum)
         collapse = self.path.mechanisms[0].factor
         if factor < (1.0 - 1e-3) * collapse:
             found.append(
@@ -663,16 +668,16 @@ class _Oscillator:
     def linear(self) -> AssessmentCheck:
         """Linear check with a behaviour factor q."""
         confidence, q = self.given.confidence_factor, self.given.q
-        ground = peak_acceleration(self.spectrum)
+        free = self.given.free_period or 0.0
+        ground = first_acceleration(self.spectrum, free)
         capacity = q / confidence * (np.inf if self.path is None else float(self.curve["a"][0]))
         ratio = capacity / ground
-        source = "Circolare 7/2019, C8.7.1.2.1.5 and C8.7.1.2.1.7, eq. C8.7.1.8"
         return AssessmentCheck(
             *(f"linear, q = {q:g}, FC = {confidence:g}", capacity, ground, "m/s²", ratio, np.nan),
-            source,
+            f"Circolare 7/2019, C8.7.1.2.1.5 and C8.7.1.2.1.7, eq. C8.7.1.{9 if free else 8}",
             bounded=self.bounded,
             floor=self.e_star * ratio if self.searched else None,
-            amplified=describe_floor(self.spectrum),
+            amplified=describe_floor(self.spectrum) + f" at T_0 = {free:g} s" * bool(free),
         )
 
     def assess(self) -> KinematicAssessment:
@@ -716,13 +721,15 @@ class _Oscillator:
                 moved = replace(found.displacement, bodies=whole.displacement.ratio)
                 found = replace(found, displacement=moved)
         doubts = [y for x in found.checks for y in (*x.doubt_split(), *x.doubt_end(self.remedy))]
+        given = self.given.spectrum, self.foot, self.given.free_period
+        more, turn = judge_floor(*given, whole.checks)
         ratios = [f"{x.bodies:.3g} by {x.name}" for x in found.checks if x.bodies is not None]
         split = (
             "weights are at the centroids of blocks: one for each body that moves as one gives "
             f"e* = {whole.e_star:.3f}, and the spectrum may be as strong as {join_names(ratios)}"
         )
-        notes = (*found.notes, *[split] * bool(ratios))
-        return replace(found, doubts=(*found.doubts, *doubts), notes=notes)
+        notes = (*found.notes, *more, *[split] * bool(ratios))
+        return replace(found, doubts=(*found.doubts, *doubts, *turn), notes=notes)
 
     @property
     def remedy(self) -> str:
@@ -733,7 +740,7 @@ class _Oscillator:
     def _check_displacement(self) -> AssessmentCheck:
         """Check the displacement of the capacity curve against the spectrum."""
         given, curve = self.given, (self.curve["d"].values, self.curve["a"].values)
-        check = given.rules.check(self.spectrum, given.confidence_factor, *curve)
+        check = given.rules.check(self.spectrum, given.confidence_factor, *curve, given.free_period)
         higher = not check.at_rest and bool(self.opens or doubt_stretches(self.stretches))
         at_least = self.path is not None and self.path.end is not PathEnd.FALLS
         return replace(check, bounded=self.bounded or higher, at_least=at_least)
