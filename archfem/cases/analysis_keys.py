@@ -20,6 +20,7 @@ from archfem.limit.vehicles import VEHICLES, VEHICLES_OF_CODES, Vehicle
 from archfem.limit.worst_places import ASSUMED_STRENGTH
 from archfem.masonry.loads import Action, AttachedLoad, BodyForce, PointLoad, Settlement, name_side
 from archfem.masonry.materials import check_strength
+from archfem.masonry.out_of_plane import take_highest_strip
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import Structure, join_names
 from archfem.motion.design_spectra import DesignSpectrum
@@ -38,6 +39,12 @@ LIGHT_AXLE = 20e3
 # Words of [limit] and [assessment]: laws of the joints, and of the fill
 FRICTION_LAWS = ("coulomb", "nonassociated", "none")
 FILL_LAWS: Mapping[str, type[Fill | PlasticFill]] = {"pressure": Fill, "plastic": PlasticFill}
+
+# Note on the strip of a whole wall that has courses of different lengths
+_STRIP = (
+    "it has courses as long as the longest and all loads of the wall, weights on a gable at its "
+    "top, and falls alone unless the gable is tied together along its length, as by a beam on it"
+)
 
 
 @validate_methods
@@ -382,10 +389,22 @@ class AssessmentSettings:
                     del options["friction"]
                 each = mechanism_assessment.assess_parts(structure, spectrum, **options)
                 found |= {f"{name or 'part'}, {side}": result for name, result in each.items()}
-            else:
-                found[side] = last = kinematic_assessment(structure, spectrum, **options)
+                continue
+            loads, whole = options.pop("loads", ()), np.full(2, np.inf)
+            bodies = [(side, structure, loads)]
+            if taken := take_highest_strip(structure, loads):
+                bodies.append((f"{side}, strip through the highest place", *taken))
+            for name, body, own in bodies:
+                last = kinematic_assessment(body, spectrum, loads=own, **options)
+                notes = (*last.notes, *[_STRIP] * (body is not structure))
+                listed = {name: replace(last, notes=notes)}
                 while above := last.above:
-                    found[f"{side}, {above.mechanism_name}"] = last = above
+                    listed[f"{name}, {above.mechanism_name}"] = last = above
+                # by the linear check, and by that which decides
+                ratios = [[x.checks[k].decisive for k in (0, -1)] for x in listed.values()]
+                if body is structure or (np.min(ratios, axis=0) < 0.999 * whole).any():
+                    found |= listed
+                whole = np.min(ratios, axis=0)
         return {name: result.least or result for name, result in found.items()}
 
 

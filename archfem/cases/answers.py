@@ -372,35 +372,25 @@ def note_across(structure: Structure, found: Iterable[KinematicAssessment]) -> l
     return [f"{NOTE_MARK}{text}"] * (weaker and bool(text))
 
 
-def note_strip(case: Case, found: Mapping[str, KinematicAssessment]) -> list[str]:
-    """Return a note on a strip with courses of one length, if it is weaker than a whole wall."""
-    blocks = case.structure.blocks
-    plain = [x.material for x in blocks if not (x.fixed or x.material.stands_for)]
-    short = [x.material.stands_for == COURSE_LENGTH for x in blocks]
-    if not (plain and any(short)):
-        return []
-    solid = max(plain, key=lambda material: material.unit_weight)
-    filled = [replace(x, material=solid) if y else x for x, y in zip(blocks, short, strict=True)]
-    with suppress(InvalidInput):
-        strip = replace(case.structure, blocks=tuple(filled))
-        own = case.assessment.solve(strip, case.demand).values()
-        words = "a strip through the highest place, with no course shorter than the foot and its "
-        words += f"share of the loads, is weaker: {describe_margin(own)}"
-        return [f"{NOTE_MARK}{words}"] * (find_margin(own) < 0.999 * find_margin(found.values()))
-    return []
+def doubt_strip(structure: Structure) -> list[Remark]:
+    """Return the doubt of a whole gable whose strip is not known, as its stones carry a roof."""
+    load, below = (block.material.stands_for for block in structure.blocks[-2:])
+    slopes = structure.above is not None and load == below not in (None, COURSE_LENGTH)
+    words = "the weights of its upper courses are with '{}', so that the strip through its highest "
+    words += "place, which is weaker, is not assessed"
+    remedy = "assess the column strip too, or give it as a load instead of in the stones"
+    return [Doubt(words, remedy, (load,))] * slopes
 
 
 def doubt_ties(case: Case) -> list[Remark]:
     """Return doubts about ties that pull in the one sense of the push."""
-    settings = case.assessment
-    if len(settings.directions) > 1:
-        return []
+    sense = sum(case.assessment.directions)  # 0 of both
     words = "the tie at {} pulls in the sense of the push, which it never holds"
     remedy = "correct the sign of its force, which points to where it is held"
     return [
         Doubt(words, remedy, (str(load.block),))
-        for load in settings.options.get("loads", ())
-        if load.passive and not load.anchor and settings.directions[0] * load.force[0] > 0.0
+        for load in case.assessment.options.get("loads", ())
+        if load.passive and not load.anchor and sense * load.force[0] > 0.0
     ]
 
 

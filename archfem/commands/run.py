@@ -231,8 +231,7 @@ def assess(case: Case, options: argparse.Namespace) -> int:
     try:  # a search of many assessments, which may be cut short
         with keep_warnings():  # which are those of the assessment
             found = found if options.parts else answers.assess_untied(case, found)
-            strip = [] if options.parts else answers.note_strip(case, found)
-            ties = [] if options.parts else [*strip, *answers.note_ties(case)]
+            ties = [] if options.parts else answers.note_ties(case)
     finally:
         every = _show_assessment(case, found, [*doubts, *ties], options.out)
     return doubt_code(every)
@@ -245,7 +244,8 @@ def _show_assessment(
     out: str | None,
 ) -> list[result_text.Remark]:
     """Write the results of an assessment and print them; return all its remarks."""
-    remarks += [*answers.doubt_ties(case), *answers.note_sense(case)]
+    remarks += [*answers.doubt_strip(case.structure), *answers.doubt_ties(case)]
+    remarks += answers.note_sense(case)
     remarks += answers.note_band(case, found.values())
     remarks += answers.note_across(case.structure, found.values())
     remarks += result_text.note_masses(case.structure, parapets=case.parapets)

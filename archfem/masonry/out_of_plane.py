@@ -14,6 +14,7 @@ import shapely
 from archfem._typing import Array, Metres
 from archfem._validation import check_between, validate_arguments
 from archfem.masonry.block import Block
+from archfem.masonry.loads import AttachedLoad
 from archfem.masonry.materials import COURSE_LENGTH
 from archfem.masonry.shapes.rings import column
 from archfem.masonry.structure import LEVEL_TOLERANCE, Structure, join_words, merge_levels
@@ -25,6 +26,9 @@ UNCHECKED_ACROSS = "nothing is checked across the plane of the drawing"
 # Weight of a course across the plane, over the median, below which it is one block with the course
 # below it: on a joint as stiff as those of whole courses, the tip of a gable would decide the step
 LIGHT_COURSE = 0.2
+
+# What stones of a wall across its plane stand for that carry nothing
+_OF_STONES = None, COURSE_LENGTH
 
 # Height of the block at the top of a strip that bears what a slope carries, over that of its course
 LOADED_TOP = 0.05
@@ -104,6 +108,36 @@ def columns_across(wall: Structure, *, above: Metres | None = None) -> dict[str,
     }
     pier = _find_worst_pier(wall, levels, shares, unit_weights)
     return columns | ({"pier": build(*pier)} if pier else {})
+
+
+def take_highest_strip(
+    whole: Structure, loads: Sequence[AttachedLoad]
+) -> tuple[Structure, list[AttachedLoad]] | None:
+    """Return the strip of a whole wall through its highest place, with all loads of the wall.
+
+    Its courses are as long as the longest one, or as a gable at its foot. A weight on the shorter
+    ones at the top, as of a roof on its slopes, is on its top. None without courses of different
+    lengths.
+    """
+    stones = [x for x in whole.blocks if not x.fixed and x.material.stands_for in _OF_STONES]
+    if not any(x.material.stands_for for x in stones):
+        return None
+    solid = max((x.material for x in stones), key=lambda material: material.unit_weight)
+    short = [x in stones and x.material.unit_weight < solid.unit_weight for x in whole.blocks]
+    crown = len(short) - short[::-1].index(False)
+    own = [x.material.unit_weight for x in stones]
+    if len(own) > 1 and own == sorted({*own}, reverse=True):  # a gable above its eaves
+        low, high = (float(np.ptp(x.points[:, 1])) for x in stones[:2])
+        foot = own[0] + (own[0] - own[1]) * low / (low + high)
+        solid = replace(solid, unit_weight=foot, stands_for=COURSE_LENGTH)
+    filled = tuple(replace(x, material=solid) if x in stones else x for x in whole.blocks)
+    on_crown = [x for x in loads if x.weight and whole.block_number(x.block) >= crown]
+    top, level = filled[-1].name, float(filled[-1].points[:, 1].max())
+    moved = [x for x in loads if x not in on_crown]
+    moved += [replace(x, weight=0.0) for x in on_crown if any(x.force)]
+    places = [(x.point[0], max(x.point[1], level)) for x in on_crown]
+    moved += [AttachedLoad(top, y, x.weight) for x, y in zip(on_crown, places, strict=True)]
+    return replace(whole, blocks=filled, name=f"{whole.name}, highest strip"), moved
 
 
 def _split_high(

@@ -5,7 +5,6 @@ from dataclasses import replace
 from functools import partial
 from itertools import pairwise
 from math import atan2, cos, hypot, pi, sin, sqrt
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -19,10 +18,10 @@ from archfem.cases.answers import (
     assess_untied,
     compare_checks,
     describe_margin,
+    doubt_strip,
     doubt_ties,
     find_margin,
     list_ratios,
-    note_strip,
     note_ties,
     state_assessments,
 )
@@ -30,6 +29,7 @@ from archfem.cases.defaults import note_loads_left_out
 from archfem.cases.report import margins
 from archfem.cases.report.conclusion import list_facts
 from archfem.cases.report.report_data import ReportData
+from archfem.cases.structure_keys import write_structure
 from archfem.cases.toml_file import read_object
 from archfem.limit.finite_mechanism import PathEnd, PathFollower
 from archfem.statics import LIMIT_STATES, AssessmentCheck, LimitState, mechanism_assessment
@@ -41,6 +41,7 @@ from archfem.statics.assessment_checks import (
     describe_difference,
     spectral_acceleration,
 )
+from archfem.studies.evaluators import evaluate_assessment
 
 G = 9.81
 SPECTRUM = af.motion.Ntc2018(ag=0.25, f0=2.4, tc_star=0.32, site="B")
@@ -743,28 +744,73 @@ def test_a_tied_wall_that_is_not_shown_to_pass_says_that_it_passes_untied(verifi
     assert assess_untied(weak, found) == found
 
 
-def test_a_whole_gable_notes_that_its_strip_is_weaker(verified):
+def assess_case(structure, spectrum, **assessment):
+    """Case and assessments of a column that was made in Python."""
+    tables = write_structure(structure) | {"assessment": {"spectrum": spectrum, **assessment}}
+    case = af.Case.of(tables)
+    return case, case.assessment.solve(case.structure, None)
+
+
+def test_the_strip_of_a_whole_gable_is_in_its_verdict(verified):
     """A strip through the ridge is a prism, which turns from thickness over height on."""
     gable = {"breadth": 5.2, "height": 6.2, "eaves": 3.8, "width": 0.6, "course": 0.25}
     wall = af.Case.of({"structure": {"shape": "wall", "stone": 0.5, **gable}}).structure
-    spectrum = {"code": "NTC-2018", "ag": 0.15, "f0": 2.5, "tc_star": 0.33, "site": "B"}
-    column = {"shape": "column", "breadth": 0.6, "heights": [6.2]}
-    case = af.Case.of({"structure": column, "assessment": {"spectrum": spectrum}})
     columns = af.masonry.columns_across(wall)
-    whole, strip, prism = (
-        SimpleNamespace(structure=x, assessment=case.assessment, demand=None)
-        for x in (columns["whole"], columns["strip"], case.structure)
-    )
-    found = case.assessment.solve(whole.structure, None)
-    (note,) = note_strip(whole, found)
     pga = 0.15 * 1.2 * af.units.STANDARD_GRAVITY / G
     ratio = 2.0 / 1.35 * (0.6 / 6.2) / pga
-    said = float(re.search(r"share of the loads, is weaker: least margin (\S+) \(", note)[1])
-    verified("gable: least ratio of a strip", ratio, "overturning of a prism", said)
-    assert said == pytest.approx(ratio, abs=5e-4)  # three figures
-    assert find_margin(found.values()) > 1.2 * ratio
+    spectrum = {"code": "NTC-2018", "ag": 0.15, "f0": 2.5, "tc_star": 0.33, "site": "B"}
+    case, found = assess_case(columns["whole"], spectrum)
+    own = found["right, strip through the highest place"]
+    verified("gable: least ratio of a strip", ratio, "overturning of a prism", own.linear.decisive)
+    assert own.linear.decisive == pytest.approx(ratio, rel=1e-6) == find_margin(found.values())
+    assert find_margin([found["right"]]) > 1.2 * ratio
+    assert any("tied together along its length" in note for note in own.notes)
+    rows = state_assessments(found, []).rows
+    assert any(", strip through the highest place" in row.result for row in rows)
+    assert evaluate_assessment(case)["least_margin"] == pytest.approx(ratio, rel=1e-6)
     # a strip, and a block, whose courses are all as long
-    assert note_strip(strip, found) == note_strip(prism, found) == []
+    for prism in (columns["strip"], af.column(breadth=0.6, heights=[6.2])):
+        assert not any("highest" in name for name in assess_case(prism, spectrum)[1])
+
+
+def test_a_roof_on_slopes_is_on_top_of_the_strip(verified):
+    """A wall of 7 × 0.7 m to eaves at 5 m and a ridge at 8 m, 20 kN/m³: moments of a metre of it.
+
+    The roof of 110.6 kN acts at the middle of the slopes on the whole, and at the ridge on the
+    strip. Its thrust stays at the middle of the slopes.
+    """
+    gable = {"breadth": 7.0, "height": 8.0, "eaves": 5.0, "width": 0.7, "course": 0.5}
+    gable |= {"shape": "wall", "stone": 1.0, "material": "masonry"}
+    tables = {"structure": gable, "materials": {"masonry": {"preset": "stone", "unit_weight": 2e4}}}
+    whole = af.masonry.columns_across(af.Case.of(tables).structure)["whole"]
+    spectrum = {"code": "NTC-2018", "ag": 0.18, "f0": 2.45, "tc_star": 0.34, "site": "C"}
+    (course,) = (x.name for x in whole.blocks if x.points[:, 1].max() == pytest.approx(6.5))
+    roof = {"block": course, "point": [0.0, 6.5], "weight": 110.64e3, "force": [1.4e3, 0.0]}
+    eaves = {"block": "block 10", "point": [0.0, 5.0], "weight": 14e3}
+    _, found = assess_case(whole, spectrum, direction=1, loads=[roof, eaves])
+    strip = found["right, strip through the highest place"]
+    wall, load, low, thrust = 112.0, 110.64 / 7.0, 2.0, 0.2  # of a metre [kN]
+    turned = np.array([wall * 4.0, load * 8.0, low * 5.0])
+    alpha = (0.35 * (wall + load + low) - thrust * 6.5) / turned.sum()
+    share = turned.sum() ** 2 / ((wall + load + low) * (turned @ [4.0, 8.0, 5.0]))
+    ratio = 2.0 / 1.35 * alpha / share / (0.18 * (1.7 - 0.6 * 2.45 * 0.18))
+    ratio *= G / af.units.STANDARD_GRAVITY
+    own = strip.linear.bodies
+    verified("gable with a roof: ratio of a strip", ratio, "moments", own)
+    assert (strip.alpha_0, own) == pytest.approx((alpha, ratio), rel=1e-4)
+    assert strip.linear.decisive < found["right"].linear.decisive
+    # above its eaves alone, where no course has the length of the wall at the foot
+    gable_alone = af.masonry.columns_across(af.Case.of(tables).structure, above=5.0)["whole"]
+    roof = {"block": "block 3", "point": [0.0, 1.5], "weight": 110.64e3}
+    _, found = assess_case(gable_alone, spectrum, direction=1, loads=[roof])
+    alone = found["right, strip through the highest place"].alpha_0
+    assert alone == pytest.approx(0.35 * (42.0 + load) / (42.0 * 1.5 + load * 3.0), rel=1e-6)
+    # in the stones the roof and the length of a course are one weight: a doubt says so
+    gable["floors"] = {"roof": {"level": 8.0, "load": 15.8e3}}
+    stacks = af.masonry.columns_across(af.Case.of(tables).structure)
+    said = [[str(x) for x in doubt_strip(stacks[name])] for name in ("whole", "strip")]
+    assert said[0][0].startswith("the weights of its upper courses are with 'roof', so that the")
+    assert (len(said[0]), said[1], doubt_strip(whole)) == (1, [], [])
 
 
 def test_a_ratio_without_ties_is_no_bound_of_that_with_them():
@@ -1833,3 +1879,96 @@ def test_what_moves_high_above_the_ground_is_in_doubt_under_its_spectrum():
     for structure in (slender, af.circular_arch(**sizes, embrace=160.0)):
         found = af.kinematic_assessment(structure, GROUND)
         assert not any("that of the ground" in each.cause for each in found.doubts)
+
+
+def parapet(above, *heights):
+    """A stack 0.5 m thick whose foot is at a height above the ground; None for none given."""
+    return replace(af.column(breadth=0.5, heights=heights or [1.0]), above=above)
+
+
+def floor_level(period=0.0, ag=0.18):
+    """S_eZ at the top of a building of 10.5 m and three storeys, T_1 = 0.29 s, by C7.2.6 [g]."""
+    level, peak = 3.0 * ag * 9.0 / 7.0 * sqrt(1.01), 1.1 / sqrt(0.05)  # S_e(T_1) = 1.2 · 2.5 a_g
+    return level * peak / (1.0 + (peak - 1.0) * (1.0 - period / (0.8 * 0.29)) ** 1.6)
+
+
+def test_what_vibrates_freely_takes_the_spectrum_at_its_own_period(verified):
+    """A parapet of 0.5 × 1 m: α₀ = 0.5, e* = 1; eq. C8.7.1.9 with C7.2.6."""
+    floor = af.motion.FloorSpectrum(GROUND, 0.29, height=10.5, storeys=3)
+    held, free = (
+        af.kinematic_assessment(parapet(10.5), floor, free_period=x) for x in (None, 0.12)
+    )
+    capacity = 2.0 / 1.35 * 0.5 * G / af.units.STANDARD_GRAVITY
+    for found, period in ((held, 0.0), (free, 0.12)):
+        ratio = capacity / floor_level(period)
+        verified(f"parapet: ratio at {period} s", ratio, "C7.2.6 by hand", found.linear.ratio)
+        assert found.linear.ratio == pytest.approx(ratio, rel=1e-6)
+    assert held.linear.ratio > 1.0 > free.linear.ratio
+    # it may fail by its own period, and says so; what moves from the ratio of q = 1 on
+    (doubt,) = (str(x) for x in held.doubts if "vibrates freely" in str(x))
+    worst = held.linear.ratio * 0.05**0.5 / 1.1
+    says = "linear, q = 2, FC = 1.35 passes with a_Z, and of what vibrates freely its ratio may be "
+    assert doubt.startswith(f"{says}{worst:.3g}, by T_0; give free_period")
+    assert " at T_0 = 0.12 s: fails" in str(free.linear)
+    assert (held.linear.source[-1], free.linear.source[-1]) == ("8", "9")
+    said = "at its own period T_0, up to 4.92 times as much"
+    assert (said in str(held), said in str(free)) == (True, False)
+    # 0 says that it does not vibrate freely
+    stated = af.kinematic_assessment(parapet(10.5), floor, free_period=0.0)
+    assert stated.linear == held.linear
+    assert not stated.doubts
+    assert said not in str(stated)
+    # what is above a bed is rated with it too, and a wall on the ground takes its spectrum
+    stack = af.kinematic_assessment(parapet(10.5, 0.6, 0.6), floor, free_period=0.12)
+    rules = stack.limit_state, stack.curve["d"].values, stack.curve["a"].values
+    rated = rules[0].rate(floor, 2.0, 1.35, 10.5, *rules[1:], 0.12)
+    assert rated == pytest.approx((stack.linear.ratio, stack.displacement.ratio))
+    ground = af.kinematic_assessment(parapet(0.0), GROUND, free_period=0.2)
+    assert ground.linear.demand == pytest.approx(0.54 * af.units.STANDARD_GRAVITY)
+
+
+def test_a_mechanism_at_rest_by_a_z_alone_is_in_doubt(verified):
+    """What vibrates freely is set in motion by S_eZ(T_0), and then displacements decide."""
+    ground = replace(GROUND, ag=0.05)
+    floor = af.motion.FloorSpectrum(ground, 0.29, height=10.5, storeys=3)
+    small = replace(af.column(breadth=0.03, heights=[0.06]), above=10.5)
+    held, free = (af.kinematic_assessment(small, floor, free_period=x) for x in (None, 0.12))
+    begins = 0.5 / 1.35 * G / af.units.STANDARD_GRAVITY
+    for found, period in ((held, 0.0), (free, 0.12)):
+        ratio, check = begins / floor_level(period, 0.05), found.displacement
+        verified(f"at rest: ratio at {period} s", ratio, "C7.2.6 by hand", check.ratio)
+        assert check.ratio == pytest.approx(ratio, rel=1e-6)
+        assert (check.at_rest, check.moved < 0.8) == (True, True)
+    assert free.displacement.ratio < 1.0 < held.displacement.ratio
+    doubted = [x.values[0] for x in held.doubts if "vibrates freely" in str(x)]
+    assert doubted == ["linear, q = 2, FC = 1.35", "NTC-2018 SLV"]
+    # what passes once it moves does so at any T_0
+    (linear,) = af.kinematic_assessment(
+        parapet(10.5), replace(floor, ground_spectrum=ground)
+    ).doubts
+    assert linear.values[0] == "linear, q = 2, FC = 1.35"
+
+
+def test_what_stands_above_a_building_is_shaken_as_its_top():
+    """The first mode is 1 there. Where no height is given, that of the ground is in doubt."""
+    floor = af.motion.FloorSpectrum(GROUND, 0.29, height=10.5, storeys=3)
+    top, higher = (
+        af.kinematic_assessment(parapet(z), floor, free_period=0.0) for z in (10.5, 12.0)
+    )
+    assert higher.linear.demand == pytest.approx(floor_level() * af.units.STANDARD_GRAVITY)
+    assert higher.linear == top.linear
+    said = "its foot, z = 12 m, is above H = 10.5 m of the spectrum: z = H is taken"
+    assert ([said in x for x in higher.notes].count(True), said in str(top)) == (1, False)
+    for heights in ([1.0], [0.6, 0.6]):
+        for above, doubted in ((None, True), (0.0, False), (10.5, False)):
+            found = af.kinematic_assessment(parapet(above, *heights), floor, free_period=0.0)
+            says = [str(x) for x in found.doubts if "height of its foot" in str(x)]
+            assert len(says) == doubted
+    assert "taken as 0: what moves is shaken as at z = 0 m" in str(
+        af.kinematic_assessment(parapet(None), floor)
+    )
+    # other spectra take no height, and a ring has its own foot
+    at_top = floor.at(10.5)
+    for structure, spectrum in ((parapet(None), at_top), (parapet(None), GROUND), (RING, floor)):
+        found = af.kinematic_assessment(structure, spectrum)
+        assert "height of its foot" not in str(found)
