@@ -253,6 +253,32 @@ def test_the_note_on_forces_of_ties_is_printed_once(tmp_path, capsys):
     assert text.count("forces of ties are in all for 1 m of width") == 1
 
 
+WHOLE = """
+base = "whole.toml"
+[assessment]
+direction = 1
+spectrum = { code = "EC8", ag = 0.13, ground = "A", type = 1 }
+limit_state = "NTC-2018 SLC"
+"""
+
+
+def test_a_whole_gable_with_its_roof_in_the_stones_is_in_doubt(tmp_path, capsys):
+    """Its strip is not known; without the roof it is assessed, and the least margin is its own."""
+    wall = {"shape": "wall", "breadth": 5.0, "height": 4.0, "eaves": 2.0, "width": 0.5}
+    wall |= {"course": 0.5, "stone": 1.0}
+    for floors in ({}, {"floors": {"roof": {"level": 4.0, "load": "4 kN/m"}}}):
+        made = af.Case.of({"structure": wall | floors}).structure
+        whole = af.masonry.columns_across(made)["whole"]
+        af.Analysis(whole, fidelity="rigid", displacements="large").write(tmp_path / "whole.toml")
+        (path := tmp_path / "assessed.toml").write_text(WHOLE, encoding="utf-8")
+        code, text = af.commands.main(["assess", str(path)]), capsys.readouterr().out
+        least = 2.0 / 1.35 * 0.5 / 4.0 / 0.13 * 9.81 / af.units.STANDARD_GRAVITY
+        strip = f"least margin {least:.3g} (" in text and "right, strip through the highest" in text
+        doubted = "in doubt: the weights of its upper courses are with 'roof'" in text
+        assert (strip, doubted) == (not floors, bool(floors))
+        assert code == 3
+
+
 LEFT_OUT = """
 [assessment]
 spectrum = { code = "EC8", ag = 0.1, ground = "A" }
