@@ -372,7 +372,10 @@ class AssessmentSettings:
     def solve(
         self, structure: Structure, demand: DesignSpectrum | Motion | None, parts: bool = False
     ) -> dict[str, KinematicAssessment]:
-        """Assess the structure, or each part by itself, in each direction, with the least fill."""
+        """Assess the structure, or each part by itself, in each direction, with the least fill.
+
+        Of a whole wall across its plane also the strip through its highest place, if it is weaker.
+        """
         spectrum = self.spectrum if self.spectrum is not None else demand
         if spectrum is None:
             raise InvalidInput(
