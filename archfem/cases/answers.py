@@ -430,12 +430,13 @@ class _TieSearch:
             loads += [replace(x, force=(scale * x.force[0], scale * x.force[1])) for x in self.ties]
         options = {**settings.options, "loads": loads}
         own = replace(settings, directions=(self.sense,), options=options)
-        found = own.solve(self.case.structure, self.case.demand).values()
-        listed = [(x, each.mechanism_name) for each in found for _, x in list_ratios(each)]
+        found = own.solve(self.case.structure, self.case.demand)
+        of = {k: x.mechanism_name + " of the strip" * ("highest" in k) for k, x in found.items()}
+        listed = [(x, of[key]) for key, each in found.items() for _, x in list_ratios(each)]
         ratios, name = min(listed, key=lambda each: (not each[0].fails, each[0].decisive))
         margin = min(MOST_TIED, *(x.decisive for x, _ in listed))
         linear = min(MOST_TIED, *(x.decisive for x, _ in listed if x.linear))
-        breaks = any(each.path and each.path.end is PathEnd.BREAKS for each in found)
+        breaks = any(each.path and each.path.end is PathEnd.BREAKS for each in found.values())
         given = ratios, any(x.bounded for x, _ in listed), breaks
         return self.tried.setdefault(scale, _Tied(margin, linear, name, *given))
 

@@ -13,8 +13,10 @@ from bonded import bonded_wall
 from scipy.optimize import brentq
 
 import archfem as af
+from archfem._display import ProgressReport
 from archfem.cases.answers import (
     Statement,
+    _TieSearch,
     assess_untied,
     compare_checks,
     describe_margin,
@@ -799,6 +801,13 @@ def test_a_roof_on_slopes_is_on_top_of_the_strip(verified):
     verified("gable with a roof: ratio of a strip", ratio, "moments", own)
     assert (strip.alpha_0, own) == pytest.approx((alpha, ratio), rel=1e-4)
     assert strip.linear.decisive < found["right"].linear.decisive
+    # its share of a tie is that of its length, and what its note names is said to be the strip's
+    tie = {"block": "block 10", "point": [0.0, 5.0], "force": [-70e3, 0.0], "passive": True}
+    case, found = assess_case(whole, spectrum, direction=1, loads=[tie])
+    tied = found["right, strip through the highest place"].alpha_0
+    assert tied == pytest.approx((0.35 * wall + 10.0 * 5.0) / (wall * 4.0), rel=1e-4)
+    with ProgressReport("ties", None) as progress:
+        assert _TieSearch(case, 1.0, progress).solve(1.0).mechanism.endswith(" of the strip")
     # above its eaves alone, where no course has the length of the wall at the foot
     gable_alone = af.masonry.columns_across(af.Case.of(tables).structure, above=5.0)["whole"]
     roof = {"block": "block 3", "point": [0.0, 1.5], "weight": 110.64e3}
