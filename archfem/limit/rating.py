@@ -148,6 +148,11 @@ class Rating(ResultDisplay):
         return {name: float(getattr(self, name)) for name in [*names, "geometric"]}
 
     @property
+    def is_width_by_rule(self) -> bool:
+        """Whether one vehicle spreads over the width by rule."""
+        return bool(np.isclose(self.width, self.vehicle.spread_over(self.structure)))
+
+    @property
     def passes(self) -> bool:
         """Whether the bridge carries the factored vehicle everywhere; no if it falls unloaded."""
         return bool(self.factor >= 1.0)
@@ -666,8 +671,7 @@ def rate_again(found: Rating, structure: Structure, width: float | None, **optio
     options["strength"] = check_options(structure, options["friction"], options["strength"])
     options["fill"] = place_backing(options["fill"], structure)
     options["dead"] = lay_parapets(structure, found.dead * found.parapets)
-    by_rule = np.isclose(found.width, vehicle.spread_over(found.structure))
-    usual = vehicle.spread_over(structure) if by_rule else found.width
+    usual = vehicle.spread_over(structure) if found.is_width_by_rule else found.width
     weighted = _scale_weights(structure, found.dead)
     axles = parse_axles(vehicle.axles, vehicle.spacings)
     rows = vehicle.factored(found.live, found.impact)

@@ -47,6 +47,7 @@ from archfem.limit.rating import Rating, rate_again
 from archfem.limit.vehicles import with_cs454
 from archfem.limit.worst_places import ASSUMED_STRENGTH
 from archfem.masonry.joint_closing import with_finish
+from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import Structure, join_words, with_contacts
 from archfem.models.model import Doubt, write_doubts
 from archfem.motion.motion import Motion
@@ -482,7 +483,14 @@ def vary_rating(
 def _rate_at_once(
     case: Case, found: Rating, worst: dict[str, Any], folder: str | Path | None
 ) -> dict[str, float]:
-    """Return the factor with the worst of each property at once, and that by CS 454."""
+    """Return the factor with the worst of each property at once, and that by CS 454.
+
+    A width by rule is the share of that of the changed bridge, whose cover may be less.
+    """
+    if "rating.width" in worst and found.is_width_by_rule:
+        others = [(key, value) for key, value in worst.items() if key != "rating.width"]
+        rule = found.vehicle.spread_over(Point.of(case, others).case.structure)
+        worst = worst | {"rating.width": worst["rating.width"] * rule / found.width}
     known = _rate_changed(case, found, {ALL_AT_ONCE: worst}, folder)
     if known and found.by_cs454:
         other = with_cs454(found.vehicle)
@@ -561,7 +569,7 @@ def _list_rating_changes(case: Case, found: Rating) -> Iterator[Change]:
     fixed = _list_keys(case.settings["structure"], ("state",))
     if free := {path: "free" for path, state in fixed if state == "fixed"}:
         yield "abutments", FREE, free
-    yield from _list_changed_weights(case, found)
+    yield from _list_changed_weights(case)
     if np.isfinite(found.strength):
         half = {"limit.strength": 0.5 * found.strength}
         yield "strength", "half the strength of the stones", half
@@ -603,10 +611,12 @@ def _list_changed_lengths(case: Case, found: Rating) -> Iterator[Change]:
             yield subject, name, {path: change(x, by) for path, x in paths.items()}
 
 
-def _list_changed_weights(case: Case, found: Rating) -> Iterator[Change]:
-    """Yield weights that the case does not give likewise."""
-    for material in dict.fromkeys(block.material for block in found.structure.blocks):
-        if "unit_weight" in list_default_keys(case, material):
+def _list_changed_weights(case: Case) -> Iterator[Change]:
+    """Yield likewise the weights of fill, which scatter, and those that the case does not give."""
+    blocks = case.structure.blocks
+    of_fill = {blocks[number].material for number in find_yielding_blocks(case.structure)}
+    for material in dict.fromkeys(block.material for block in blocks):
+        if material in of_fill or "unit_weight" in list_default_keys(case, material):
             key, name = find_table(case.settings, material)[0], material.name
             key = f"materials.{format_key(key)}.unit_weight"
             for by, words in ((0.9, "a tenth lighter"), (1.1, "a tenth heavier")):

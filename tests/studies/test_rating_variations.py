@@ -87,7 +87,9 @@ def test_each_row_is_the_rating_of_a_changed_case(tmp_path):
     assert words[0] == first
     # against a rating with the worst of each property
     worst = [*thin, *rough, "structure.backfill.cover=0.2", "limit.strength=2e6"]
-    worst += ["rating.width=1.62"]
+    # of the wheels, 1.5 m, and of the lesser cover
+    width = 0.9 * (1.5 + 0.2)
+    worst += [f"rating.width={width}"]
     worst += ["limit.fill.mobilisation=0", "limit.fill.active=0"]
     weight = case.structure.blocks[-1].material.unit_weight
     worst += [f"materials.backfill.unit_weight={0.9 * weight}"]
@@ -96,7 +98,7 @@ def test_each_row_is_the_rating_of_a_changed_case(tmp_path):
     assert factors[least_of_all] == pytest.approx(whole.factor, rel=PRINTED)
     assert next(iter(cells)) == least_of_all
     code = af.limit.VEHICLES["CS454-single"]
-    cart = {**case.rating, "live": code.live, "impact": code.impact, "width": 1.62}
+    cart = {**case.rating, "live": code.live, "impact": code.impact, "width": width}
     cart["vehicle"] = replace(case.rating["vehicle"], impact_on=code.impact_on)
     whole = rate_case(other.structure, cart, other.limit)
     assert by_cs454 == pytest.approx(whole.factor, rel=PRINTED)
@@ -153,8 +155,13 @@ def test_the_keys_of_a_case_are_changed_one_property_at_a_time(tmp_path, key):
         "0.1 less friction of joints": {'contacts."stone to stone".friction': 0.5},
         "0.1 more friction of joints": {'contacts."stone to stone".friction': 0.7},
     }
-    # that of the stones is given
+    # that of the stones is given, that of fill scatters all the same
+    given = text + '[materials.backfill]\nunit_weight = "18 kN/m³"\n'
+    path.write_text(given.replace("PIER", f'{key} = "0.8 m"'))
+    of_fill = dict(x[1:] for x in _list_rating_changes(af.Case.read(path), found))
     name, key = "backfill", "materials.backfill.unit_weight"
+    assert of_fill["backfill a tenth lighter"] == pytest.approx({key: 0.9 * 18e3})
+    assert not [name for name in of_fill if name.startswith("stone ")]
     weight = next(b.material.unit_weight for b in structure.blocks if b.material.name == name)
     expected |= {"backfill a tenth lighter": {key: 0.9 * weight}}
     expected |= {"backfill a tenth heavier": {key: 1.1 * weight}}
@@ -217,7 +224,7 @@ def test_a_backing_is_left_out_alone_and_at_once_with_the_worst_of_the_others(
     assert alone < 0.9 * found.factor
     worst = [*removed, "structure.arches.thickness=0.36", "structure.backfill.cover=0.2"]
     worst += ["limit.strength=2e6", "limit.fill.mobilisation=0", "limit.fill.active=0"]
-    width = min(float(x.split()[3]) for x in cells if x.startswith("a vehicle on"))
+    width = 0.9 * (1.5 + 0.1 + 0.2)  # of the wheels, the paving and the lesser cover
     weight = 0.9 * case.structure.blocks[-1].material.unit_weight
     worst += [f"rating.width={width}", f"materials.backfill.unit_weight={weight}"]
     worst += [f'contacts."{each} to stone".friction=0.5' for each in ("stone", "soil")]
@@ -330,6 +337,28 @@ def test_a_rating_of_the_command_is_varied(tmp_path, unplotted, capsys, monkeypa
     assert {each["structure"]["paving"]["thickness"] for each in changed} == {"0.1 m"}
 
 
+@pytest.mark.parametrize("by_rule", [True, False])
+def test_all_at_once_has_the_width_of_its_own_cover(tmp_path, monkeypatch, by_rule):
+    """Wheels of 1.5 m and the cover, 0.3 m less 0.1 m; a given width stays, less a tenth."""
+    (tmp_path / "case.toml").write_text(CASE.replace("PIER", 'breadth = "0.9 m"'))
+    case = af.Case.read(tmp_path / "case.toml")
+    changed = []
+
+    def rate_changed(_, __, changes, ___):
+        changed.append(changes)
+        return dict.fromkeys(changes, 1.0)
+
+    monkeypatch.setattr(variations, "_rate_changed", rate_changed)
+    vehicle = case.rating["vehicle"]
+    paved = 1.5 + 0.3 + 0.1
+    assert vehicle.spread_over(case.structure) == pytest.approx(paved)
+    found = SimpleNamespace(vehicle=vehicle, width=paved, is_width_by_rule=by_rule, by_cs454={})
+    worst = {"rating.width": 0.9 * paved, "structure.backfill.cover": 0.2}
+    variations._rate_at_once(case, found, worst, None)
+    ((at_once,),) = (each.values() for each in changed)
+    assert at_once["rating.width"] == pytest.approx(0.9 * (paved - 0.1 * by_rule))
+
+
 @pytest.mark.parametrize(("free", "says"), [(4.001, True), (3.9, False)])
 def test_free_abutments_that_change_nothing_say_by_which_size(tmp_path, monkeypatch, free, says):
     walls = '[structure.sidewalls]\nlength = "5.5 m"\nheight = "0.5 m"\nstate = "fixed"\n'
@@ -339,7 +368,7 @@ def test_free_abutments_that_change_nothing_say_by_which_size(tmp_path, monkeypa
     case = af.Case.read(tmp_path / "case.toml")
     given = {"factor": 4.0, "without_pressure": 3.0, "full_pressure": 5.0, "strength": np.inf}
     words = {"vehicle": SimpleNamespace(name="cart"), "label": "cart", "crushing": {}}
-    words["by_cs454"] = {}
+    words |= {"by_cs454": {}, "is_width_by_rule": False}
     found = SimpleNamespace(
         structure=case.structure, fill=case.limit.fill, width=2.5, **given, **words
     )
