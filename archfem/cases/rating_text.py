@@ -1,6 +1,6 @@
 """Ratings of bridges in words: statements, tables, doubts and notes."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
@@ -23,6 +23,9 @@ IMMOVABLE = "abutments are taken as immovable"
 # All that is unfavourable in the variations of a rating, which may be left out
 ALL_AT_ONCE, NOT_COMPUTED = "all unfavourable at once", "not computed"
 AT_ONCE_BY_CS454 = f"{ALL_AT_ONCE}, by CS 454"
+
+# Begin of the doubt of a bridge that fails without what is assumed, which are the next words
+ONLY = "the bridge passes only with "
 
 
 def state_ratings(
@@ -154,9 +157,7 @@ def doubt_rating(found: Rating, limit: LimitAnalysis) -> list[Remark]:
         words = "joints do not crush, as no strength of the stones is given: "
         remedy = "give strength in [materials] or [limit]"
         lines.append(Doubt(f"{words}{found.crushing_text}", remedy))
-    remedy = "show by tests that these act, or judge by the least factor"
-    if only := found.passes and found.needed:
-        lines.append(Doubt(f"the bridge passes only with {only}", remedy))
+    lines += _doubt_assumed(found)
     if "from memory" in str(found):
         words = "values from memory were not compared with the text of their code"
         lines.append(f"{NOTE_MARK}{words}: look them up before you sign")
@@ -175,3 +176,15 @@ def doubt_rating(found: Rating, limit: LimitAnalysis) -> list[Remark]:
     if not found.parapets:
         left_out.append('parapets (their weight is parapets = "… kN/m" of [rating])')
     return [*lines, f"{NOTE_MARK}left out: {join_words(left_out)}"]
+
+
+def _doubt_assumed(found: Rating) -> Iterator[Doubt]:
+    """Yield doubts of a bridge that passes only with what is assumed, also by codes."""
+    only = dict[str, list[str]]()
+    for code, each in {"": found, **found.by_codes}.items():
+        if each.passes and each.needed:
+            only.setdefault(each.needed, []).append(code and f"{found.vehicle.name} {code}")
+    for needed, of in only.items():
+        by = f", for {join_words(of)}" * all(of)
+        remedy = "show by tests that these act, or judge by the least factor"
+        yield Doubt(f"{ONLY}{needed}{by}", remedy)

@@ -8,6 +8,7 @@ from archfem._files import group_of, read_file_list
 from archfem.cases import result_text
 from archfem.cases.answers import RESULTS, Row
 from archfem.cases.defaults import say_loads_left_out
+from archfem.cases.rating_text import ONLY
 from archfem.cases.report import outcomes
 from archfem.cases.report.demands import name_spectrum
 from archfem.cases.report.doubts import (
@@ -71,6 +72,8 @@ def _mark_rows(data: ReportData) -> Iterator[tuple[str, ...]]:
         named += [name for name in checks if name and name in doubt.values]
         if "the displacement check" in doubt.words and row.numbers.get("linear"):
             return False
+        if doubt.words.startswith(ONLY):  # of the rows that say so too
+            return doubt.words.partition(", for ")[0].removeprefix("the bridge ") in row.outcome
         return not named or any(name in f"{row.result} {row.demand}" for name in named)
 
     for result, row in rows:
@@ -110,11 +113,13 @@ def _capacity_rows(data: ReportData) -> Iterator[tuple[str, Row]]:
         held = {k: x for k, x in held.items() if x.outcome not in FALLEN_STATES}
         sizes = np.array([(x.displacement, x.residual) for x in held.values()])
         if sizes.size and np.isfinite(sizes).all():
-            largest, residual = map(format_mm, sizes.max(axis=0))
+            (largest, residual), farthest = map(format_mm, sizes.max(axis=0)), sizes.argmax(axis=0)
             over = "time steps" if data.fidelity == VARIED_FIDELITY else "time steps and fidelity"
             steps = ", ".join(outcomes.list_ranges_of_steps(data))
-            under = f" under '{[*held][sizes[:, 0].argmax()]}'" * (len(data.runs) > 1)
-            outcome += f"; displaced by up to {largest}{under}, {residual} at the end"
+            # each is the largest of all motions, which may be of two
+            at_most, at_end = (f" under '{[*held][k]}'" * (len(data.runs) > 1) for k in farthest)
+            at_end *= at_end != at_most
+            outcome += f"; displaced by up to {largest}{at_most}, {residual} at the end{at_end}"
             outcome += f"; over {over} by {steps}" * bool(steps)
         yield HISTORIES, Row(HISTORIES, demand, outcome, "-", {})
     for computed in data.verdict_ranges:
