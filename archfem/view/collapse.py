@@ -25,7 +25,7 @@ from archfem.limit.rating import Rating
 from archfem.limit.vehicles import MovingLoad
 from archfem.masonry.loads import PointLoad
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
-from archfem.masonry.structure import Structure
+from archfem.masonry.structure import Structure, join_words, list_first
 from archfem.statics.assessment_checks import UPPER_BOUND, AssessmentCheck
 from archfem.statics.mechanism_assessment import KinematicAssessment
 from archfem.view import style
@@ -161,7 +161,7 @@ def draw_ratings(ratings: Sequence[Rating]) -> Figure:
     """Draw the factors of several vehicles along a bridge.
 
     Args:
-        ratings: ratings of one bridge; the first six are drawn.
+        ratings: ratings of one bridge; the first six are drawn, and the others named.
 
     Returns:
         The figure: the lesser factor of both directions over the place of each vehicle's middle, up
@@ -182,7 +182,8 @@ def draw_ratings(ratings: Sequence[Rating]) -> Figure:
     upper.axhline(1.0, color=Colour.GREY, lw=1.0)
     upper.set_ylim(0.0, top)
     style.style_axes(upper, "middle of the vehicle, x [m]", "factor [-]")
-    style.set_title(upper, f"{structure.name}: least factor of each vehicle, over its place")
+    left = _name_left_out(ratings)
+    style.set_title(upper, f"{structure.name}: least factor of each vehicle, over its place{left}")
     upper.legend(frameon=False, fontsize=Size.LABEL, loc="lower center", ncols=3)
     return figure
 
@@ -192,7 +193,8 @@ def draw_worst_places(ratings: Sequence[Rating]) -> Figure:
     """Draw each of several vehicles at its worst place on a bridge, with the mechanism.
 
     Args:
-        ratings: ratings of one bridge, in the order of the panels; the first six are drawn.
+        ratings: ratings of one bridge, in the order of the panels; the first six are drawn, and the
+            others named.
 
     Returns:
         The figure, with two panels a row.
@@ -201,7 +203,8 @@ def draw_worst_places(ratings: Sequence[Rating]) -> Figure:
     structure, count = drawn[0].structure, (len(drawn) + 1) // 2
     low, high = style.outline_bounds(structure)
     tall = (0.5 * Size.PAGE - 0.2) * (high[1] - low[1]) / (high[0] - low[0]) + 0.3
-    figure = style.new_figure(Size.PAGE, 0.4 + min(count * tall, 3.25))
+    left = _name_left_out(ratings)
+    figure = style.new_figure(Size.PAGE, min(0.4 + 0.2 * bool(left) + count * tall, 3.65))
     rows = [figure.add_subplot(count, 2, 1 + k) for k in range(len(drawn))]
     for found, axes in zip(drawn, rows, strict=True):
         worst, factors, strips = _take_axles_as_given(found)
@@ -210,12 +213,26 @@ def draw_worst_places(ratings: Sequence[Rating]) -> Figure:
         _mark_strips(axes, structure, strips)
         axes.get_legend().remove()
         axes.set_axis_off()
-        style.set_title(axes, f"{found.label}: {found.factor:.3g}")
+        # in so small a panel sizes would cover the arrows that they stand beside
+        beside = [text for text in axes.texts if text.get_text().endswith(" kN")]
+        sizes = [text.get_text() for text in sorted(beside, key=lambda x: x.xy[0])]
+        for text in beside:
+            text.remove()
+        of = f" ({join_words(sizes)})" * bool(sizes)
+        style.set_title(axes, f"{found.label}: {found.factor:.3g}{of}", Size.LABEL)
     # the size of the loads is another one in each panel
     every = {x.get_label(): x for axes in rows for x in axes.get_legend_handles_labels()[0]}
     kept = [handle for label, handle in every.items() if not label.startswith("live load")]
     style.add_legend_below(figure, handles=kept)
+    if left:
+        figure.suptitle(left.removeprefix("; "), fontsize=Size.LABEL)
     return figure
+
+
+def _name_left_out(ratings: Sequence[Rating]) -> str:
+    """Name vehicles with their factors, for which there is no room."""
+    left = [f"{x.label} ({x.factor:.3g})" for x in ratings[len(Colour.LINES) :]]
+    return f"; not drawn: {list_first(left, 4)}" * bool(left)
 
 
 @validate_arguments
@@ -265,11 +282,11 @@ def _draw_factors(
     tall = min(max(1.5 * tall * (high[0] - low[0]) / np.ptp(ends), 2.5), 3.9)
     figure = style.new_figure(wide, tall + 2.0)
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=[2.0, tall])
-    ways = zip(("right", "left"), ("-", "--"), (Colour.THRUST, Colour.LOAD), strict=True)
-    for way, line, colour in ways:
+    # by their marks in grey too, and unlike the thrust line
+    for way, line, colour in (("right", ">-", Colour.LINES[-1]), ("left", "<--", Colour.LOAD)):
         drawn = over.sel(direction=way)
-        look = {"color": colour, "ls": line, "lw": 1.5, "label": f"driving {way}"}
-        upper.plot(drawn["position"], drawn.where(np.isfinite(drawn)), **look)
+        look = {"color": colour, "lw": 1.5, "ms": 4.0, "markevery": 4, "label": f"driving {way}"}
+        upper.plot(drawn["position"], drawn.where(np.isfinite(drawn)), line, **look)
     upper.axhline(required, color=Colour.GREY, lw=1.0)
     if np.isfinite(worst.factor):
         look = {"mfc": Colour.HINGE, "mec": "white", "ms": 7.5, "zorder": 5}

@@ -182,7 +182,7 @@ def panel_grid(count: int) -> tuple[int, int]:
     return (1, count) if Size.PAGE > 5.0 else (count, 1)
 
 
-def set_title(axes: Axes, text: str) -> None:
+def set_title(axes: Axes, text: str, size: float = Size.TITLE) -> None:
     """Set the title of axes, wrapped to the width of their part of the figure."""
     place, width, indent = axes.get_subplotspec(), axes.figure.get_figwidth(), ""
     if place is not None and place.get_gridspec().ncols * place.get_gridspec().nrows > 1:
@@ -191,7 +191,7 @@ def set_title(axes: Axes, text: str) -> None:
         ratios = np.array(place.get_gridspec().get_width_ratios() or np.ones(columns), dtype=float)
         width *= ratios[list(place.colspan)].sum() / ratios.sum()
     width -= 0.3  # labels of the axis at the left shift the panel
-    text, letters = " ".join(text.split()), max(int(width / text_width(1, Size.TITLE)), 12)
+    text, letters = " ".join(text.split()), max(int(width / text_width(1, size)), 12)
     for narrower in range(letters, 11, -1):
         lines = fill(text, narrower, initial_indent=indent, break_long_words=False)
         # capitals are 0.2 of the font size wider than other letters
@@ -199,7 +199,7 @@ def set_title(axes: Axes, text: str) -> None:
         if max(wide, default=0.0) <= letters:
             break
     lines = lines.removeprefix(indent)
-    axes.set_title(lines, fontsize=Size.TITLE, color=Colour.TEXT, parse_math=False)
+    axes.set_title(lines, fontsize=size, color=Colour.TEXT, parse_math=False)
 
 
 def set_figure_title(figure: Figure, text: str) -> None:

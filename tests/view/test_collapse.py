@@ -304,6 +304,15 @@ def test_a_rating_shows_its_worst_place_and_the_axles_as_given(ring, few_places)
     assert upper.get_ylim()[0] <= found.factor <= upper.get_ylim()[1]
     labels = lower.get_legend_handles_labels()[1]
     assert f"live load: {found.factor:.3g} × 1.8 × 12 kN" in labels
+    # without colours lines of the legend differ by dashes and marks
+    handles = [x for axes in (upper, lower) for x in axes.get_legend_handles_labels()[0]]
+    looks = {
+        x.get_label(): (x.get_linestyle(), x.get_marker())
+        for x in handles
+        if hasattr(x, "get_marker")
+    }
+    named = [looks[label] for label in ("driving right", "driving left", "thrust line")]
+    assert len({*named}) == 3
     # the bridge is analysed under more newtons, over all of its width
     sizes = [-load.force[1] for load in found.moving.worst.live]
     np.testing.assert_allclose(sizes, 12e3 * 1.8 * 2.0)
@@ -323,7 +332,7 @@ def test_a_rating_marks_where_the_distributed_load_stands(coarse_ring, few_place
 
 @pytest.mark.slow
 def test_several_vehicles_are_drawn_each_at_its_worst_place(coarse_ring, few_places, monkeypatch):
-    """Of seven the first six: a line each, and a panel with its own axles."""
+    """Of seven the first six: a line each, and a panel with its own axles; the last is named."""
     monkeypatch.setattr(cut_road, "__defaults__", (8,))
     lorries = [
         af.limit.Vehicle(f"lorry {k}", (5e3 + 1e3 * k, 5e3), (1.0,), area_load=2e3 * (k > 1))
@@ -349,7 +358,13 @@ def test_several_vehicles_are_drawn_each_at_its_worst_place(coarse_ring, few_pla
     np.testing.assert_allclose(points, expected)
     for found, axes in zip(ratings, panels[:3], strict=True):
         title = f"{found.vehicle.name}, without partial factors: {found.factor:.3g}"
+        # both axles stand on it, the first at the right where it drives there
+        front, rear = (f"{axle / 1e3:g}" for axle in found.vehicle.axles)
+        ends = (rear, front) if found.moving.direction == "right" else (front, rear)
+        title += " ({} kN and {} kN)".format(*ends) * (front != rear)
         assert axes.get_title().replace("\n", " ") == title
+        # nothing stands beside arrows that are so near
+        assert not [text for text in axes.texts if "kN" in text.get_text()]
         tips = [text.xy for text in axes.texts if text.arrow_patch is not None]
         count = int(
             found.moving.factors["axles"].sel(
@@ -360,6 +375,10 @@ def test_several_vehicles_are_drawn_each_at_its_worst_place(coarse_ring, few_pla
         np.testing.assert_allclose(tips, [load.place(coarse_ring)[1] for load in loads])
         ends = [getattr(coarse_ring.joints[k], side) for k, side in found.moving.worst.hinges]
         np.testing.assert_allclose(lines_of(axes)["hinge"], ends)
+    left = f"not drawn: {seven[-1].label} ({seven[-1].factor:.3g})"
+    assert figure.get_suptitle() == left
+    assert upper.get_title().replace("\n", " ").endswith(f"; {left}")
+    assert not draw_worst_places(ratings).get_suptitle()
     (below,) = figure.legends
     assert "distributed load" in [text.get_text() for text in below.get_texts()]
 
