@@ -3,6 +3,7 @@
 import re
 from dataclasses import replace
 from itertools import pairwise
+from pathlib import Path
 from types import SimpleNamespace
 from unittest.mock import Mock
 
@@ -30,7 +31,7 @@ from archfem.cases.report.outcomes import sentence
 from archfem.cases.report.report import _collect_data
 from archfem.cases.report.report_data import ReportData, label_parts
 from archfem.cases.report.scales import find_first_failures
-from archfem.cases.report.study_findings import collect_findings
+from archfem.cases.report.study_findings import collect_findings, say_what_changes
 from archfem.cases.result_text import UPPER_BOUNDS
 from archfem.cases.run import MOTION_VARIABLE
 from archfem.cases.toml_file import format_tables
@@ -296,11 +297,18 @@ def test_the_margin_of_scales_ends_where_it_is_dislocated(case):
         "of the scales that were run under 'a' it first falls at 1.50 ×; under 'a' it stands again "
         "at some scales from 1.60 to 2.00 ×; under 'b' it stands again at 2.80 ×"
     )
-    for least, fails in ((1.3, ""), (0.9, ", beyond which it fails")):
+    # an unfinished search is no margin, unless one of its runs fails
+    for least, begin, end in (
+        (
+            1.3,
+            "it stands at a scale of",
+            ", under one motion: no margin, as a search is unfinished",
+        ),
+        (0.9, "the least margin is", ", beyond which it fails, under one motion"),
+    ):
         begun = scales("a", 0.7, unfinished=True, moves=0.5, falls=least)
         assert say_margin(data, scale=state("scale", begun))[0] == (
-            "the least margin is 0.700 so far (search unfinished) on 'a', at a PGA of 0.14 g"
-            f"{fails}, under one motion"
+            f"{begin} 0.700 so far (search unfinished) on 'a', at a PGA of 0.14 g{end}"
         )
         (fall,) = find_first_failures(data)
         at = f"at {0.2 * least:.3g} g, {least:#.3g} × the motion"
@@ -331,6 +339,14 @@ def test_rows_are_in_doubt_that_a_doubt_is_about_by_its_motion_or_its_check(case
     # how far a tie is stretched says nothing of accelerations
     stretched = Doubt("the tie is stretched: the displacement check is {}", "", (UPPER_BOUND,))
     assert mark(every, [stretched], "assessment") == [False, True]
+    only = "passes only with the pressure of the fill, in words"
+    fails = Doubt("the bridge passes only with the pressure of the fill, for LM2 by a code")
+    every = [
+        answers.Row("rating", name, words, "1.2", {"passes": True, "least": 0.9})
+        for name, words in {"LM1": "passes, in words", "LM2": only}.items()
+    ]
+    assert mark(every, [fails], "rating") == [False, True]
+    assert mark(every, [of_all], "rating") == [True, True]
     every = [
         answers.Row("scale", f"'{x}', PGA 0.20 g", "in words", "1", scales(x, 1.0)._asdict())
         for x in "ab"
@@ -861,7 +877,8 @@ def test_the_verdict_of_several_cases_is_the_worst_and_names_its_case(case):
         vars(data)["statements"] = {"assessment": state("assessment", check)} if ratio else {}
     lorry = answers.Row("rating", "LM1", "fails", "0.85", {"passes": False, "least": 0.8})
     load = answers.Row("limit analysis", "a load", "", "1.2", PushFactors(1.2, 1.2)._asdict())
-    ranks = (1, {"the vehicle": 0.8}), (4, {"the given load": 1.2})
+    ranks = [(1, {"the vehicle": 0.8}, {"the vehicle": 0.85})]
+    ranks += [(4, {"the given load": 1.2}, {"the given load": 1.2})]
     for name, row, rank in zip(("rating", "limit"), (lorry, load), ranks, strict=True):
         static = ReportData(case, {})
         vars(static)["statements"] = {name: answers.Statement([], [row])}
@@ -1437,20 +1454,25 @@ def test_ratings_that_disagree_are_all_in_the_headline(case, norm, needed):
 
 def test_a_stricter_code_that_passes_only_on_some_fills_stands_beside_that_of_the_norm(case):
     """By CS 454 it fails without the pressure of the fill, and passes with it."""
+    only, without = "passes only with the pressure of the fill", "without the pressure of the fill"
     found = {
         "lorry by Eurocodes": ("passes", "1.5", 1.1),
-        "lorry by CS 454": ("passes only with the pressure of the fill; 0.7 to 1.5", "1.005", 0.7),
+        "lorry by CS 454": (f"{only}; 0.9 (axle at x = 1 m) {without}", "1.005", 0.7),
+        "LM1": (f"{only}, with 1 axle at x = 2 m; 0.8 {without}", "1.1", 0.8),
     }
     rows = [
         answers.Row("rating", name, words, x, {"passes": True, "least": least})
         for name, (words, x, least) in found.items()
     ]
+    # 0.7 is of all that is unfavourable, and not of the pressure alone
+    rows[1].numbers["state"] = "all unfavourable at once"
     settings = {key: value for key, value in case.settings.items() if key != "motion"}
     data = ReportData(af.Case.of(settings | {"report": {"norm": "EN 1991-2"}}), {})
     vars(data)["statements"] = {"rating": answers.Statement([], rows)}
     assert head_of(conclusion.list_facts(data)) == (
         "Rating for lorry by Eurocodes: factor 1.5, 1 is required, passes. It passes only with the "
-        "pressure of the fill for lorry by CS 454 (else 0.7)."
+        f"pressure of the fill for lorry by CS 454 (1.005, 0.9 {without}, 0.7 all unfavourable at "
+        f"once) and LM1 (1.1, 0.8 {without})."
     )
 
 
@@ -1769,7 +1791,7 @@ def test_a_push_is_compared_with_a_demand_in_numbers_and_words_are_not_read(
     data = ReportData(found.case, {}, found.folder)
     demands, table = [x for x in conclusion.build_conclusion(data).pieces if x.kind == "grid"][:2]
     text = " ".join(words_of(data))
-    own = [("push", "PGA 0.2 g", "[limit]", "limit analysis")] if demand else []
+    own = [("push", "0.2 g", "[limit]", "limit analysis")] if demand else []
     assert [*demands.rows] == [
         (
             *("as stated", "0.3 g at the ground", "[report]"),
@@ -1856,6 +1878,96 @@ def test_a_study_of_another_structure_has_no_part_in_the_answer(case, tmp_path, 
     plan = folders[0] / "study.json"
     write_sealed_json(plan, {"points": read_sealed_json(plan, "study")["points"]})
     assert not ReportData(given, {}, study_folders=folders[:1]).own_studies
+
+
+def test_the_push_is_the_margin_while_a_search_of_scales_is_unfinished(case):
+    """A push over 0.1 g, of a structure whose motion has 2 m/s²; the scale is larger."""
+    pushed = af.Case.of({**case.settings, "limit": {"horizontal": 1.0, "demand": "0.1 g"}})
+    push = PushFactors(3.0, 4.0, "the demand of 0.1 g; vertical acceleration is left out")
+    for unfinished in (True, False):
+        data = data_of(pushed, a=verdict_of())
+        vars(data)["transverse_push"] = np.nan
+        found = scales("a", 8.0, moves=5.0, dislocated=9.0, unfinished=unfinished)
+        searched = state("scale", found)._replace(doubts=[Doubt("interrupted")] * unfinished)
+        vars(data)["statements"] = {"limit": state("limit", push), "scale": searched}
+        facts = dict(conclusion.list_joint_facts({"A": data, "B": data}))
+        beside = 3.0 * 0.1 * G / 2.0
+        over = f"3 times the demand of 0.1 g by a push, {beside:.3g} times the 0.2 g of its motions"
+        least = over if unfinished else "8 times the earthquake"
+        assert facts["margin"] == f"The least margins are of A {least}; of B {least}."
+        result = "scale of the motion"
+        in_doubt = f"A: {result}; B: {result}" if unfinished else None
+        assert facts.get("in doubt") == in_doubt
+    # what fails under one motion decides, whatever is left to run under others
+    vars(data)["statements"] = {
+        "scale": state("scale", scales("b", 0.8, falls=0.9), scales("a", 0.5, unfinished=True))
+    }
+    assert [x for x, is_margin, _ in margins.list_margins(data) if is_margin] == [0.8]
+
+
+def test_cases_are_compared_by_the_properties_as_given(case):
+    """One lorry alone was varied, all at once to 0.6; the other has the less factor as given."""
+    at_once, less = "all unfavourable at once", "without the pressure of the fill"
+    parts, numbers = {}, {"A": ("1.3", 0.6, at_once), "B": ("1.1", 0.9, less)}
+    for name, (factor, least, of) in numbers.items():
+        row = {"passes": True, "least": least, "state": of}
+        words = "passes only with the pressure of the fill"
+        data = parts[name] = ReportData(case, {})
+        stated = answers.Statement([], [answers.Row("rating", "lorry", words, factor, row)])
+        vars(data).update(statements={"rating": stated}, transverse_push=np.nan)
+    facts = dict(conclusion.list_joint_facts(parts))
+    assert facts["verdict"].startswith("The worst of 2 cases is B: Rating for lorry: factor 1.1")
+    assert facts["margin"] == (
+        f"The least margins are of B 0.9 times the vehicle, lorry, {less}; "
+        f"of A 0.6 times the vehicle, lorry, {at_once}."
+    )
+
+
+@pytest.mark.parametrize("varied", ["", "rating.vehicle"])
+def test_a_study_stands_once_with_the_case_whose_rating_it_varied(case, monkeypatch, varied):
+    """Three cases of one structure: pushed, rated for other vehicles, and for the one studied."""
+    rated = {"rating": {"vehicle": {"name": "cart", "axles": ["40 kN"]}}}
+    names = ("pushed", "others", "own")
+    cases = [af.Case.of({**case.settings, **rated, "title": name}) for name in names]
+    values = {"factor": ("case", [3.0, 2.0]), "geometric": ("case", [2.0, 1.5])}
+    table = xr.Dataset(values, {"case": ["as given", "thinner"]}, attrs={"varied": varied})
+    monkeypatch.setattr(
+        report_data,
+        "read_study",
+        lambda place, _: replace(
+            collect_findings("Doubts", "", table),
+            name="the study 'Doubts'",
+            folder=place,
+            digests={"rated"},
+        ),
+    )
+    monkeypatch.setattr(
+        ReportData,
+        "inputs",
+        property(lambda self: "" if self.case.title == "pushed" else "rated"),
+    )
+    tables = {"others": {"vehicle": "LM1, LM2"}}
+    monkeypatch.setattr(
+        ReportData,
+        "read_table",
+        lambda self, key: tables.get(self.case.title, self.case.settings.get(key, {})),
+    )
+    stated = answers.Statement([], [])
+    monkeypatch.setattr(
+        ReportData,
+        "statements",
+        property(lambda self: {} if self.case.title == "pushed" else {"rating": stated}),
+    )
+    folder = Path("doubts")
+    parts = label_parts([ReportData(each, {}, study_folders=[folder]) for each in cases])
+    assert [len(each.studies) for each in parts.values()] == [0, 0, 1]
+    (found,) = parts["C"].studies
+    (said,) = say_what_changes(found)
+    of = "" if varied else " for cart"
+    assert said.startswith(f"in the study 'Doubts'{of} 'thinner' lowers the factor most, from 3")
+    # of two that fit alike it stands with the first
+    alike = label_parts([ReportData(cases[2], {}, study_folders=[folder])] * 2)
+    assert [len(each.studies) for each in alike.values()] == [1, 0]
 
 
 def long_sentences(data, chapters=()):

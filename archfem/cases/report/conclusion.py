@@ -11,7 +11,7 @@ import numpy as np
 from archfem.cases.answers import RESULTS, Ratios, Statement, read_numbers
 from archfem.cases.case import REPORT_KEYS
 from archfem.cases.defaults import list_default_keys, list_materials_and_contacts
-from archfem.cases.push_factors import PushFactors
+from archfem.cases.push_factors import PushFactors, site_acceleration
 from archfem.cases.rating_text import NOT_COMPUTED
 from archfem.cases.report import margins, outcomes
 from archfem.cases.report.capacities import tabulate_capacities
@@ -26,6 +26,7 @@ from archfem.cases.report.doubts import (
     list_elastic_fill,
     list_notes,
     list_unvaried,
+    peak_of_ground,
     spans_run,
 )
 from archfem.cases.report.motion_rules import find_missed, find_rule, is_of_norm, name_norm
@@ -93,6 +94,7 @@ def list_facts(data: ReportData) -> list[tuple[str, str]]:
         said[key].append(sentence(text))
     head = [(key, " ".join(texts)) for key, texts in said.items() if texts]
     named = [f"{x.partition(',')[0]} of PGA {p:.2g} g" for x, p, _, of in list_demands(data) if of]
+    named = [each.replace("push of PGA", "a push of") for each in named]
     question = [("question", f"Does it withstand {join_words(named)}?")] if named else []
     return [*signed, *question, *head, *doubts, *blocks]
 
@@ -110,25 +112,27 @@ def list_joint_facts(parts: Mapping[str, ReportData]) -> list[tuple[str, str]]:
     signed = [(key, _join_values(heads, key)) for key in dict.fromkeys(keys)]
     answer, margin, _, left = HEAD
     ranks = {name: _rank_verdict(data) for name, data in parts.items()}
-    place = min(each for each, _ in ranks.values())
+    place = min(each for each, *_ in ranks.values())
     worst, listed = dict[str, list[str]](), list[str]()
     for kind in KINDS:  # factors on demands of several kinds have no order
-        own = {name: least[kind] for name, (_, least) in ranks.items() if kind in least}
+        own = {name: given[kind] for name, (*_, given) in ranks.items() if kind in given}
         order = sorted(own, key=own.__getitem__)
-        sizes = {name: _say_factor(parts[name], own[name], kind) for name in order}
+        sizes = {name: _say_factor(parts[name], ranks[name][1][kind], kind) for name in order}
         listed += [f"of {name} {size}" for name, size in sizes.items()]
         first = [name for name in order if ranks[name][0] == place]
         for name in first:
             if own[name] <= own[first[0]] * (1.0 + MAX_TIE_DIFFERENCE):
                 worst.setdefault(name, []).append(sizes[name])
-    listed += [f"of {name} not known" for name, (_, least) in ranks.items() if not least]
+    listed += [f"of {name} not known" for name, (_, least, _) in ranks.items() if not least]
     facts = [("cases", "; ".join(data.name for data in parts.values()))]
+    in_doubt = {name: dict(head).get("in doubt") for name, head in heads.items()}
+    doubts = "; ".join(f"{name}: {results}" for name, results in in_doubt.items() if results)
     said = {name: dict(head).get(answer, "") for name, head in heads.items()}
     if len(worst) > 1:
         named = [f"{name} ({join_words(each)})" for name, each in worst.items()]
         kinds = ", each by its kind of demand," * (len({*map(tuple, worst.values())}) > 1)
-        doubt = ", some of it in doubt" * any("in doubt" in dict(head) for head in heads.values())
         words = f"the worst of {len(parts)} cases{kinds} are {join_words(named)}."
+        doubt = ", some of it in doubt" * bool(doubts)
         facts.append((answer, f"{VERDICTS[place]}{doubt}: {words}"))
     else:
         name = next(iter(worst), min(ranks, key=lambda x: ranks[x][0]))
@@ -136,6 +140,7 @@ def list_joint_facts(parts: Mapping[str, ReportData]) -> list[tuple[str, str]]:
     norms = {x.case.report.get("norm", ""): x for x in parts.values() if "rating" in x.statements}
     of = f", ratings for {join_words([*filter(None, norms)])}," * any(norms)
     facts.append((margin, f"The least margins{of} are {'; '.join(listed)}."))
+    facts += [("in doubt", doubts)] * bool(doubts)
     unchecked = dict[str, list[str]]()
     for name, head in heads.items():
         for text in (text for key, text in head if key == left):
@@ -155,7 +160,7 @@ def _join_values(heads: Mapping[str, list[tuple[str, str]]], key: str) -> str:
 
 def _say_factor(data: ReportData, factor: float, kind: str) -> str:
     """Say a least factor of a case, with "at most" before an upper bound, and until when it is."""
-    pushes = read_numbers(PushFactors, data.statements.get("limit"))
+    pushes = _list_loads(data)
     bounds = [x.least for x in pushes if x.bounded or x.proved is not None]
     checks = read_numbers(Ratios, data.statements.get("assessment"))
     bounds += [check.decisive for check in checks if check.bounded]
@@ -172,15 +177,28 @@ def _say_factor(data: ReportData, factor: float, kind: str) -> str:
         bounds += [factor] * (NOT_COMPUTED in row.numbers.get("state", ""))
         named = row.demand.partition(" (")[0], row.numbers.get("state")
         until = "".join(f", {x}" for x in named if x)
+    for push in (x for x in pushes if x.site and x.least == factor and kind == KINDS[1]):
+        kind = f"{push.site.partition(';')[0]} by a push"
+        peak = max(map(peak_of_ground, data.runs.values()), default=0.0)
+        of_motions = factor * site_acceleration(data.case) / max(peak, 1e-9)
+        if of_motions < factor:
+            until = f", {format_ratio(of_motions)} times the {peak:.2g} g of its motions"
     at_least = any(check.unshown and check.decisive == factor for check in checks)
     bound = "at least " if at_least else "at most " * (factor in bounds)
     return f"{bound}{format_ratio(factor)} times {kind}{until}"
 
 
-def _rank_verdict(data: ReportData) -> tuple[int, dict[str, float]]:
+def _list_loads(data: ReportData) -> list[PushFactors]:
+    """List the factors on loads and pushes."""
+    stated = (data.statements.get(name) for name in ("limit", "pushover"))
+    return [load for each in stated for load in read_numbers(PushFactors, each)]
+
+
+def _rank_verdict(data: ReportData) -> tuple[int, dict[str, float], dict[str, float]]:
     """Return the place of a case among others, the worst first, and its least factors by kind.
 
-    Factors are those in the plane of the drawing, where all cases have them.
+    Factors are those in the plane of the drawing, where all cases have them. Those behind are with
+    the properties as given, by which cases are compared, as not all are varied.
     """
     ranked = [*margins.list_margins(data, across=False)]
     outcome = outcomes.find_worst(data)[1] if data.runs else ""
@@ -188,8 +206,7 @@ def _rank_verdict(data: ReportData) -> tuple[int, dict[str, float]]:
     rows = stated.rows if stated else []
     if data.case.report.get("norm"):  # decides, if it has a rating
         rows = [row for row in rows if is_of_norm(data, row.demand)] or rows
-    stated_loads = (data.statements.get(name) for name in ("limit", "pushover"))
-    loads = [load for each in stated_loads for load in read_numbers(PushFactors, each)]
+    loads = _list_loads(data)
     factors = [load.least for load in loads if not load.site]
     fails = [x < 1.0 for x, is_ranked, _ in ranked if is_ranked] + [x < 1.0 for x in factors]
     fails += [least < 1.0 for least, *_ in margins.say_less(data)]
@@ -199,9 +216,11 @@ def _rank_verdict(data: ReportData) -> tuple[int, dict[str, float]]:
     pushed = [load.least for load in loads if load.site and not shaken]
     demands = shaken, pushed, [x.numbers["least"] for x in rows], factors
     every = zip(KINDS, (min(x, default=np.inf) for x in demands), strict=True)
+    ratings = [0.0 if row.factor == "-" else float(row.factor) for row in rows]
     undecided = outcome.startswith("may") or (bool(data.runs) and bool(_say_why_undecided(data)))
     holds = outcome == "does not survive", any(fails), undecided, "damage" in outcome, True
-    return holds.index(True), {kind: least for kind, least in every if least < np.inf}
+    leasts = {kind: least for kind, least in every if least < np.inf}
+    return holds.index(True), leasts, leasts | ({KINDS[2]: min(ratings)} if ratings else {})
 
 
 def _say_plainly(data: ReportData, doubtful: Sequence[str]) -> Iterator[tuple[str, str]]:
@@ -306,9 +325,17 @@ def _say_ratings(data: ReportData, stated: Statement) -> Iterator[str]:
     for words, rows in (f"fails{too}", fails), ("passes", passes):
         if rows:
             yield f"it {words} for {join_words([f'{x.demand} ({x.factor})' for x in rows])}"
+    only = dict[str, list[str]]()
     for row in unsure:
-        least = format_ratio(row.numbers["least"], 4)
-        yield f"it {row.outcome.partition('; ')[0]} for {row.demand} (else {least})"
+        outcome, _, losses = row.outcome.partition("; ")
+        # places are among the capacities
+        of = [row.factor, *[re.sub(r" \(axles? at [^)]*\)", "", losses)] * bool(losses)]
+        least, state = row.numbers["least"], row.numbers.get("state", "")
+        of += [f"{format_ratio(least, 4)} {state}"] * (state not in losses)
+        named = f"{row.demand} ({', '.join(of).replace('; ', ', ')})"
+        only.setdefault(outcome.partition(", with ")[0], []).append(named)
+    for words, each in only.items():
+        yield f"it {words} for {join_words(each)}"
 
 
 def _say_survival(

@@ -166,7 +166,7 @@ def list_margins(
     checks = read_numbers(Ratios, data.statements.get("assessment"))
     ratios = sorted(_describe_check(data, each) for each in checks)
     for least, texts in [*ratios[:1], *describe_scales(data)]:
-        yield least, True, texts
+        yield least, least < np.inf, texts
     for least, at, _, body in sorted(say_across(data))[:across]:
         text = f"below {at}: {body} across the plane as one rigid body, held by nothing else"
         yield least, True, [text]

@@ -52,6 +52,7 @@ class ReportData:
     study_folders: Sequence[Path] = ()  # without any, that of the results, which may have one
     label: str = ""  # in a report of several cases, with inputs and signatures of all
     shared: Sequence[Path] = ()  # studies, of which the least margin is of no or another case
+    elsewhere: Sequence[Path] = ()  # studies that stand with another case
     # of several cases, those of a wall across its plane, or in its plane of a stack that is across
     other_plane: tuple[str, str] | None = None  # which plane they are of, and their labels
 
@@ -65,9 +66,18 @@ class ReportData:
             return []
         # a case in a folder of results has the blocks of its drawing
         given = _files.hash_value(case.structure), case.hash_sections(STRUCTURE_SECTIONS)
-        found = [read_study(place, given) for place in folders]
+        found = [read_study(place, given) for place in folders if place not in self.elsewhere]
         # of several cases each has those of its structure
-        return [each for each in found if each.is_own or not self.label]
+        return [self._name_rated(each) for each in found if each.is_own or not self.label]
+
+    def _name_rated(self, study: StudyFindings) -> StudyFindings:
+        """Return a study of ratings with the vehicle of the case, if it varies none."""
+        given = self.case.rating.get("vehicle")
+        rates = study.is_own and "geometric" in study.table and given is not None
+        if not rates or "vehicle" in study.table.attrs["varied"]:
+            return study
+        of = f" for {getattr(given, 'name', given)}"
+        return replace(study, title=study.title + of, name=study.name + of)
 
     @property
     def name(self) -> str:
@@ -80,6 +90,12 @@ class ReportData:
     def is_shaken(self) -> bool:
         """Whether it has results of earthquakes."""
         return bool(self.runs or self.statements.keys() - {"rating"})
+
+    @property
+    def is_rated(self) -> bool:
+        """Whether it has a rating for the vehicle of its case."""
+        given = self.case.settings.get("rating", {}).get("vehicle")
+        return "rating" in self.statements and self.read_table("rating").get("vehicle") == given
 
     @property
     def own_studies(self) -> list[StudyFindings]:
@@ -247,15 +263,17 @@ def label_parts(cases: Sequence[ReportData]) -> dict[str, ReportData]:
         plane, found = ("in", walls) if walls else ("across", across.get(label, []))
         if found:
             parts[label] = replace(part, other_plane=(f"{plane} its plane", join_words(found)))
-    # studies of each case by whether they change this very case, and no other with its structure
+    # studies of each case by whether they change this very case, and rate the vehicle of its rating
     varied = {
-        label: {each.folder: part.inputs in each.digests for each in part.studies}
+        label: {each.folder: (part.inputs in each.digests, part.is_rated) for each in part.studies}
         for label, part in parts.items()
     }
+    first = {k: max(varied, key=lambda x: varied[x].get(k, ())) for x in varied for k in varied[x]}
     for label, own in varied.items():
         others = [each for name, each in varied.items() if name != label]
-        shared = [k for k, is_own in own.items() if any(x.get(k, -1) >= is_own for x in others)]
-        parts[label] = replace(parts[label], shared=shared)
+        shared = [k for k, fits in own.items() if any(x.get(k, ()) >= fits for x in others)]
+        elsewhere = [k for k in own if first[k] != label]
+        parts[label] = replace(parts[label], shared=shared, elsewhere=elsewhere)
     return parts
 
 

@@ -94,27 +94,29 @@ def say_fragile(data: ReportData) -> Iterator[str]:
 
 
 def describe_scales(data: ReportData) -> Iterator[tuple[float, list[str]]]:
-    """Yield the least scale up to which it stands, what comes beyond, and motions without any."""
+    """Yield the least scale up to which it stands, what comes beyond, and motions without any.
+
+    It is no margin, and infinite, where an unfinished search has found no failure at 1 and less.
+    """
     searches, unscaled = list_scales(data), _list_unscaled(data)
     for state in dict.fromkeys(state for state, _ in unscaled.values()):
         own = {f"'{name}'": peak for name, (of, peak) in unscaled.items() if of == state}
         of = f"{join_words([*own])}, PGA {Ends.of(own.values()):.2f} g"
         fails = f"under which it {_STATES[state][0]}, and which {_was(len(own))} not scaled"
         yield np.nextafter(1.0, 0.0), [f"below 1 on {of}, {fails}"]
-    made = sorted((each for each in searches if each.held), key=lambda x: (_bound(x), x.pga))
+    made = [each for each in searches if each.held]
     if not made:
         return
-    first = made[0]
-    # between the scales that were run nothing is known
-    failing = {"dislocated", "falls", "mechanism"} & first.states.keys()
-    met = min((first.states[state] for state in failing), default=np.inf)
+    # what fails at 1 decides, whatever is left to run
+    first = min(made, key=lambda x: (_met(x) > 1.0, _bound(x), x.pga))
+    is_failed = _met(first) <= 1.0
+    is_open = not is_failed and any(each.unfinished for each in searches)
     # smaller scales may fail that were not run
     words = f"{first.held:#.3g}" + f" so far ({UNFINISHED})" * first.unfinished
     if _bound(first) < first.held:
-        met = min(met, _bound(first))
         words = f"below {_bound(first):#.3g} as one rigid body ({words} in courses)"
     words += f" on '{first.motion}', at a PGA of {_bound(first) * first.pga:.3g} g"
-    words += ", beyond which it fails" * (met <= 1.0)
+    words += ", beyond which it fails" * is_failed
     words += f", of {len(made)} motions" if made[1:] else ", under one motion"
     falls = [x for x in searches if {"falls", "mechanism"} & x.states.keys()]
     under = "under '{}' " * (len(searches) > 1)
@@ -127,7 +129,15 @@ def describe_scales(data: ReportData) -> Iterator[tuple[float, list[str]]]:
     known = {each.motion for each in searches} | unscaled.keys()
     if left := [f"'{pair}'" for pair in data.pairs if pair not in known]:
         texts.append(f"{join_words(left)} {_was(len(left))} not scaled")
-    yield _bound(first), texts
+    if is_open:
+        texts[0] = f"it stands at a scale of {words}: no margin, as a search is unfinished"
+    yield (np.inf if is_open else _bound(first)), texts
+
+
+def _met(search: Scales) -> float:
+    """Return the least scale that was run at which it fails; between these nothing is known."""
+    met = [search.states.get(state, np.inf) for state in ("dislocated", "falls", "mechanism")]
+    return min(*met, search.as_one or np.inf)
 
 
 def _was(count: int) -> str:

@@ -14,10 +14,12 @@ import xarray as xr
 from archfem._display import DOUBT_MARK, NOTE_MARK
 from archfem._files import read_listed
 from archfem.cases.answers import Ratios, read_numbers
+from archfem.cases.case import REPORT_KEYS
 from archfem.cases.defaults import describe_margins_at_rest
 from archfem.cases.report import response
 from archfem.cases.report.capacities import tabulate_capacities
 from archfem.cases.report.conclusion import (
+    HEAD,
     build_conclusion,
     build_signatures,
     describe_width,
@@ -106,9 +108,16 @@ def build_joint_sections(parts: Mapping[str, ReportData]) -> list[Section]:
         Section("Signatures and drawings", [build_signatures(report), *drawn]),
         Section("Inputs of all cases", compare_inputs(parts)),
     ]
-    for data in parts.values():
-        own = [replace(each, level=each.level + 1) for each in build_sections(data)]
-        sections += [Section(data.name, [Grid((), list_facts(data))]), *own]
+    known, said = dict[str, list[Section]](), (*REPORT_KEYS, HEAD[0], HEAD[-1])
+    for label, data in parts.items():
+        # the head of all has the others
+        facts = [each for each in list_facts(data) if each[0].replace(" ", "_") not in said]
+        known[label] = build_sections(data)
+        sections.append(Section(data.name, [Grid((), facts)]))
+        for each in known[label]:
+            first = next(other for other, own in known.items() if each in own)
+            pieces = each.pieces if first == label else [TextBlock(f"As of case {first}.")]
+            sections.append(replace(each, pieces=pieces, level=each.level + 1))
     return sections
 
 
