@@ -1898,6 +1898,10 @@ def test_the_push_is_the_margin_while_a_search_of_scales_is_unfinished(case):
         result = "scale of the motion"
         in_doubt = f"A: {result}; B: {result}" if unfinished else None
         assert facts.get("in doubt") == in_doubt
+    vars(data)["pairs"] = ("a", "b")  # of which one was scaled
+    least = "8 times the earthquake by its scale under 'a', as not all motions were scaled"
+    said = dict(conclusion.list_joint_facts({"A": data, "B": data}))["margin"]
+    assert said == f"The least margins are of A {least}; of B {least}."
     # what fails under one motion decides, whatever is left to run under others
     vars(data)["statements"] = {
         "scale": state("scale", scales("b", 0.8, falls=0.9), scales("a", 0.5, unfinished=True))

@@ -32,7 +32,7 @@ from archfem.cases.report.doubts import (
 from archfem.cases.report.motion_rules import find_missed, find_rule, is_of_norm, name_norm
 from archfem.cases.report.outcomes import sentence
 from archfem.cases.report.report_data import SHOWN_RESULTS, ReportData
-from archfem.cases.report.scales import find_first_failures, say_fragile
+from archfem.cases.report.scales import find_first_failures, list_scales, say_fragile
 from archfem.cases.report.study_findings import MAX_TIE_DIFFERENCE, say_what_changes
 from archfem.dynamics.collapse_state import COLLAPSE_STATES, RANGE_REMEDY
 from archfem.masonry.structure import Structure, join_names, join_words
@@ -183,6 +183,9 @@ def _say_factor(data: ReportData, factor: float, kind: str) -> str:
         of_motions = factor * site_acceleration(data.case) / max(peak, 1e-9)
         if of_motions < factor:
             until = f", {format_ratio(of_motions)} times the {peak:.2g} g of its motions"
+    scaled = [x for x in list_scales(data) if kind == KINDS[0] and factor in (x.held, x.as_one)]
+    if scaled and len(data.pairs) > len(list_scales(data)):
+        until = f" by its scale under '{scaled[0].motion}', as not all motions were scaled"
     at_least = any(check.unshown and check.decisive == factor for check in checks)
     bound = "at least " if at_least else "at most " * (factor in bounds)
     return f"{bound}{format_ratio(factor)} times {kind}{until}"

@@ -41,10 +41,7 @@ def tabulate_demands(data: ReportData) -> list[Grid]:
     compared = "words alone, which are compared with none"
     compared += ": limit.demand is" * (data.case.limit.demand is not None)
     rows = [("as stated", text, "[report]", compared)] if text else []
-    rows += [
-        (name, f"{'PGA ' * (name != 'push')}{p:.3g} g", source, join_words(x))
-        for name, p, source, x in found
-    ]
+    rows += [(x, f"{'PGA ' * (x != 'push')}{p:.3g} g", y, join_words(of)) for x, p, y, of in found]
     peaks = [peak for _, ends, *_ in found for peak in ends]
     differ = bool(peaks) and max(peaks) > MAX_RATIO_OF_PEAKS * min(peaks)
     caption = "Demands of an earthquake" + "; a margin on one is none on another" * differ
