@@ -1927,6 +1927,26 @@ def test_cases_are_compared_by_the_properties_as_given(case):
     )
 
 
+def test_what_cases_share_stands_with_the_first(case, undrawn):
+    """The third has another structure; what the head of all has is not said again."""
+    lower = {**case.settings, "structure": {**case.settings["structure"], "heights": [0.9, 1.0]}}
+    every = [ReportData(af.Case.of(each), {}) for each in (case.settings, case.settings, lower)]
+    every = label_parts(every)
+    for data in every.values():
+        vars(data)["statements"] = {"limit": state("limit", PushFactors(0.5, 0.5, "the site's"))}
+    built = sections.build_joint_sections(every)
+    starts = [k for k, each in enumerate(built) if each.level == 2][3:]
+    parts = [built[k:end] for k, end in pairwise([*starts, len(built)])]
+    for label, listed in zip("ABC", parts, strict=True):
+        facts = dict(listed[0].pieces[0].rows)
+        assert "structure" in facts
+        assert not {"verdict", "not checked"} & {*facts}
+        texts = {x.title: getattr(x.pieces[0], "text", "") for x in listed[1:]}
+        again = [title for title, text in texts.items() if text == "As of case A."]
+        assert ("Structure and dead load" in again) == (label == "B")
+        assert ("Inputs and assumptions" in again) == (label != "A")
+
+
 @pytest.mark.parametrize("varied", ["", "rating.vehicle"])
 def test_a_study_stands_once_with_the_case_whose_rating_it_varied(case, monkeypatch, varied):
     """Three cases of one structure: pushed, rated for other vehicles, and for the one studied."""

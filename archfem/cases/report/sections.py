@@ -108,10 +108,11 @@ def build_joint_sections(parts: Mapping[str, ReportData]) -> list[Section]:
         Section("Signatures and drawings", [build_signatures(report), *drawn]),
         Section("Inputs of all cases", compare_inputs(parts)),
     ]
-    known, said = dict[str, list[Section]](), (*REPORT_KEYS, HEAD[0], HEAD[-1])
+    known = dict[str, list[Section]]()
+    # in the head of all
+    said = {HEAD[0], HEAD[-1], *(key.replace("_", " ") for key in REPORT_KEYS)}
     for label, data in parts.items():
-        # the head of all has the others
-        facts = [each for each in list_facts(data) if each[0].replace(" ", "_") not in said]
+        facts = [(x, text) for x, text in list_facts(data) if x not in said]
         known[label] = build_sections(data)
         sections.append(Section(data.name, [Grid((), facts)]))
         for each in known[label]:
