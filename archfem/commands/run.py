@@ -277,9 +277,8 @@ def _show_assessment(
 @keep_attempt("rating")
 def rate(case: Case, options: argparse.Namespace) -> int:
     """Rate the bridge of a case for vehicles, by the joints and the fill of its [limit]."""
-    keys = ("live", "impact", "dead", "width", "area_load")
+    values = {x: getattr(options, x) for x in ("live", "impact", "dead", "width", "area_load")}
     # as in --set, so that a length may have a unit
-    values = {key: getattr(options, key) for key in keys}
     given = dict(parse_change(f"{k}={x}") for k, x in values.items() if x is not None)
     rating = {**case.settings.get("rating", {}), **given}
     tables = name_vehicles(options.vehicles, rating)

@@ -694,10 +694,9 @@ def _scale_weights(structure: Structure, factor: float) -> Structure:
     """Return a structure whose blocks weigh a multiple."""
     if factor == 1.0:
         return structure
-    blocks = []
-    for block in structure.blocks:
-        material = replace(block.material, unit_weight=factor * block.material.unit_weight)
-        blocks.append(replace(block, material=material))
+    known = {block.material for block in structure.blocks}
+    scaled = {each: replace(each, unit_weight=factor * each.unit_weight) for each in known}
+    blocks = (replace(block, material=scaled[block.material]) for block in structure.blocks)
     return replace(structure, blocks=tuple(blocks))
 
 

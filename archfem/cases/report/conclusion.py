@@ -166,10 +166,9 @@ def _say_factor(data: ReportData, factor: float, kind: str) -> str:
     bounds += [check.decisive for check in checks if check.bounded]
     bounds += [least for least, words, _ in margins.say_less(data) if "≤" in words]
     until = ""
-    for check in checks:
-        if check.decisive == factor and kind == KINDS[0]:
-            until = f" by {check.name}"
-        if check.displaced is not None and check.decisive == factor:
+    for check in (x for x in checks if x.decisive == factor and kind == KINDS[0]):
+        until = f" by {check.name}"
+        if check.displaced is not None:
             by = f"{format_ratio(check.displaced)} by displacements ({check.name})"
             until = f" until it begins to move, {by}"
     rated = data.statements["rating"].rows if kind == KINDS[2] else []
@@ -218,11 +217,11 @@ def _rank_verdict(data: ReportData) -> tuple[int, dict[str, float], dict[str, fl
     shaken = [x for x, is_margin, _ in ranked if is_margin]
     pushed = [load.least for load in loads if load.site and not shaken]
     demands = shaken, pushed, [x.numbers["least"] for x in rows], factors
-    every = zip(KINDS, (min(x, default=np.inf) for x in demands), strict=True)
     ratings = [0.0 if row.factor == "-" else float(row.factor) for row in rows]
     undecided = outcome.startswith("may") or (bool(data.runs) and bool(_say_why_undecided(data)))
     holds = outcome == "does not survive", any(fails), undecided, "damage" in outcome, True
-    leasts = {kind: least for kind, least in every if least < np.inf}
+    listed = zip(KINDS, demands, strict=True)
+    leasts = {kind: min(x) for kind, x in listed if min(x, default=np.inf) < np.inf}
     return holds.index(True), leasts, leasts | ({KINDS[2]: min(ratings)} if ratings else {})
 
 
