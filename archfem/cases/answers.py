@@ -287,7 +287,7 @@ def list_ratios(found: KinematicAssessment) -> list[tuple[AssessmentCheck, Ratio
         bodies = split if (split or np.inf) < 0.999 * check.ratio else None
         least = check.decisive if bodies is floor is None else check.ratio
         moved = check.moved if check.at_rest and not over else None
-        if found.of_bodies and bodies is not None and moved is not None and floor is None:
+        if bodies is not None and moved is not None and found.of_bodies:
             whole = found.of_bodies.checks[number]
             moved = whole.moved if whole.at_rest else None
         most = np.inf if check.unshown else over.ends[1] if over else least
