@@ -327,7 +327,7 @@ def draw_kinematic_assessment(found: KinematicAssessment) -> Figure:
     Returns:
         The figure: blocks at rest and at the capacity d_u* beside a*(d*), divided by the
         confidence factor, over the spectrum of the demand; the mechanism alone where it has no
-        finite motion.
+        finite motion. Curve, capacity and demand are of the split of weights that decides.
 
     Raises:
         InvalidInput: no horizontal force makes the structure a mechanism.
@@ -348,8 +348,10 @@ def draw_kinematic_assessment(found: KinematicAssessment) -> Figure:
     else:
         figure = style.new_figure(wide, high + 3.0)
         left, right = figure.subplots(2, 1, height_ratios=[high, 3.0])
-    _draw_displaced_mechanism(left, found)
-    _draw_capacity_curve(right, found)
+    # one weight a body lowers the ratio, where the check has both
+    drawn = found if found.displacement.bodies is None else found.of_bodies or found
+    _draw_displaced_mechanism(left, drawn)
+    _draw_capacity_curve(right, drawn, found)
     # in the panels it would lie on curves
     style.add_legend_below(figure, 3)
     return figure
@@ -402,7 +404,9 @@ def _draw_ties(axes: Axes, blocks: PlacedBlocks) -> None:
         label = ""
 
 
-def _draw_capacity_curve(axes: Axes, found: KinematicAssessment) -> None:
+def _draw_capacity_curve(
+    axes: Axes, found: KinematicAssessment, titled: KinematicAssessment
+) -> None:
     """Draw the capacity curve, the displacement check, and the spectrum of the demand."""
     check, curve = found.displacement, found.curve
     reduced = curve["a"].values / found.confidence_factor
@@ -422,7 +426,7 @@ def _draw_capacity_curve(axes: Axes, found: KinematicAssessment) -> None:
     reach = min(1.1 * last, top / slope)
     look = {"color": Colour.LOAD, "lw": 1.0, "ls": "--"}
     axes.plot([0.0, reach], [0.0, slope * reach], label=f"T = {check.period:.2f} s", **look)
-    colour = Colour.MECHANISM if check.passes else Colour.HINGE
+    colour = Colour.MECHANISM if titled.displacement.passes else Colour.HINGE
     axes.axvline(check.capacity, color=colour, lw=1.2, label=f"capacity {check.capacity:.3f} m")
     look = {"mfc": Colour.LOAD, "mec": "white", "ms": 7.0, "zorder": 5}
     label = f"demand {check.demand:.3f} m"
@@ -430,8 +434,8 @@ def _draw_capacity_curve(axes: Axes, found: KinematicAssessment) -> None:
     style.style_axes(axes, "spectral displacement d* [m]", "spectral acceleration a* [m/s²]")
     axes.set(xlim=(0.0, 1.1 * max(last, check.demand)), ylim=(0.0, top))
     rest = ", at which it begins to move" if check.at_rest else ""
-    titles = [f"{_title_check(check)}{rest}"]
-    titles += [] if found.linear.passes else [_title_check(found.linear)]
+    titles = [f"{_title_check(titled.displacement)}{rest}"]
+    titles += [] if titled.linear.passes else [_title_check(titled.linear)]
     style.set_title(axes, "; ".join(titles))
 
 
@@ -439,10 +443,11 @@ def _title_check(check: AssessmentCheck) -> str:
     """Return outcome and ratio of a check in a few words; assumptions on a fill are in the text."""
     some = check.over_fill is not None and check.over_fill.needed
     outcome = "passes with some assumptions" if some else check.words
-    whole, drawn = "", ""
-    if not check.over_fill and (check.bodies or np.inf) < 0.999 * check.ratio:
-        whole, drawn = f"{check.bodies:.3g} with one weight a body, ", " as drawn"
-    return f"{check.name}: {outcome}, {whole}ratio {check.ratios}{drawn}"
+    ratios = check.ratios
+    # that of a lower bound has both
+    if not (check.over_fill or check.unshown) and (check.bodies or np.inf) < 0.999 * check.ratio:
+        ratios = f"{check.bodies:.3g} with one weight a body, {ratios} with the weights apart"
+    return f"{check.name}: {outcome}, ratio {ratios}"
 
 
 def draw_capacity(
