@@ -90,6 +90,16 @@ def read_dataset(path: str | Path, what: str) -> xr.Dataset:
     return dataset
 
 
+def name_flags(table: xr.Dataset) -> xr.Dataset:
+    """Return a table with the meanings of flags among its coordinates (CF Conventions, 3.5)."""
+    coordinates = dict[Any, Any]()  # all, which keeps their order
+    for name, each in table.coords.items():
+        words = each.attrs.get("flag_meanings", "").split()
+        named = (each.dims, [words[int(x)] for x in each.values]) if words else each.variable
+        coordinates[name] = named
+    return table.drop_vars(coordinates).assign_coords(coordinates)
+
+
 def _check_sizes(file: netCDF4.Dataset, size: int) -> None:
     """Refuse variables that declare more than a file of a size holds, or than fits into memory."""
     # texts of any length are Python's, which take more; NumPy's product may overflow

@@ -23,7 +23,7 @@ from tqdm import tqdm
 
 from archfem import _files
 from archfem._display import PROGRESS_INTERVAL, write_progress_line
-from archfem._netcdf import read_dataset, write_dataset
+from archfem._netcdf import name_flags, read_dataset, write_dataset
 from archfem._validation import validate_arguments
 from archfem.cases.provenance import describe_version
 from archfem.cases.result_text import STATED_DOUBTS, UPPER_BOUNDS, mark_bound
@@ -352,6 +352,8 @@ def build_table(
             if "." in key and key != PAIR_KEY:  # of the case; others are names
                 values, unit = in_si_unit(values)
             attributes = {"units": unit} if unit else {}
+            if all(isinstance(value, bool) for value in values):
+                attributes = {"flag_values": [0.0, 1.0], "flag_meanings": "no yes"}
             table.coords[_coordinate(key)] = _coordinate(axis.name), _to_array(values), attributes
         if axis.name not in axis.keys:
             table.coords[axis.name] = axis.name, np.arange(len(axis.rows))
@@ -410,7 +412,7 @@ def _to_cell(value: Any) -> Any:
 
 def format_table(table: xr.Dataset, max_rows: int = 50) -> str:
     """Return the table of a study as text: keys, and the findings in which points differ."""
-    frame = _flatten(table).drop(columns=["error", STATED_DOUBTS], errors="ignore")
+    frame = _flatten(name_flags(table)).drop(columns=["error", STATED_DOUBTS], errors="ignore")
     points, shown = frame.to_dict("records"), frame.drop(columns=UPPER_BOUNDS, errors="ignore")
     cells = {x: [mark_bound(each, x, _format_cell(each[x])) for each in points] for x in shown}
     same = {x: each[0] for x, each in cells.items() if x not in table.coords and len({*each}) == 1}

@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
+from archfem._netcdf import name_flags
 from archfem._typing import Array
 from archfem._validation import validate_arguments
 from archfem.dynamics.accuracy import Accuracy
@@ -98,7 +99,7 @@ def draw_findings(
     Raises:
         InvalidInput: no finding is a number that differs between points.
     """
-    flat = table.drop_dims("entry", errors="ignore")
+    flat = name_flags(table.drop_dims("entry", errors="ignore"))
     frame = flat.to_dataframe(dim_order=list(flat.dims)).reset_index()
     differs = {name: frame[name].replace(np.inf, np.nan).nunique() > 1 for name in frame}
     # numbers of points and samples are no keys of the case

@@ -18,6 +18,7 @@ from scipy import stats
 from study_tables import equal_tables
 
 import archfem as af
+from archfem._netcdf import write_dataset
 from archfem.cases import provenance
 from archfem.cases.report.study_findings import collect_findings, tabulate_study
 from archfem.cases.result_text import describe_collapse
@@ -26,6 +27,7 @@ from archfem.studies.evaluators import Evaluator, evaluate_limit, evaluate_ratin
 from archfem.studies.parameter_space import group_by_model
 from archfem.studies.result_store import Store
 from archfem.studies.shared_results import compute_once, share_results
+from archfem.view import draw_findings
 
 
 @pytest.fixture
@@ -377,6 +379,21 @@ def test_pairs_that_another_worker_matches_are_left_for_later(small):
     tasks = process_pool.TaskQueue(points, Evaluator.of("dead load"))
     assert tasks.pop(None, (), {"first"}).pair == "second"
     assert tasks.pop(None, (), {"first"}).pair == "first"  # better than to wait
+
+
+def test_a_key_that_is_no_or_yes_is_drawn_and_told_in_words(tmp_path):
+    """Its column of the files has 0 and 1."""
+    axes = parameter_axes({"motion.reversed": [True, False], "motion.scale": [1.0, 2.0, 3.0]})
+    rows = [{"found": {"factor": 1.0 + k}, "error": ""} for k in range(6)]
+    table = result_store.build_table(axes, rows, {}, {})
+    assert table["motion.reversed"].values.tolist() == [1.0, 0.0]
+    kept = af.studies.read_table(write_dataset(table, tmp_path / "results.nc", "table"))
+    over_sense, over_scale = draw_findings(kept).axes
+    assert [x.get_text() for x in over_sense.get_xticklabels()] == ["yes", "no"]
+    assert [x.get_text() for x in over_scale.get_legend().get_texts()] == ["yes", "no"]
+    first = result_store.format_table(kept).splitlines()[1]
+    assert first.split() == ["yes", "1", "1"]
+    assert tabulate_study(collect_findings("signs", "", kept)).rows[-1] == ["no", "3", "6"]
 
 
 def test_a_long_table_is_cut_and_equal_findings_are_stated_once(small_ring):

@@ -12,7 +12,7 @@ import numpy as np
 import xarray as xr
 
 from archfem._files import hash_json, path_inside, read_file_list, read_listed, read_sealed_json
-from archfem._netcdf import read_dataset
+from archfem._netcdf import name_flags, read_dataset
 from archfem.cases.result_text import STATED_DOUBTS, UPPER_BOUNDS, mark_bound
 from archfem.cases.structure_keys import CONTACT_KEYS, MATERIAL_KEYS, list_shapes, shape_keys
 from archfem.dynamics.collapse_state import COLLAPSE_STATES, FALLEN_STATES
@@ -212,7 +212,7 @@ def read_study(place: Path, structure: Collection[str]) -> StudyFindings:
 
 def collect_findings(title: str, text: str, table: xr.Dataset) -> StudyFindings:
     """Return the worst point of each case of the table of a study."""
-    table = table.drop_dims("entry", errors="ignore")
+    table = name_flags(table.drop_dims("entry", errors="ignore"))
     if "least_push_over_site" in table:
         table = table.rename(least_push_over_site=OVER_SITE)
         if UPPER_BOUNDS in table:
