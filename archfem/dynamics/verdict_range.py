@@ -146,15 +146,34 @@ class VerdictRange(ResultDisplay):
         Analysis, 2008, section 1.2.6). Runs that are `in_doubt` count, as in `share`.
 
         Returns:
-            By property, in descending order; chance alone explains about 2 / runs.
+            By property, in descending order; chance alone explains about 2 / runs of one property,
+            and more of the largest: see `beyond_chance`.
         """
         decisive = self.decisive[self.answered]
         outcomes = decisive.astype(float) if self.is_mixed else self._residual_ranks()
-        shares = {
-            name: _correlation_ratio(self.dataset[name].values[self.answered], outcomes)
-            for name in self.properties
-        }
-        return dict(sorted(shares.items(), key=lambda item: -item[1]))
+        shares = zip(self.properties, self._correlate(outcomes[None])[:, 0].tolist(), strict=True)
+        return dict(sorted(shares, key=lambda item: -item[1]))
+
+    @cached_property
+    def beyond_chance(self) -> frozenset[str]:
+        """Properties with a larger share by `importance` than chance gives any, at the 5 % level.
+
+        Of random permutations of the outcomes, the largest share of all properties is the measure
+        of chance (Westfall and Young, 1993). There are none where outcomes are all alike.
+        """
+        decisive, random = self.decisive[self.answered].astype(float), np.random.default_rng(0)
+        if not self.is_mixed:
+            return frozenset()
+        chance = [random.permutation(decisive) for _ in range(PERMUTATIONS)]
+        largest = np.sort(self._correlate(np.array(chance)).max(axis=0))
+        # the outcomes themselves are one of their permutations
+        least = largest[-int(MAX_CHANCE * (PERMUTATIONS + 1))] + 1e-9
+        return frozenset(name for name, share in self.importance().items() if share > least)
+
+    def _correlate(self, outcomes: Array) -> Array:
+        """Return correlation ratios of outcomes (n, answered runs) by property (properties, n)."""
+        columns = (self.dataset[name].values[self.answered] for name in self.properties)
+        return np.array([_correlation_ratios(each, outcomes) for each in columns])
 
     @property
     def is_mixed(self) -> bool:
@@ -263,11 +282,24 @@ class VerdictRange(ResultDisplay):
         """
         return change.residual if self.is_dislocation_worst else change.displacement
 
+    @property
+    def _by_steps(self) -> "list[SingleChange]":
+        """The unvaried run, and that of half its step, where they do not fall."""
+        made = [x for x in self.single_changes if x.rank in (0, 1)]
+        return [x for x in made if x.name in (UNVARIED, HALF_STEP)]
+
+    @property
+    def is_quiet(self) -> bool:
+        """Whether unvaried, by any step, it is displaced no farther than a structure as drawn."""
+        return all(x.displacement <= MAX_SLIP_AT_REST for x in self._by_steps)
+
     @cached_property
     def step_ratio(self) -> float:
-        """Ratio of displacements up to which other time steps alone may change them [-]."""
-        made = [x for x in self.single_changes if x.rank in (0, 1)]
-        sizes = [self.measure(x) for x in made if x.name in (UNVARIED, HALF_STEP)]
+        """Ratio of displacements up to which other time steps alone may change them [-].
+
+        It is of blocks that rock or slide: of runs that are `is_quiet` it says nothing.
+        """
+        sizes = [self.measure(x) for x in self._by_steps]
         least, most = min(sizes, default=1.0), max(sizes, default=1.0)
         return max(MAX_RATIO_OF_DISPLACEMENTS, most / least if least > 0.0 else inf)
 
@@ -310,7 +342,8 @@ class VerdictRange(ResultDisplay):
         """Say how far the unvaried structure is displaced, and with which changes farthest."""
         moved = sorted(held, key=lambda each: -self.measure(each))[:2]
         larger = [each for each in moved if self.is_beyond_steps(each, given)]
-        alike = ": other time steps alone may change it as much" * bool(moved and not larger)
+        as_much = moved and not larger and not self.is_quiet
+        alike = ": other time steps alone may change it as much" * bool(as_much)
         larger = larger or moved[:1]
         listed = [f"{format_mm(self.measure(each))} with {each.name}" for each in larger]
         verb = "remains" if self.is_dislocation_worst else "is"
@@ -406,6 +439,9 @@ class VerdictRange(ResultDisplay):
         if not conditions:
             sampled = self.answers["sampled"].values
             among = f" among the {sampled.sum()} that vary all" * bool(~sampled.all())
+            alone = decisive[~sampled]  # the unvaried run is the first
+            if self.answered[0] and (count := int((alone[1:] != alone[:1]).sum())):
+                among += f", but {count} of {len(alone) - 1} single changes alter the outcome"
             return f"no property separates {runs} from the others by more than chance{among}"
         chosen = np.all([each.holds(self.answers) for each in conditions], axis=0)
         where = " and ".join(map(self._condition_text, conditions))
@@ -459,9 +495,10 @@ class VerdictRange(ResultDisplay):
                 f"{label}: {int(decisive[chosen].sum())} of {int(chosen.sum())}"
                 for label, chosen in groups
             ]
-            explained = [f"{share:.0%}"] if self.is_mixed else []
-            rows.append([property_text(name), *explained, ", ".join(cells)])
-        head = ["explains, of the variance of the outcome"] if self.is_mixed else []
+            explained = f"{share:.0%}" if name in self.beyond_chance else "no more than chance"
+            own = [explained] * bool(self.beyond_chance)
+            rows.append([property_text(name), *own, ", ".join(cells)])
+        head = ["explains, of the variance of the outcome"] * bool(self.beyond_chance)
         return ["property", *head, self.counted], rows
 
     def table(self) -> str:
@@ -472,7 +509,9 @@ class VerdictRange(ResultDisplay):
         """Sentence, doubts, displacements, and a line for each property."""
         doubts = [f"{DOUBT_MARK}{doubt}" for doubt in self.doubts]
         moved = filter(None, [self.displacements, "; ".join(self.what_changes)])
-        return "\n".join([self.sentence, *doubts, *moved, self.table()])
+        none = "no varied property explains the variance of the outcomes more than chance does"
+        shares = [none] * (self.is_mixed and not self.beyond_chance)
+        return "\n".join([self.sentence, *doubts, *moved, *shares, self.table()])
 
     def _summary(self) -> str:
         return f"VerdictRange: {self.sentence}"
@@ -601,11 +640,9 @@ def _group_values(values: Array, groups: int = 3) -> list[tuple[str, NDArray[np.
     ]
 
 
-def _correlation_ratio(values: Array, outcomes: Array) -> float:
-    """Return the variance of the group means of outcomes over their variance [-]."""
-    total = float(np.sum((outcomes - outcomes.mean()) ** 2))
-    between = sum(
-        float(chosen.sum() * (outcomes[chosen].mean() - outcomes.mean()) ** 2)
-        for _, chosen in _group_values(values)
-    )
-    return between / total if total > 0.0 else 0.0
+def _correlation_ratios(values: Array, outcomes: Array) -> Array:
+    """Return the variance of the group means of outcomes (n, runs) over their variance (n,) [-]."""
+    apart = outcomes - outcomes.mean(axis=1, keepdims=True)
+    total, groups = (apart**2).sum(axis=1), [chosen for _, chosen in _group_values(values)]
+    between = sum(apart[:, chosen].sum(axis=1) ** 2 / chosen.sum() for chosen in groups)
+    return np.divide(between, total, out=np.zeros_like(total), where=total > 0.0)

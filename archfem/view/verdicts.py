@@ -52,14 +52,14 @@ def draw_verdict_range(verdicts: VerdictRange) -> Figure:
     for axes, (name, share) in zip(panels, shares.items(), strict=False):
         beside = "residual\ndisplacement [mm]" if axes in panels[::columns] else ""
         style.style_axes(axes, labels.get(name, name.replace("_", " ")), beside)
-        if verdicts.is_mixed:
+        if name in verdicts.beyond_chance:
             style.set_title(axes, f"explains {share:.0%}")
         _draw_property(axes, verdicts, rows[name].values, heights)
         if falls.any():
             axes.axhline(top, color=Colour.GREY, lw=0.9, ls="--")
         axes.set(yscale="log", ylim=(0.7e-3 * top, 4.0 * top))
     style.add_legend_below(figure, 3)
-    shares_of = "; shares are of the variance of the outcome" * verdicts.is_mixed
+    shares_of = "; shares are of the variance of the outcome" * bool(verdicts.beyond_chance)
     style.set_figure_title(figure, verdicts.headline + shares_of)
     return figure
 

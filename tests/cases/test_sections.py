@@ -3,6 +3,7 @@
 import re
 from dataclasses import replace
 from itertools import pairwise
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -139,7 +140,7 @@ def test_the_doubts_of_several_runs_stand_in_one_table(piers, runs, monkeypatch)
 def test_falls_by_property_are_a_table_whose_cells_wrap(piers, tmp_path):
     """As text their lines were wider than a page, and broke before the last word."""
     rows = {
-        "outcome": ["fallen", "stands"] * 8,
+        "outcome": ["fallen"] * 8 + ["stands"] * 8,
         "displacement": np.zeros(16),
         "residual": np.zeros(16),
         "error": [""] * 16,
@@ -166,6 +167,42 @@ def test_falls_by_property_are_a_table_whose_cells_wrap(piers, tmp_path):
     assert name == "k_n"
     assert cell.count(" of ") == 3
     assert table.manner == "words"
+
+
+def range_of_steps(motion, size):
+    """Variations of a run and half its step, and one sample, displaced by a size [m]."""
+    rows = {
+        **{"outcome": ["stands"] * 3, "displacement": [size] * 3, "residual": [size] * 3},
+        **{"error": [""] * 3, "sampled": [False, False, True], "dt": ["as given", "half", "half"]},
+    }
+    columns = {name: ("run", np.asarray(values)) for name, values in rows.items()}
+    attrs = {"properties": ["dt"], "k_n": 2e9, "k_s": 1e9, "motion": motion}
+    return VerdictRange(xr.Dataset(columns, attrs=attrs))
+
+
+@pytest.mark.parametrize(("given", "tables"), [({}, 1), ({"dt": "half"}, 2)])
+def test_properties_that_all_motions_vary_alike_are_one_table(piers, tmp_path, given, tables):
+    """Of motions that move it by less than a millimetre no ratio of time steps is told."""
+    made = [range_of_steps("a", 0.0002), range_of_steps("b", 0.02)]
+    made[1].dataset["dt"][:] = [given.get("dt", x) for x in made[1].dataset["dt"].values]
+    files = dict[str, Path]()
+    for found in made:
+        place = f"{found.dataset.attrs['motion']}/verdict_range"
+        (tmp_path / place).parent.mkdir()
+        files |= {f"{place}.{kind}": tmp_path / f"{place}.{kind}" for kind in ("txt", "nc")}
+        files[f"{place}.txt"].write_text(str(found), encoding="utf-8")
+    case = SimpleNamespace(structure=piers, suite={"pairs": {"a": {}, "b": {}}}, settings={})
+    data = report_data.ReportData(case, {})
+    vars(data).update(files=files, verdict_ranges=tuple(made))
+    grids = [x for x in sections._build_range(data) if x.kind == "grid"]
+    varied = [x.caption for x in grids if x.caption.startswith("Varied properties")]
+    assert len(varied) == tables
+    assert varied[0].endswith("each alone, under each of 2 motions" if tables == 1 else "alone")
+    singles = {x.caption[:28]: x.caption for x in grids if x.caption.startswith("Single")}
+    ratio = "other time steps alone may change displacements 1.5 times"
+    assert {ratio in caption for place, caption in singles.items() if "'a'" in place} == {False}
+    if not given:
+        assert {ratio in x for place, x in singles.items() if "'b'" in place} == {True}
 
 
 @pytest.mark.parametrize(

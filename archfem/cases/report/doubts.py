@@ -21,6 +21,7 @@ from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import join_words
 from archfem.models.model import Doubt, group_doubts, merge_doubts
 from archfem.statics.assessment_checks import OF_SPLIT, UPPER_BOUND
+from archfem.statics.equilibrium import MAX_SLIP_AT_REST
 from archfem.units import STANDARD_GRAVITY, Ends
 
 # Ratio of the peaks of motions and spectrum beyond which they are different demands: those of
@@ -163,9 +164,9 @@ def _doubt_displacement(data: ReportData, found: VerdictRange) -> Iterator[Doubt
     sizes = verdict.displacement, float(base["displacement"])
     fallen = [each in FALLEN_STATES for each in (verdict.outcome, base["outcome"].item())]
     own, other = ("falls" if falls else "is displaced by up to {:mm}" for falls in fallen)
-    if fallen[0] != fallen[1] or (
-        not fallen[0] and max(sizes) > MAX_RATIO_OF_DISPLACEMENTS * min(sizes)
-    ):
+    # displaced by less it stands as drawn
+    largest = max(MAX_RATIO_OF_DISPLACEMENTS * min(sizes), MAX_SLIP_AT_REST)
+    if fallen[0] != fallen[1] or (not fallen[0] and max(sizes) > largest):
         held = (size for size, falls in zip(sizes, fallen, strict=True) if not falls)
         words = f"the run {own}; with another time step or fidelity it {other}"
         yield Doubt(words, RANGE_REMEDY, tuple(held))

@@ -483,7 +483,7 @@ def _build_range(data: ReportData) -> list[Any]:
         "{} by the value of each property: of k_n, k_s and damping ratio factors on the values of "
         "the case, of friction what is added"
     )
-    built, ranges = list[Any](), iter(data.verdict_ranges)
+    built, ranges, varied = list[Any](), iter(data.verdict_ranges), iter(_tabulate_varied(data))
     for pair, place in data.list_parts("verdict_range.txt").items():
         # the picture of a pair is named by it, since there may be several
         named = f"Under '{pair}': {caption[:1].lower()}{caption[1:]}" if pair else caption
@@ -499,12 +499,22 @@ def _build_range(data: ReportData) -> list[Any]:
             told = filter(None, [found.sentence, found.displacements * spans_run(data, found)])
             blocks[: 2 if changes else 1] = [TextBlock(sentence("; ".join(told)))]
         if found is not None:
-            count = found.dataset["sampled"].values.sum()
-            varied = f"Varied properties; {count} samples, and each alone"
-            head = ("property", "varied over", "mark")
-            blocks.insert(1, Grid(head, list_ranges(data, found), varied, "words"))
+            blocks[1:1] = next(varied)
         built += [*blocks, *changes]
     return built
+
+
+def _tabulate_varied(data: ReportData) -> list[list[Grid]]:
+    """Tabulate the varied properties of each motion, with the first alone where all are alike."""
+    head, tables = ("property", "varied over", "mark"), list[Grid]()
+    for found in data.verdict_ranges:
+        count = found.dataset["sampled"].values.sum()
+        caption = f"Varied properties; {count} samples, and each alone"
+        tables.append(Grid(head, list_ranges(data, found), caption, "words"))
+    if len(tables) < 2 or any(each != tables[0] for each in tables):
+        return [[each] for each in tables]
+    caption = f"{tables[0].caption}, under each of {len(tables)} motions"
+    return [[replace(tables[0], caption=caption)], *[list[Grid]() for _ in tables[1:]]]
 
 
 def _tabulate_single_changes(data: ReportData, found: VerdictRange, pair: str) -> list[Grid]:
@@ -516,6 +526,7 @@ def _tabulate_single_changes(data: ReportData, found: VerdictRange, pair: str) -
         limit = DISLOCATION * shallowest_part(data.case.structure)[0]
         caption += f", by the displacement at the end; beyond {format_mm(limit)} it is dislocated"
     steps = f"; other time steps alone may change displacements {found.step_ratio:.2g} times"
+    steps *= not found.is_quiet
     head = ("single change", "outcome", "largest displacement", "at the end")
     rows = [
         # of a fall it is the way to the ground
