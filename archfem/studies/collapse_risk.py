@@ -635,7 +635,7 @@ class CollapseRisk(ResultDisplay):
         doubts += self._doubt_records()
         found, dt = self.dataset, self.dataset.attrs["dt"]
         steps, lacking = found["admissible_step"].values, found["lacks_joints"].values
-        doubts += doubt_runs(steps.tolist(), lacking.tolist(), dt, "samples", "")
+        doubts += doubt_runs(steps.tolist(), lacking.tolist(), dt, "samples")
         doubts += self._doubt_rest()
         count = len(self.dataset["sample"])
         # a twentieth of all is what the 90 % interval leaves out at each of its ends

@@ -17,6 +17,7 @@ import numpy as np
 import xarray as xr
 from scipy.stats import qmc
 
+from archfem._typing import Flags
 from archfem._validation import check_integer, validate_arguments
 from archfem.cases.case import Case
 from archfem.cases.defaults import list_default_keys
@@ -161,7 +162,9 @@ def verdict_range(  # noqa: PLR0913  (one call, one argument for each thing that
     doubts += doubt_soft_blocks(*structures)
     steps = [row["found"].get("admissible_step", inf) for row in rows.values()]
     lacking = [row["found"].get("lacks_joints", False) for row in rows.values()]
-    doubts += doubt_runs(steps, lacking, analysis.dt)
+    # rigid blocks have steps of their own
+    halved = [x.get("dt") == "half" and x.get("joint_rule") != "rigid" for x in changes]
+    doubts += doubt_runs(steps, lacking, analysis.dt, halved=np.array(halved))
     outcomes, residuals = dataset["outcome"].values, dataset["residual"].values
     doubts += doubt_standing(analysis.structure, outcomes, residuals)
     dataset.attrs["doubts"] = write_doubts(doubts)
@@ -187,19 +190,24 @@ def doubt_runs(
     lack_joints: Sequence[bool],
     dt: float | None,
     runs: str = "runs",
-    half: str = " or half of it",
+    halved: Flags | None = None,
 ) -> Iterator[Doubt]:
     """Yield doubts where steps are too long for sliding, or joints lack, in runs or samples.
 
-    Admissible steps are infinite where those of the run follow.
+    Admissible steps are infinite where those of the run follow. Of runs some may have half the
+    step; where all of these follow, it is the remedy, as of other steps others may not follow.
     """
-    of, steps = f"in {{}} of {len(admissible)} {runs}", [step for step in admissible if step < inf]
-    if steps and dt is not None:
+    of, long = f"in {{}} of {len(admissible)} {runs}", np.array(admissible) < inf
+    if long.any() and dt is not None:
+        step, of_step = min(admissible), "or less, and repeat this while any is in doubt"
+        if halved is not None and halved.any() and not long[halved].any():
+            step, of_step = 0.5 * dt, f"with which none of {halved.sum()} runs is in doubt"
+        half = " or half of it" * (halved is not None)
+        alone = "; without dt, a single run varies its steps, and has no such doubt" * bool(half)
         yield Doubt(
             f"{of} the steps, {1e3 * dt:g} ms{half}, are long for sliding",
-            f"take {1e3 * min(steps):g} ms or less, `--set analysis.dt={min(steps):g}`"
-            f"{'; without dt, a single run varies its steps, and has no such doubt' * bool(half)}",
-            (len(steps),),
+            f"take {1e3 * step:g} ms, `--set analysis.dt={step:g}`, {of_step}{alone}",
+            (int(long.sum()),),
         )
     if lacking := int(sum(lack_joints)):
         words = "blocks were loose, without elastic joints, before strong motion was over, and none"

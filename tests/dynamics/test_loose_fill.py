@@ -303,6 +303,29 @@ def test_pieces_that_fell_out_of_the_ends_of_the_fill_are_in_doubt_by_end(footbr
         assert f"free end at x = {end:.4g} m, {count} of {len(fill)}; retain" in text
 
 
+@pytest.mark.parametrize("over_crown", [-0.05, 0.05])
+def test_an_end_that_a_wall_retains_up_to_the_crown_gets_no_advice_to_retain_it(over_crown):
+    """The wall of the left end ends by 5 cm below or above the highest corner of the ring."""
+    arch = af.shapes.Arch(span=6.0, rise=1.5, thickness=0.4, voussoirs=15)
+    held = {"length": 1.0, "height": 0.5, "setback": 0.0, "state": "fixed"}
+
+    def build(left):
+        walls = [af.shapes.Sidewall(**held, above=x, name=f"{x:g}") for x in (left, 1.0)]
+        fill = af.shapes.Backfill(cover=0.3)
+        return af.bridge(arches=[arch], sidewalls=walls, backfill=fill)
+
+    crown = max(np.max(x.points, axis=0)[1] for x in build(1.1).blocks if x.role == "ring")
+    low = max(np.max(x.points, axis=0)[1] for x in build(1.1).blocks if x.fixed) - 1.1
+    bridge = build(crown + over_crown - low)
+    pieces = af.masonry.jointed_fill(bridge, 0.5, friction_angle=35.0)
+    moved = np.zeros(len(pieces.blocks))
+    moved[[*find_yielding_blocks(pieces)]] = 9.0
+    left, right = doubt_fallen_fill(pieces, moved)
+    advised = ["setback = 0" in doubt.remedy for doubt in (left, right)]
+    assert advised == [over_crown < 0.0, True]
+    assert ("longer ones, `length`" in left.remedy) == (over_crown > 0.0)
+
+
 @pytest.mark.slow
 def test_no_scale_is_searched_where_the_fill_bears_tension_at_rest(footbridge):
     """In proportion to its weight: twice as heavy it bears twice the tension."""

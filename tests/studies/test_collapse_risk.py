@@ -372,8 +372,8 @@ def test_steps_too_long_for_sliding_at_a_bound_are_in_doubt(monkeypatch):
     found = af.collapse_risk(*given, samples=8, precision=0.5, vary={"friction": (-0.1, 0.1)})
     (doubt,) = (str(each) for each in found.doubts if "sliding" in str(each))
     assert doubt == (
-        "in 4 of 8 samples the steps, 5 ms, are long for sliding; take 2 ms or less, "
-        "`--set analysis.dt=0.002`"
+        "in 4 of 8 samples the steps, 5 ms, are long for sliding; take 2 ms, "
+        "`--set analysis.dt=0.002`, or less, and repeat this while any is in doubt"
     )
     found.dataset["admissible_step"].values[:] = np.inf
     assert "sliding" not in str(found.doubts)
