@@ -59,7 +59,7 @@ def state_ratings(
         outcome = f"rating for {first.vehicle.name}: {first.said_factor}, {outcome}"
         sentences = [outcome, f"worst {first.place}", *others]
     if len(rated) > 1:
-        least, code = first.least_by_codes
+        least, code = first.rank
         words = f", {least:.4g} {code}" * bool(code)
         sentences.append(f"of {len(rated)} vehicles it has the least factor{words}")
     sentences += [*first.describe_codes(), *first.describe_pressure(), *first.describe_backing()]
@@ -98,7 +98,7 @@ def _say_flips(share: float, varied: ResultTable) -> str:
 def tabulate_ratings(ratings: Iterable[Rating]) -> ResultTable:
     """Tabulate the ratings of a bridge for several vehicles."""
     rows, columns, rated = [], list[str](), list(ratings)
-    by_codes = any(found.least_by_codes[1] for found in rated)
+    by_codes = any(found.rank[1] for found in rated)
     for found in rated:
         columns, numbers = [*found.factors], found.factors.values()
         cells = ["-" if np.isnan(value) else f"{value:.4g}" for value in numbers]

@@ -334,7 +334,7 @@ def _vary(
 def _rate_each(
     case: Case, tables: Sequence[Mapping[str, Any]]
 ) -> list[tuple[Rating, list[result_text.Remark], Mapping[str, Any]]]:
-    """Return ratings with their doubts and tables, that of `least_by_codes` first.
+    """Return ratings with their doubts and tables, that of the least `rank` first.
 
     Those before Ctrl-C are returned, if there are any.
     """
@@ -356,7 +356,7 @@ def _rate_each(
             progress.show(f"{found.vehicle.name}: {found.headline.partition(',')[0]}", 1)
             if np.isnan(found.factor):  # whatever the vehicle
                 break
-    return sorted(rated, key=lambda each: each[0].least_by_codes[0])
+    return sorted(rated, key=lambda each: each[0].rank[0])
 
 
 def mesh(options: argparse.Namespace) -> None:

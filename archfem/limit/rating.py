@@ -476,9 +476,15 @@ class Rating(ResultDisplay):
 
     @property
     def least_by_codes(self) -> tuple[float, str]:
-        """Least factor by codes of a vehicle without factors, and of which; else its own, ""."""
-        codes = self.by_codes if self.missing else {}
-        return min(((x.factor, by) for by, x in codes.items()), default=(self.factor, ""))
+        """Least factor by codes, and of which; "" where that of its own factors is less."""
+        codes = self.by_codes
+        own = [(self.factor, "")] * (not self.missing or not codes)
+        return min([*own, *((x.factor, by) for by, x in codes.items())])
+
+    @property
+    def rank(self) -> tuple[float, str]:
+        """Factor by which vehicles are ranked: without factors `least_by_codes`, else its own."""
+        return self.least_by_codes if self.missing else (self.factor, "")
 
     @property
     def _is_multiple(self) -> bool:

@@ -85,12 +85,11 @@ def doubt_whole_fill(structure: Structure) -> tuple[Doubt, ...]:
         return ()
     heights = [height for number in fill for height in _free_end_heights(structure, number)]
     ends = f", and it ends in free faces of {join_names(heights)} m" if heights else ""
-    hold = "hold its ends by sidewalls ([structure.sidewalls] in a case), and " * bool(heights)
     return (
         Doubt(
             f"fill in one piece holds itself by tension: as soil of {angle:g}° and "
             f"{cohesion / kPa:g} kPa it does not stand under its own weight{ends}",
-            f"{hold}compare with pieces "
+            "hold its ends by sidewalls ([structure.sidewalls] in a case), and compare with pieces "
             '(law = "jointed", friction_angle and piece_size in [structure.fill])',
         ),
     )
