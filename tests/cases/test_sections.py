@@ -182,7 +182,7 @@ def range_of_steps(motion, size):
 
 @pytest.mark.parametrize(("given", "tables"), [({}, 1), ({"dt": "half"}, 2)])
 def test_properties_that_all_motions_vary_alike_are_one_table(piers, tmp_path, given, tables):
-    """Of motions that move it by less than a millimetre no ratio of time steps is told."""
+    """No ratio of time steps is said of motions that move it by less than a millimetre."""
     made = [range_of_steps("a", 0.0002), range_of_steps("b", 0.02)]
     made[1].dataset["dt"][:] = [given.get("dt", x) for x in made[1].dataset["dt"].values]
     files = dict[str, Path]()

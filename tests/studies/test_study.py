@@ -381,7 +381,7 @@ def test_pairs_that_another_worker_matches_are_left_for_later(small):
     assert tasks.pop(None, (), {"first"}).pair == "first"  # better than to wait
 
 
-def test_a_key_that_is_no_or_yes_is_drawn_and_told_in_words(tmp_path):
+def test_a_boolean_key_is_drawn_and_printed_in_words(tmp_path):
     """Its column of the files has 0 and 1."""
     axes = parameter_axes({"motion.reversed": [True, False], "motion.scale": [1.0, 2.0, 3.0]})
     rows = [{"found": {"factor": 1.0 + k}, "error": ""} for k in range(6)]
