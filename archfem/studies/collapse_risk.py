@@ -603,21 +603,23 @@ class CollapseRisk(ResultDisplay):
     def disaggregation(self, bins: int = 12) -> tuple[Array, Array]:
         """Return the edges of bins of intensity (bins + 1,), and the share of the rate in each.
 
-        The rest of the rate lies above the last edge, where all structures fall.
+        A thousandth of the rate lies below the first edge. The rest lies above the last one, where
+        all structures fall.
 
         Args:
             bins: number of bins.
         """
         curve, every = self.fragility(), np.arange(len(self.answered))[None]
-        spread = np.linspace(-3.5, 2.5, check_integer(bins, "bins") + 1)
-        edges = curve.median * np.exp(curve.dispersion * spread)
-        middle = np.log(edges[1:] * edges[:-1]) / 2.0
-        falls = 0.0
-        for group in self._groups:
-            mean, deviation = self._fits(every, group)
-            falls += group.mean() * ndtr((middle - mean) / deviation)
-        shares = falls * -np.diff(self.hazard.rate_of(edges))
-        return edges, shares / (shares.sum() + self.hazard.rate_of(edges[-1]))
+        place = np.log(curve.median) + curve.dispersion * np.linspace(-15.0, 2.5, 3501)
+        middle = (place[1:] + place[:-1]) / 2.0
+        fits = [(group.mean(), *self._fits(every, group)) for group in self._groups]
+        falls = sum(share * ndtr((middle - mean) / wide) for share, mean, wide in fits)
+        rates = self.hazard.rate_of(np.exp(place))
+        below = np.cumsum(np.append(0.0, falls * -np.diff(rates)))
+        below /= below[-1] + rates[-1]
+        first, steps = np.interp(0.001, below, place), check_integer(bins, "bins")
+        edges = np.linspace(first, place[-1], steps + 1)
+        return np.exp(edges), np.diff(np.interp(edges, place, below))
 
     @property
     def doubts(self) -> tuple[Doubt, ...]:

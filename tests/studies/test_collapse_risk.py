@@ -57,13 +57,31 @@ def test_rate_of_a_lognormal_capacity_is_that_of_cornell():
     chance = risk.rate().probability(50.0)[0]
     assert chance == pytest.approx(1.0 - np.exp(-50.0 * risk.rate().rate), rel=1e-12)
     edges, shares = risk.disaggregation(60)
-    # above the last edge all fall: the rest of the rate is that of exceedance
+    # above the last edge all fall, and a thousandth lies below the first one
     rest = float(risk.hazard.rate_of(edges[-1])) / risk.rate().rate
-    assert 0.04 < rest == pytest.approx(1.0 - shares.sum(), rel=0.01)
+    assert 0.04 < rest == pytest.approx(0.999 - shares.sum(), rel=0.01)
     # Φ(z) x^-b is largest where φ / Φ is b β
     z = brentq(lambda z: norm.pdf(z) / norm.cdf(z) - 2.5 * dispersion, -5.0, 5.0)
     peak = np.sqrt(edges[1:] * edges[:-1])[np.argmax(shares)]
     assert peak == pytest.approx(median * np.exp(dispersion * z), rel=0.04)  # a bin is 4 %
+
+
+def test_shares_of_the_rate_are_those_of_a_steep_hazard_and_a_wide_capacity():
+    """Integration by parts: of the rate Φ(z + b β) - Φ(z) exp(-b β z - (b β)² / 2) is below z."""
+    median, dispersion, exponent = 5.0, 0.8, 3.0
+    capacity = median * np.exp(dispersion * norm.ppf((np.arange(1000) + 0.5) / 1000))
+    risk = risk_of(capacity, np.arange(1000) % 20)
+    values = asdict(SITE) | {"intensity": [1.0, 10.0], "rate": [2e-3, 2e-3 * 10.0**-exponent]}
+    risk.dataset.attrs["hazard"] = json.dumps(values)
+    wide = risk.fragility().dispersion
+    for bins in (6, 60):
+        edges, shares = risk.disaggregation(bins)
+        z = np.log(edges / risk.fragility().median) / wide
+        shift = exponent * wide
+        below = norm.cdf(z + shift) - norm.cdf(z) * np.exp(-shift * z - shift**2 / 2.0)
+        assert below[0] == pytest.approx(1e-3, rel=0.01)
+        # steps of 0.005 deviations, and two ways to fit a lognormal to narrow brackets
+        assert shares == pytest.approx(np.diff(below), abs=1e-4)
 
 
 @pytest.mark.parametrize("last", [pytest.param(2.5, marks=pytest.mark.slow), 8.0])

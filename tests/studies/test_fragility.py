@@ -275,10 +275,20 @@ def test_annual_rate_is_that_of_cornell():
     def cornell(median, dispersion):
         return 2e-3 * median**-2.5 * np.exp(0.5 * (2.5 * dispersion) ** 2)
 
-    # 240 intervals over six deviations to either side
-    assert rate.rate == pytest.approx(cornell(curve.median, curve.dispersion), rel=1e-4)
+    assert rate.rate == pytest.approx(cornell(curve.median, curve.dispersion), rel=1e-9)
     ends = np.quantile(cornell(*curve.resampled.T), [0.05, 0.95])
-    assert (rate.low, rate.high) == pytest.approx(tuple(ends), rel=1e-4)
+    assert (rate.low, rate.high) == pytest.approx(tuple(ends), rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("exponent", "dispersion"), [(4.0, 1.0), (4.0, 1.3), (6.0, 0.7), (3.0, 0.0)]
+)
+def test_an_annual_rate_counts_the_weakest_where_hazard_is_steep(exponent, dispersion):
+    """Most of the rate then comes from b β below the median, here from up to 5.2 deviations."""
+    curve = af.studies.Fragility(3.0, dispersion, 1.0, 0.0, np.tile([3.0, dispersion], (2, 1)))
+    exact = 1e-3 * 3.0**-exponent * np.exp(0.5 * (exponent * dispersion) ** 2)
+    # 15 deviations to the left leave 10 of its own around that peak
+    assert curve.annual_rate(af.Hazard.power(1e-3, exponent)).rate == pytest.approx(exact, rel=1e-9)
 
 
 def test_an_annual_rate_needs_a_hazard():
