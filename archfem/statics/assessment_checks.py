@@ -164,8 +164,10 @@ class LimitState:
         capacity = self.share * float(moved[-1])
         secant = secant_period(moved, curve, self.secant_share * capacity)
         period = float(self.period_factor / 2.0 * np.sqrt(confidence) * secant)
-        # The largest spectral displacement up to the period; code spectra grow with it.
-        periods = period * np.linspace(0.0, 1.0, 41)[1:]
+        # The largest spectral displacement up to the period, with that at the points of a table.
+        periods = period * np.linspace(0.0, 1.0, 401)[1:]
+        points = getattr(getattr(spectrum, "ground_spectrum", spectrum), "periods", periods)
+        periods = np.union1d(periods, points[points <= period])
         acceleration = spectral_acceleration(spectrum, periods, self.damping)
         demand = float((acceleration * (periods / (2.0 * np.pi)) ** 2).max())
         # nor does it fail where the ground does not set it in motion
