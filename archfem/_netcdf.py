@@ -94,9 +94,8 @@ def name_flags(table: xr.Dataset) -> xr.Dataset:
     """Return a table with the meanings of flags among its coordinates (CF Conventions, 3.5)."""
     coordinates = dict[Any, Any]()  # all, which keeps their order
     for name, each in table.coords.items():
-        words = each.attrs.get("flag_meanings", "").split()
-        named = (each.dims, [words[int(x)] for x in each.values]) if words else each.variable
-        coordinates[name] = named
+        words, own = each.attrs.get("flag_meanings", "").split(), each.variable
+        coordinates[name] = (own.dims, [words[int(x)] for x in own.values]) if words else own
     return table.drop_vars(coordinates).assign_coords(coordinates)
 
 

@@ -149,18 +149,15 @@ def doubt_fallen_fill(structure: Structure, moved: Array) -> Iterator[Doubt]:
         return
     x, y = np.concatenate([blocks[number].points for number in fill]).T
     places, middle = structure.centroids[gone, 0], 0.5 * (x.min() + x.max())
-    rings = (block.points[:, 1].max() for block in blocks if block.role == "ring")
-    crown = max(rings, default=np.inf)
+    crown = max((k.points[:, 1].max() for k in blocks if k.role == "ring"), default=np.inf)
     for end, count in ((x.min(), (places < middle).sum()), (x.max(), (places >= middle).sum())):
-        if not count:
-            continue
+        words = "pieces of the fill fell out of its free end at x = {:.4g} m, {} of {}"
         remedy = "retain the end: in a case give the sidewalls setback = 0, and `above` up to just "
         remedy += "below the road"
         if y[np.isclose(x, end)].min() >= crown:  # a wall holds all that is lower
-            remedy = "walls retain it up to the crown already: compare with longer ones, `length`, "
-            remedy += "whose ends are farther from the rings"
-        words = "pieces of the fill fell out of its free end at x = {:.4g} m, {} of {}"
-        yield Doubt(words, remedy, (float(end), int(count), len(fill)))
+            remedy = "walls retain it up to the crown: compare with longer ones, `length`"
+        if count:
+            yield Doubt(words, remedy, (float(end), int(count), len(fill)))
 
 
 def interpolate_field(places: Array, displacements: Array, velocities: Array) -> Field:

@@ -149,8 +149,12 @@ class VerdictRange(ResultDisplay):
             By property, in descending order; chance alone explains about 2 / runs of one property,
             and more of the largest: see `beyond_chance`.
         """
-        decisive = self.decisive[self.answered]
-        outcomes = decisive.astype(float) if self.is_mixed else self._residual_ranks()
+        from scipy.stats import rankdata  # slow to import, and of no use to a single run
+
+        outcomes = self.decisive[self.answered].astype(float)
+        if not self.is_mixed:  # among fallen structures distances to the ground say nothing
+            residuals = np.where(self.falls, 0.0, self.dataset["residual"].values)
+            outcomes = rankdata(residuals[self.answered])  # equal runs share a mean rank
         shares = zip(self.properties, self._correlate(outcomes[None])[:, 0].tolist(), strict=True)
         return dict(sorted(shares, key=lambda item: -item[1]))
 
@@ -179,13 +183,6 @@ class VerdictRange(ResultDisplay):
     def is_mixed(self) -> bool:
         """Whether some runs are decisive, and others are not."""
         return len(np.unique(self.decisive[self.answered])) > 1
-
-    def _residual_ranks(self) -> Array:
-        """Return the rank of each answered run by its residual displacement (runs,)."""
-        from scipy.stats import rankdata  # slow to import, and of no use to a single run
-
-        # among fallen structures distances to the ground say nothing; equal runs share a mean rank
-        return rankdata(np.where(self.falls, 0.0, self.dataset["residual"].values)[self.answered])
 
     @property
     def doubts(self) -> tuple[Doubt, ...]:

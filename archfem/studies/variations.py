@@ -199,16 +199,15 @@ def doubt_runs(
     """
     of, long = f"in {{}} of {len(admissible)} {runs}", np.array(admissible) < inf
     if long.any() and dt is not None:
-        step, of_step = min(admissible), "or less, and repeat this while any is in doubt"
-        if halved is not None and halved.any() and not long[halved].any():
-            step, of_step = 0.5 * dt, f"with which none of {halved.sum()} runs is in doubt"
-        half = " or half of it" * (halved is not None)
-        alone = "; without dt, a single run varies its steps, and has no such doubt" * bool(half)
-        yield Doubt(
-            f"{of} the steps, {1e3 * dt:g} ms{half}, are long for sliding",
-            f"take {1e3 * step:g} ms, `--set analysis.dt={step:g}`, {of_step}{alone}",
-            (int(long.sum()),),
-        )
+        step, why, half = min(admissible), "or less, and repeat this while any is in doubt", ""
+        if halved is not None:
+            half = " or half of it"
+            if halved.any() and not long[halved].any():
+                step, why = 0.5 * dt, f"with which none of {halved.sum()} runs is in doubt"
+            why += "; without dt, a single run varies its steps, and has no such doubt"
+        words = f"{of} the steps, {1e3 * dt:g} ms{half}, are long for sliding"
+        remedy = f"take {1e3 * step:g} ms, `--set analysis.dt={step:g}`, {why}"
+        yield Doubt(words, remedy, (int(long.sum()),))
     if lacking := int(sum(lack_joints)):
         words = "blocks were loose, without elastic joints, before strong motion was over, and none"
         remedy = "`archfem run CASE.toml` says which stones met, and what to do"

@@ -404,9 +404,7 @@ def _draw_ties(axes: Axes, blocks: PlacedBlocks) -> None:
         label = ""
 
 
-def _draw_capacity_curve(
-    axes: Axes, found: KinematicAssessment, titled: KinematicAssessment
-) -> None:
+def _draw_capacity_curve(axes: Axes, found: KinematicAssessment, titled: Any) -> None:
     """Draw the capacity curve, the displacement check, and the spectrum of the demand."""
     check, curve = found.displacement, found.curve
     reduced = curve["a"].values / found.confidence_factor

@@ -20,7 +20,6 @@ from archfem.cases.push_factors import PushFactors, site_acceleration
 from archfem.cases.report import (
     capacities,
     conclusion,
-    demands,
     doubts,
     margins,
     outcomes,
@@ -756,7 +755,7 @@ def test_what_no_check_shows_is_said_and_not_that_another_sense_withstands():
     data = ReportData(ring(assessment={"spectrum": floor}), {})
     shown = answers.Ratios("SLV", ["right"], 1.5, 1.5)
     vars(data)["statements"] = {"assessment": state("assessment", shown)}
-    of = f"the floor spectrum above ground of PGA {demands.find_demand(data):.3g} g"
+    of = f"the floor spectrum above ground of PGA {capacities.find_demand(data):.3g} g"
     assert f"it withstands {of}" in head_of(conclusion.list_facts(data))
     other = answers.Ratios("SLV", ["left"], 1.2, 1.2, bounded=True)
     vars(data)["statements"] = {"assessment": state("assessment", shown, other)}
@@ -1372,7 +1371,7 @@ def test_a_rating_is_stated_by_the_norm_of_the_report_alone(case, norm, first):
     (table,) = capacities.tabulate_capacities({"": data})
     settings |= {"report": {"demand": "PGA 0.25 g"}}
     vars(data)["case"] = af.Case.of(settings)
-    assert demands.tabulate_demands(data) == []  # of a vehicle there is none of an earthquake
+    assert capacities.tabulate_demands(data) == []  # of a vehicle there is none of an earthquake
     assert table.caption.endswith("Factors are multiples of the demand: a load makes a mechanism")
     assert first in table.rows[0][1]
     assert {row[3] for row in table.rows} == {*codes.values()}  # others are not left out
@@ -1725,7 +1724,7 @@ def test_the_vertical_peak_of_a_demand_is_that_of_the_motion_and_not_of_a_run_th
     data = data_of(case, m=verdict_of())
     data.runs["m"].dataset["ground"][0, 1] = 0.4
     data.runs["m"].dataset[MOTION_VARIABLE] = ("sample", "axis"), motion, {"dt": 0.01}
-    ((name, *_),) = demands.list_demands(data)
+    ((name, *_),) = capacities.list_demands(data)
     assert name == "motions, with vertical ones of up to 0.1 g"
 
 

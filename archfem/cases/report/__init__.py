@@ -1,8 +1,7 @@
 """HTML report of the results of a case.
 
-    capacities      demands and capacities, a row for each check
+    capacities      demands with their sources, and capacities, a row for each check
     conclusion      head, outcome with margin and range
-    demands         demands of an earthquake, with their sources
     doubts          doubts and notes of results, and what was not varied
     inputs          inputs with their marks
     motion_rules    rules of norms for suites of motions

@@ -8,14 +8,17 @@ from archfem._files import group_of, read_file_list
 from archfem.cases import result_text
 from archfem.cases.answers import RESULTS, Row
 from archfem.cases.defaults import say_loads_left_out
+from archfem.cases.push_factors import peak_of_spectrum, site_acceleration
 from archfem.cases.rating_text import ONLY
 from archfem.cases.report import outcomes
-from archfem.cases.report.demands import name_spectrum
 from archfem.cases.report.doubts import (
     HISTORIES,
+    MAX_RATIO_OF_PEAKS,
     VARIATIONS,
     list_decisive_doubts,
     list_doubts,
+    peak_of_ground,
+    read_spectrum,
     spans_run,
 )
 from archfem.cases.report.motion_rules import is_of_norm
@@ -27,7 +30,7 @@ from archfem.dynamics.walls_across import SCALES_ACROSS
 from archfem.limit.instability import list_margins_at_rest
 from archfem.masonry.structure import join_words
 from archfem.models.model import Doubt
-from archfem.units import format_mm, format_ratio
+from archfem.units import STANDARD_GRAVITY, Ends, format_mm, format_ratio
 from archfem.view.pages.document import Grid
 
 # Fidelity of the variations of a verdict
@@ -41,6 +44,59 @@ _FACTORS = {
     "thickness": "of a thickness, the given over the least",
     "risk": "half a probability of a fall",
 }
+
+
+def list_demands(data: ReportData) -> Iterator[tuple[str, Ends, str, list[str]]]:
+    """Yield each demand of an earthquake: name, peaks [g], source in the case, and results."""
+    case, limit = data.case, data.case.limit.demand
+    pushes = [RESULTS[name] for name in ("limit", "pushover") if name in data.statements]
+    if data.runs:
+        # whole motions: the ground of a run ends with it
+        up = [x.vertical for x in data.motions.values() if x.vertical is not None]
+        vertical = max((np.abs(x).max().item() for x in up), default=0.0) / STANDARD_GRAVITY
+        with_vertical = f", with vertical ones of up to {vertical:.2g} g"
+        also = with_vertical if vertical else ", without vertical ones"
+        peaks, source = map(peak_of_ground, data.runs.values()), "[suite]"
+        used = ["time histories, and what varies or scales them"]
+        yield f"motions{also}", Ends.of(peaks), source if case.suite else "[motion]", used
+    if limit is not None:
+        yield "push", Ends.of([limit / STANDARD_GRAVITY]), "[limit]", pushes
+        pushes = []
+    if np.isfinite(spectrum := peak_of_spectrum(case)):
+        source = "[assessment]" if case.assessment.spectrum else "[suite], its target"
+        used = [*[RESULTS["assessment"]] * ("assessment" in data.statements), *pushes]
+        yield f"{read_spectrum(data)['code']} spectrum", Ends.of([spectrum]), source, used
+
+
+def tabulate_demands(data: ReportData) -> list[Grid]:
+    """Tabulate the demands with their sources; none where the capacities have a single one."""
+    found, text = [each for each in list_demands(data) if each[-1]], data.case.report.get("demand")
+    compared = "words alone, which are compared with none"
+    compared += ": limit.demand is" * (data.case.limit.demand is not None)
+    rows = [("as stated", text, "[report]", compared)] if text else []
+    rows += [(x, f"{'PGA ' * (x != 'push')}{p:.3g} g", y, join_words(of)) for x, p, y, of in found]
+    peaks = [peak for _, ends, *_ in found for peak in ends]
+    differ = bool(peaks) and max(peaks) > MAX_RATIO_OF_PEAKS * min(peaks)
+    caption = "Demands of an earthquake" + "; a margin on one is none on another" * differ
+    head = ("demand", "horizontal", "source in the case", "of which results")
+    stated = rows[1:] or (text and data.is_shaken)  # a vehicle has no demand of an earthquake
+    return [Grid(head, rows, caption, "words")] if stated else []
+
+
+def find_demand(data: ReportData) -> float:
+    """Return the site's acceleration [g], or the largest peak of the motions; 0 without any."""
+    if np.isfinite(site := site_acceleration(data.case)):
+        return site
+    return max((ends[-1] for _, ends, *_ in list_demands(data)), default=0.0)
+
+
+def name_spectrum(data: ReportData) -> str:
+    """Name the demand of kinematic assessments, with its peak acceleration."""
+    code = read_spectrum(data).get("code")
+    if code is None:
+        return "the spectrum of the motion"
+    ground = "above ground " * (code == "floor")
+    return f"the {code} spectrum {ground}of PGA {peak_of_spectrum(data.case):.3g} g"
 
 
 def tabulate_capacities(parts: Mapping[str, ReportData]) -> list[Grid]:

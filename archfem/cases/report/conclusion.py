@@ -14,8 +14,7 @@ from archfem.cases.defaults import list_default_keys, list_materials_and_contact
 from archfem.cases.push_factors import PushFactors, site_acceleration
 from archfem.cases.rating_text import NOT_COMPUTED
 from archfem.cases.report import margins, outcomes
-from archfem.cases.report.capacities import tabulate_capacities
-from archfem.cases.report.demands import list_demands, tabulate_demands
+from archfem.cases.report.capacities import list_demands, tabulate_capacities, tabulate_demands
 from archfem.cases.report.doubts import (
     HISTORIES,
     STUDIES,

@@ -7,7 +7,7 @@ import numpy as np
 from archfem.cases.answers import Ratios, compare_checks, read_numbers
 from archfem.cases.defaults import note_loads_left_out
 from archfem.cases.push_factors import PushFactors, peak_of_spectrum, site_acceleration
-from archfem.cases.report.demands import find_demand, name_spectrum
+from archfem.cases.report.capacities import find_demand, name_spectrum
 from archfem.cases.report.doubts import list_checks, object_to_motions, peak_of_ground
 from archfem.cases.report.outcomes import find_worst, sentence
 from archfem.cases.report.report_data import ReportData
