@@ -1,5 +1,7 @@
 """States as files, read back by programs that are not ours."""
 
+import locale
+
 import ezdxf
 import numpy as np
 import pytest
@@ -10,6 +12,14 @@ from archfem.models import write_state
 
 meshio = pytest.importorskip("meshio")
 pyvista = pytest.importorskip("pyvista")
+
+
+@pytest.fixture(autouse=True)
+def keep_locale():
+    """Restore the locale, which VTK's reader of old files leaves as "C", where text is ASCII."""
+    given = locale.setlocale(locale.LC_ALL)
+    yield
+    locale.setlocale(locale.LC_ALL, given)
 
 
 @pytest.mark.parametrize("magnification", [1.0, 50.0])
