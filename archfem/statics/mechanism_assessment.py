@@ -10,8 +10,9 @@ Spectral acceleration and displacement are those of a control point C along the 
     a* = α g / e*,   d* = d_C Σ P δ² / (δ_C Σ P δ).
 
 a*(d*) is the capacity curve; it begins at a₀* and vanishes at d₀*. C is the centroid that moves
-fastest along x at rest. The checks compare a₀*, raised by a behaviour factor, with the ground
-acceleration. They compare a share of d₀* with the displacement spectrum at a secant period.
+fastest along x at rest, of all blocks that are equally fast. The checks compare a₀*, raised by a
+behaviour factor, with the ground acceleration. They compare a share of d₀* with the displacement
+spectrum at a secant period.
 
 References:
     Circolare 21 January 2019 n. 7 C.S.LL.PP. on the NTC 2018, C8.7.1.2.1.1 to C8.7.1.2.1.8.
@@ -28,7 +29,7 @@ import xarray as xr
 
 from archfem._display import DOUBT_MARK, NOTE_MARK, ResultDisplay
 from archfem._files import align_columns
-from archfem._typing import Array, CrushingStrength, Seconds
+from archfem._typing import Array, CrushingStrength, Numbers, Seconds
 from archfem._validation import check_between, check_choice, validate_arguments
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.limit.backfill import attach_fill
@@ -113,7 +114,7 @@ class KinematicAssessment(ResultDisplay):
         limit_state: rules of the displacement check.
         confidence_factor: FC, by which accelerations of the curve are divided in both checks [-].
         strength: compressive strength at which joints crush [Pa]; infinite where they do not.
-        control: name of the block whose centroid is the control point.
+        control: name of the block whose centroid is the control point, or of several.
         path: finite motion of the mechanism; None where nothing moves.
         notes: assumptions of the result, and omissions on the safe side.
         doubts: why a ratio may be too high, or too low to pass, by how much is not known, each with
@@ -559,15 +560,17 @@ class _Oscillator:
         return place_spectrum(self.given.spectrum, self.foot)
 
     @cached_property
-    def control(self) -> int:
-        """Number of the block of the control point, the centroid fastest along x at rest.
+    def control(self) -> Numbers:
+        """Numbers of the blocks whose centroid is the control point, fastest along x at rest.
 
-        Of centroids that are equally fast it is the first one, whatever the rounding.
+        Blocks that are equally fast, as those of a body that slides, count by their weights: the
+        end of a body that later turns is as good as the other.
         """
         assert self.path is not None
         free = np.array(self.placed.structure.free)
-        speeds = np.abs(self.path.velocity[free, 0])
-        return int(free[np.argmax(speeds >= (1.0 - 1e-6) * speeds.max())])
+        along = self.placed.direction * self.path.velocity[free, 0]
+        fast = np.abs(along) >= (1.0 - 1e-6) * np.abs(along).max()
+        return free[fast & ((along > 0.0) == (along[fast].max() > 0.0))]
 
     @cached_property
     def e_star(self) -> float:
@@ -583,11 +586,14 @@ class _Oscillator:
         factors, control, moved = np.zeros(0), np.zeros(0), np.zeros(0)
         if self.path is not None:
             factors = self.path.factors
-            control = self.placed.direction * self.path.displacements[:, self.control, 0]
+            fastest = self.path.displacements[:, self.control, 0]
+            blocks = [self.placed.structure.blocks[number] for number in self.control]
+            weights = [block.area * block.material.unit_weight for block in blocks]
+            control = self.placed.direction * np.average(fastest, axis=1, weights=weights)
             moved = np.zeros(len(factors))
             if self.path.velocity.any():
                 weight, speed = self.weights
-                own = self.placed.direction * self.path.velocity[self.control, 0]
+                own = self.placed.direction * self.path.velocity[self.control[0], 0]
                 moved = control / own * (weight @ speed**2) / (weight @ speed)
         acceleration = factors * self.placed.structure.gravity / self.e_star
         values = {"d": moved, "a": acceleration, "alpha": factors, "d_control": control}
@@ -693,7 +699,7 @@ class _Oscillator:
         if path is not None:
             alpha_0, a_0 = float(curve["alpha"][0]), float(curve["a"][0])
             mass = self.e_star * (self.weights[0].sum() / structure.gravity)
-            control = structure.blocks[self.control].name
+            control = join_names([structure.blocks[number].name for number in self.control])
             if len(path.factors) > 1:
                 displacement = self._check_displacement()
             if path.end is PathEnd.FALLS:

@@ -644,6 +644,8 @@ def held_top():
 def test_a_path_that_ends_early_has_a_lower_bound(held_top, verified):
     """Its end, where the tie slackens, counts as d₀*; the weights move by 1.5 m/s both: d* = d_C.
 
+    C is the centroid of both blocks, of 3 and 0.5 m.
+
     A stronger tie turns no pass into a fail.
     """
     settings = held_top.assessment
@@ -653,12 +655,13 @@ def test_a_path_that_ends_early_has_a_lower_bound(held_top, verified):
     end = brentq(slack_below, 0.01, 0.15)
     assert found.path.end is PathEnd.RELEASED
     assert found.path.factors[-1] == pytest.approx(factor_below(end), rel=0.02) != 0.0
-    control = int(found.control == "block 2")
-    place = [fold_below(x)[0][control, 0] - fold_below(0.0)[0][control, 0] for x in (0.0, end)]
-    capacity = 0.4 * place[1]
-    turn = brentq(
-        lambda x: fold_below(x)[0][control, 0] - fold_below(0.0)[0][control, 0] - capacity, 0.0, end
-    )
+    assert found.control == "block 1, block 2"
+
+    def move(turn):
+        return np.average((fold_below(turn)[0] - fold_below(0.0)[0])[:2, 0], weights=[3.0, 0.5])
+
+    capacity = 0.4 * move(end)
+    turn = brentq(lambda x: move(x) - capacity, 0.0, end)
     period = 1.68 * pi * sqrt(capacity / (G * factor_below(turn) / 1.35))
     spectrum = replace(SPECTRUM, ag=0.3, damping=0.08)
     demand = float(spectrum.horizontal(period)) * 9.80665 * (period / 2 / pi) ** 2
@@ -843,7 +846,7 @@ def test_a_mechanism_of_stronger_ties_puts_the_ratio_of_given_ones_in_doubt(held
     alpha = 1.35 / 2.0 * 0.3 * (1.4 - 0.4 * 2.4 * 0.3) * 9.80665 / 9.81  # e* = 1
     needed = (alpha * weight * 1.75 - weight * 0.25) / 3.5
     note, doubt = map(str, note_ties(held_top))
-    ratio = "a ratio of at least 0.886"  # that of the test above
+    ratio = "a ratio of at least 0.865"  # that of the test above
     assert note == (
         f"note: pushed to the right, with 4 times the forces of the ties it {NOT_SHOWN} by "
         f"displacements: two-hinge mechanism has {ratio}; the linear check alone is passed from "
@@ -2004,3 +2007,19 @@ def test_what_stands_above_a_building_is_shaken_as_its_top():
     for structure, spectrum in ((parapet(None), at_top), (parapet(None), GROUND), (RING, floor)):
         found = af.kinematic_assessment(structure, spectrum)
         assert "height of its foot" not in str(found)
+
+
+def test_both_senses_of_a_symmetric_ring_that_slides_have_one_capacity():
+    """Five stones beyond the sliding joint are equally fast, and turn by little thereafter."""
+    ring = af.circular_arch(
+        radius=2.4385, thickness=0.5, embrace=132.1, voussoirs=15, contact=af.Contact(1e9, 4e8, 0.6)
+    )
+    spectrum = af.Eurocode8(ag=0.3, ground="C")
+    right, left = (
+        af.kinematic_assessment(ring, spectrum, direction=x, strength=20e6) for x in (1, -1)
+    )
+    assert "voussoir 15" in right.control
+    assert "voussoir 1," in left.control
+    assert "sliding" in right.mechanism_name
+    # both paths end at their own step
+    assert float(right.curve["d"][-1]) == pytest.approx(float(left.curve["d"][-1]), rel=1e-6)
