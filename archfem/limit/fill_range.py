@@ -154,7 +154,8 @@ class FillRange:
             f"{own.format_ends(unit, digits)}{name} ({state}{_FALLS * (own.ends[0] == 0.0)})"
             for state, own in sorted(states.items(), key=lambda each: each[1].ends)
         ]
-        return f"{begin}, each by the place of its inertia, feet or centroids: {'; '.join(texts)}"
+        each = "each with its active pressure, by the place of its inertia, feet or centroids"
+        return f"{begin}, {each}: {'; '.join(texts)}"
 
     @property
     def outcome(self) -> str:

@@ -287,14 +287,14 @@ def test_the_margin_of_scales_ends_where_it_is_dislocated(case):
     )
     beyond = scales("a", 1.4, falls=1.5, again=[1.6, 2.0])
     assert say_margin(data, scale=state("scale", beyond))[1] == (
-        "of the scales that were run it first falls at 1.50 ×; it stands again at some scales "
+        "of the scales that were run it first falls at 1.50 ×; it does not fall at some scales "
         "from 1.60 to 2.00 ×"
     )
     # each sentence has the motion that it is about
     others = scales("b", 2.6, falls=2.7, again=[2.8]), scales("c", 1.6, falls=1.7)
     assert say_margin(data, scale=state("scale", beyond, *others))[1] == (
-        "of the scales that were run under 'a' it first falls at 1.50 ×; under 'a' it stands again "
-        "at some scales from 1.60 to 2.00 ×; under 'b' it stands again at 2.80 ×"
+        "of the scales that were run under 'a' it first falls at 1.50 ×; under 'a' it does not "
+        "fall at some scales from 1.60 to 2.00 ×; under 'b' it does not fall at 2.80 ×"
     )
     # an unfinished search is no margin, unless one of its runs fails
     for least, begin, end in (
@@ -918,7 +918,7 @@ def test_margins_side_by_side_are_in_the_plane_and_what_is_across_it_is_said_onc
     assert sum("cross the plane of" in text for _, text in facts) == 1
     assert said["not checked"] == (
         "strong and weak: Across the plane of the drawing it was not checked, where it may "
-        "overturn from 0.3 g on (demand 1 g)."
+        "overturn from 0.3 g on (0.3 × the demand, 1 g)."
     )
 
 
@@ -1550,7 +1550,7 @@ def test_a_demand_that_overturns_it_across_its_plane_is_in_the_conclusion(ag, ov
     words = f". The demand, {1.2 * ag:.3g} g, exceeds it ({1.2 * ag / push:.3g} ×)"
     assert (words in block.text) is overturns
     words = f"it was not checked, where it may overturn from {push:.3g} g on"
-    words += f" (demand {1.2 * ag:.3g} g)."
+    words += f" ({push / (1.2 * ag):.3g} × the demand, {1.2 * ag:.3g} g)."
     assert words in head_of(conclusion.list_facts(data))
     # head and paragraph state it, and no row repeats it
     assert {row.result for _, row in capacities._capacity_rows(data)} == {"at rest"}
@@ -1729,7 +1729,7 @@ def test_the_vertical_peak_of_a_demand_is_that_of_the_motion_and_not_of_a_run_th
 
 
 def test_a_wall_that_stands_again_says_so_beside_its_first_fall():
-    """One sine of ω/p = 5, integrated from impact to impact: it stands again at its full scale."""
+    """One sine of ω/p = 5, integrated from impact to impact: it does not fall at its full scale."""
     assert [overturns(5.0, peak, 2) for peak in (0.65, 0.75, 1.75)] == [False, True, False]
     sines = sine(5.0, 1.75, 2, 1e-3)
     wall = wall_in_bond().structure
@@ -1741,13 +1741,13 @@ def test_a_wall_that_stands_again_says_so_beside_its_first_fall():
     assert name == "sines"
     assert (
         f"under 'sines' the strip first falls at {peak:#.3g} g ({first.scale:#.3g} × the motion), "
-        f"and stands again at some scales from {first.again[0]:#.3g} to {first.again[1]:#.3g} ×; "
+        f"and does not fall at some scales from {first.again[0]:#.3g} to {first.again[1]:#.3g} ×; "
         "under "
     ) in describe_falls_across(found, {"sines": sines})
     line, headline = check_across(wall, {"sines": sines})
     assert headline == (
         f"; across its plane the strip first falls at {peak:#.3g} g ({first.scale:#.3g} × the "
-        f"motion), and stands again at some scales from {first.again[0]:#.3g} to "
+        f"motion), and does not fall at some scales from {first.again[0]:#.3g} to "
         f"{first.again[1]:#.3g} ×"
     )
     assert line == describe_falls_across(found, {"sines": sines})

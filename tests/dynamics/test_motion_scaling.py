@@ -466,7 +466,7 @@ def test_windows_of_steps_too_long_for_sliding_are_said_below_the_fall_of_shorte
     found = searched_by_steps(monkeypatch, windows, {}, 0.004, is_given=False)
     first, shorter = found.first_falls[0], min(found.bracket(dt).upper for dt in found.searches)
     assert 2.2 < first < 2.45 < 2.9 < shorter
-    assert f", by those that follow sliding at {shorter:#.3g} ×, and stands again at" in str(found)
+    assert f", by those that follow sliding at {shorter:#.3g} ×, and does not fall at" in str(found)
     long = [run.scale for run in found.longer[0.005].runs if 2.45 < run.scale < 3.1]
     assert found.above == tuple(scale for scale in long if scale < found.upper) != ()
     (doubt,) = [str(x) for x in found.doubts if "not monotonic" in x.cause]
@@ -575,7 +575,7 @@ def test_collapse_is_between_a_stable_and_a_falling_run_at_every_step():
     assert found.bracket(0.005).upper == 2.5
     assert str(found) == (
         "stands at 1.00 × the motion, falls at 2.00 × the motion, by steps of 5 ms first at "
-        "2.50 ×, and stands again at some scales from 2.70 to 3.00 ×; stands at every "
+        "2.50 ×, and does not fall at some scales from 2.70 to 3.00 ×; stands at every "
         "smaller scale that was run: from 0.500 × on they are up to a factor of 2.00 apart, and "
         "none between was run; varied were the scale and the time step (10, 5 ms), and no property "
         "or motion: how far others, such as other seeds, differ is unknown"

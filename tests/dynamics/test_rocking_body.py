@@ -150,10 +150,12 @@ def test_a_body_that_stands_again_beyond_its_first_fall_has_no_one_crossing():
     fallen = found.scale, least / 1.011, most * 1.011
     assert [overturns(5.0, peak, 2) for peak in (*stood, *fallen)] == [False] * 3 + [True] * 3
     assert found.scale < least / 2.0
-    words = f"first falls at {found.scale:#.3g} × the motion, and stands again at some scales from "
+    words = (
+        f"first falls at {found.scale:#.3g} × the motion, and does not fall at some scales from "
+    )
     assert f"{words}{least:#.3g} to {most:#.3g} ×" in describe_first_fall(found)
     once = describe_first_fall(FirstFall(0.5, (2.0, 2.0)))
-    assert once == "first falls at 0.500 × the motion, and stands again at 2.00 ×"
+    assert once == "first falls at 0.500 × the motion, and does not fall at 2.00 ×"
 
 
 @pytest.mark.parametrize(

@@ -141,7 +141,8 @@ def say_by_motion(ranges: Sequence[VerdictRange], said: Iterable[Sequence[str]])
 def say_what_decides(ranges: Sequence[VerdictRange]) -> list[str]:
     """Say which of the properties that were varied decides, also alone, or displaces it most."""
     names = dict.fromkeys(name for each in ranges if each.is_mixed for name in each.deciding)
-    said = [f"of what was varied, {join_words([*names])} decides"] * bool(names)
+    said = [f"of what was varied, {join_words([*names])} decide{'s' * (len(names) == 1)}"]
+    said *= bool(names)
     said += say_by_motion(ranges, map(_say_changed, ranges))
     for found in () if said else ranges:  # single changes have the outcome of the unvaried
         changes = found.single_changes

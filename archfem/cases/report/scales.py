@@ -62,13 +62,13 @@ def find_first_failures(data: ReportData) -> Iterator[str]:
         ends = [(scale, scale * pga) for scale, pga, _ in made]
         steps = (x for x in searches if state == "falls")
         ends += [(x.all_steps, x.all_steps * x.pga) for x in steps if x.all_steps]
-        over = " or ".join(["motions"] * (len(searches) > 1) + ["time steps"])
+        over = ["motions"] * (len(searches) > 1) + ["time steps"] * (state == "falls")
         # the least is of those that were searched, or has no range
         top = map(max, zip(*ends, strict=True)) if name not in unscaled else (at, least)
         own, most = ([f"{x:#.3g} ×", f"{y:.3g} g"] for x, y in ((at, least), top))
         wide = ", ".join(x for x in most if x not in own)
         motion = f"'{name}'" if several or count > 1 else "the motion"
-        beside = f" (by other {over} up to {wide})" * bool(wide)
+        beside = f" (by other {' or '.join(over)} up to {wide})" * bool(wide)
         does = _STATES[state][1].replace("first ", "" if unfinished else "first ")
         # of unlike peaks another motion may have a smaller scale
         peak, scale, other = min(first, key=lambda x: x[1])

@@ -195,13 +195,13 @@ def say_scale(scale: float, pga: float | None, of: str = "the motion") -> str:
 
 
 def say_again(scales: Sequence[float]) -> str:
-    """Say at which scales beyond a fall a structure stands, which it need not between them."""
+    """Say at which scales beyond a fall a structure does not fall, which it may between them."""
     ends = f"{Ends.of(scales):#.3g} ×"
-    return f"stands again at {'some scales from ' * (' to ' in ends)}{ends}"
+    return f"does not fall at {'some scales from ' * (' to ' in ends)}{ends}"
 
 
 def describe_first_fall(first: FirstFall, pga: float | None = None, of: str = "the motion") -> str:
-    """Say at which scales of a motion a body falls, and stands again."""
+    """Say at which scales of a motion a body falls, and beyond does not."""
     falls = f"first falls at {say_scale(first.scale, pga, of)}"
     falls = falls if first.scale < inf else "falls at none"
     return falls + (f", and {say_again(first.again)}" if first.again else "")
