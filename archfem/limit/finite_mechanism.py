@@ -27,7 +27,7 @@ import xarray as xr
 from scipy.optimize import brentq
 
 from archfem._display import ExplainedWord
-from archfem._typing import Array, Flags
+from archfem._typing import Array, Flags, Numbers
 from archfem._validation import check_choice, validate_arguments
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.limit.collapse import Outcome, collapse_factor
@@ -127,6 +127,12 @@ class MechanismPath:
         """Largest stretch of each tie up to each place (n, n_ties) [m]."""
         found = [self.blocks.moved(each).stretches for each in self.displacements]
         return np.maximum.accumulate(np.maximum(found, 0.0))
+
+    def follow_centroid(self, numbers: Numbers) -> Array:
+        """Return the displacement of the common centroid of some blocks along x (n,) [m]."""
+        blocks = [self.blocks.structure.blocks[number] for number in numbers]
+        weights = [block.area * block.material.unit_weight for block in blocks]
+        return np.average(self.displacements[:, numbers, 0], axis=1, weights=weights)
 
     @property
     def ending(self) -> str:

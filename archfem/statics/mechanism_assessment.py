@@ -585,12 +585,8 @@ class _Oscillator:
         """Capacity curve over the places of the path."""
         factors, control, moved = np.zeros(0), np.zeros(0), np.zeros(0)
         if self.path is not None:
-            factors = self.path.factors
-            fastest = self.path.displacements[:, self.control, 0]
-            blocks = [self.placed.structure.blocks[number] for number in self.control]
-            weights = [block.area * block.material.unit_weight for block in blocks]
-            control = self.placed.direction * np.average(fastest, axis=1, weights=weights)
-            moved = np.zeros(len(factors))
+            factors, moved = self.path.factors, np.zeros(len(self.path.factors))
+            control = self.placed.direction * self.path.follow_centroid(self.control)
             if self.path.velocity.any():
                 weight, speed = self.weights
                 own = self.placed.direction * self.path.velocity[self.control[0], 0]
