@@ -95,8 +95,9 @@ class Ratios(NamedTuple):
 
     @property
     def name(self) -> str:
-        """Name of the check, with the direction of one that holds in one alone."""
-        alone = self.directions if len(self.directions) == 1 else ()
+        """Name of the check, with the direction of one that holds in one alone, or its strip."""
+        strips = {way.partition(", ")[2] for way in self.directions} - {""}
+        alone = self.directions if len(self.directions) == 1 else strips
         return ", ".join([self.check, *alone])
 
     @property
@@ -536,7 +537,8 @@ def assess_untied(
             # without its ties it may not stand
             with suppress(InvalidInput, DidNotConverge):
                 free = replace(own, directions=(x.direction,)).solve(case.structure, case.demand)
-                checks = [each.checks[-1] for each in free.values()]
+                same = {key: free[key]} if key in free else free
+                checks = [each.checks[-1] for each in same.values()]
                 if all(each.passes and each.unit == check.unit == "m" for each in checks):
                     check = replace(check, untied=min(each.decisive for each in checks))
                     given[key] = replace(x, displacement=check)

@@ -174,7 +174,7 @@ class LimitState:
         begins = float(curve[0]) / confidence / first_acceleration(spectrum, free_period)
         ratio = max(capacity / demand, begins)
         given = capacity, demand, "m", ratio, period, self.source
-        return AssessmentCheck(self.name, *given, amplified=describe_floor(spectrum))
+        return AssessmentCheck(self.name, *given)
 
 
 # Sources of displacement checks; the 2019 values were read in a transcription of the Circolare.
@@ -210,7 +210,7 @@ class AssessmentCheck:
             each load; None where each body has one anyhow.
         bounded: whether the ratio is an upper bound, by which a check fails and does not pass.
         floor: least ratio of all mechanisms of this α₀, that of e* = 1; None where it is the first.
-        amplified: amplification and a_Z of a floor spectrum, in brackets; "" of others.
+        amplified: amplification and a_Z of a floor spectrum at rest, in brackets; "" of others.
         at_least: whether the ratio is a lower bound, by which a check passes and does not fail: the
             path ends before α vanishes, and its end counts as d₀*.
         untied: ratio without the ties, by which it passes where with them it is not shown to; None
@@ -385,7 +385,8 @@ def judge_floor(
     words = f"its foot, z = {foot:.4g} m, is above H = {height:.4g} m of the spectrum: z = H is "
     notes = [f"{words}taken, where the first mode of eq. C7.2.10 is 1"] * (foot > height + 1e-6)
     if free_period is not None:
-        return notes, []
+        taken = f"free_period = {free_period:g} s is T_0 of what moves above z = {foot:.4g} m"
+        return [*notes, taken], []
     values = spectral_acceleration(floor, floor.own_period * np.linspace(0.0, 1.0, 21), 0.05)
     times = float(values.max() / values[0])
     notes.append(

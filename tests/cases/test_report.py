@@ -314,6 +314,13 @@ def test_a_check_that_passes_at_rest_says_so():
     assert answers.Ratios(**row.numbers) == expected
 
 
+def test_a_check_of_the_strip_alone_is_named_by_it():
+    strip = "strip through the highest place"
+    check = answers.Ratios("linear", [f"right, {strip}", f"left, {strip}"], 0.4, 0.4)
+    assert check.name == f"linear, {strip}"
+    assert check._replace(directions=["right", "left"]).name == "linear"
+
+
 def test_displacements_until_it_moves_are_of_the_split_of_weights_that_decides():
     """They are the quotient of the capacity and the demand that the table shows."""
     ring = af.circular_arch(radius=2.81, thickness=0.42, embrace=180.0, voussoirs=19, width=3.0)

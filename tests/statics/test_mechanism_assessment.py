@@ -1945,6 +1945,8 @@ def test_what_vibrates_freely_takes_the_spectrum_at_its_own_period(verified):
     says = "linear, q = 2, FC = 1.35 passes with a_Z, and of what vibrates freely its ratio may be "
     assert doubt.startswith(f"{says}{worst:.3g}, by T_0; give free_period")
     assert " at T_0 = 0.12 s: fails" in str(free.linear)
+    assert "free_period = 0.12 s is T_0 of what moves above z = 10.5 m" in free.notes
+    assert "a_Z" not in str(free.displacement)
     assert (held.linear.source[-1], free.linear.source[-1]) == ("8", "9")
     said = "at its own period T_0, up to 4.92 times as much"
     assert (said in str(held), said in str(free)) == (True, False)

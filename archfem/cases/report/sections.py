@@ -416,13 +416,15 @@ def _define_assessment(data: ReportData, text: str, moves: bool) -> Grid:
     )
     takes_part = "M* = (Σ P δ)² / (g Σ P δ²), e* = g M* / Σ P, with the weights P that move alone"
     checked = f"capacity {rules.share:g} d_0*; demand {demand}; {rules.source}"
+    free = data.case.assessment.options.get("free_period") or 0.0
     rows = [
         ("alpha_0", "multiple of the weights, as horizontal forces, that begins the mechanism"),
         ("e*, M*", f"share and mass that take part: {takes_part}"),
         ("a_0*", "acceleration that begins it"),
         (
             "linear",
-            "q a_0* / FC against the spectrum at T = 0, which small arches pass that fall in runs",
+            f"q a_0* / FC against the spectrum at T = {free:g}{' s' * bool(free)}, which small "
+            "arches pass that fall in runs",
         ),
     ]
     if moves:
