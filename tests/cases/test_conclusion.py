@@ -1420,7 +1420,7 @@ def test_the_factor_without_a_code_and_its_place_stand_beside_that_of_the_norm(
     margins = dict(conclusion.list_joint_facts({"A": data, "B": data}))["margin"]
     short = by.partition(" (")[0]  # the table has the partial factors
     of = f"{format_ratio(margin)} times the vehicle, lorry{short}, with neither"
-    by_norm = f", ratings for {norm}," * bool(norm)
+    by_norm = f", ratings by codes that go with {norm}," * bool(norm)
     assert margins == f"The least margins{by_norm} are of A {of}; of B {of}."
     noted = "archfem has no rating by NTC 2018: Eurocodes stand for it"
     assert doubts.list_notes(data) == ({"rating": [noted]} if norm == "NTC 2018" else {})
@@ -1892,6 +1892,7 @@ def test_the_push_is_the_margin_while_a_search_of_scales_is_unfinished(case):
         facts = dict(conclusion.list_joint_facts({"A": data, "B": data}))
         beside = 3.0 * 0.1 * G / 2.0
         over = f"3 times the demand of 0.1 g by a push, {beside:.3g} times the 0.2 g of its motions"
+        over += ", by which it may move and need not fall"
         least = over if unfinished else "8 times the earthquake"
         assert facts["margin"] == f"The least margins are of A {least}; of B {least}."
         result = "scale of the motion"

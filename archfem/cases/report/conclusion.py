@@ -137,7 +137,7 @@ def list_joint_facts(parts: Mapping[str, ReportData]) -> list[tuple[str, str]]:
         name = next(iter(worst), min(ranks, key=lambda x: ranks[x][0]))
         facts.append((answer, f"The worst of {len(parts)} cases is {name}: {said.pop(name)}"))
     norms = {x.case.report.get("norm", ""): x for x in parts.values() if "rating" in x.statements}
-    of = f", ratings for {join_words([*filter(None, norms)])}," * any(norms)
+    of = f", ratings by codes that go with {join_words([*filter(None, norms)])}," * any(norms)
     facts.append((margin, f"The least margins{of} are {'; '.join(listed)}."))
     facts += [("in doubt", doubts)] * bool(doubts)
     unchecked = dict[str, list[str]]()
@@ -180,7 +180,8 @@ def _say_factor(data: ReportData, factor: float, kind: str) -> str:
         peak = max(map(peak_of_ground, data.runs.values()), default=0.0)
         of_motions = factor * site_acceleration(data.case) / max(peak, 1e-9)
         if of_motions < factor:
-            until = f", {format_ratio(of_motions)} times the {peak:.2g} g of its motions"
+            until = f", {format_ratio(of_motions)} times the {peak:.2g} g of its motions, by which "
+            until += "it may move and need not fall"
     scaled = [x for x in list_scales(data) if kind == KINDS[0] and factor in (x.held, x.as_one)]
     if scaled and len(data.pairs) > len(list_scales(data)):
         until = f" by its scale under '{scaled[0].motion}', as not all motions were scaled"
