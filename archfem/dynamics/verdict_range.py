@@ -137,13 +137,23 @@ class VerdictRange(ResultDisplay):
         # files store a list of one name as the name
         return tuple(str(name) for name in np.atleast_1d(self.dataset.attrs["properties"]))
 
+    @property
+    def _compared(self) -> NDArray[np.bool_]:
+        """Whether a run tells what a property explains (runs,).
+
+        Runs of single changes share all other values, so that no property varies evenly in them.
+        """
+        sampled = self.answered & self.dataset["sampled"].values
+        return sampled if sampled.any() else self.answered
+
     def importance(self) -> dict[str, float]:
         """Return the share of the variance of the outcomes that each property explains [-].
 
         An outcome is 1 where `decisive`, else 0; where all or none are, it is the rank of a run by
         its residual displacement. The share is the correlation ratio, numbers in three parts of
         their range (a first-order index of sensitivity; Saltelli and others, Global Sensitivity
-        Analysis, 2008, section 1.2.6). Runs that are `in_doubt` count, as in `share`.
+        Analysis, 2008, section 1.2.6). Runs that are `in_doubt` count, as in `share`; those of
+        single changes do not, where there are sampled ones.
 
         Returns:
             By property, in descending order; chance alone explains about 2 / runs of one property,
@@ -151,10 +161,10 @@ class VerdictRange(ResultDisplay):
         """
         from scipy.stats import rankdata  # slow to import, and of no use to a single run
 
-        outcomes = self.decisive[self.answered].astype(float)
-        if not self.is_mixed:  # among fallen structures distances to the ground say nothing
+        outcomes = self.decisive[self._compared].astype(float)
+        if np.ptp(outcomes) == 0.0:  # among fallen structures distances to the ground say nothing
             residuals = np.where(self.falls, 0.0, self.dataset["residual"].values)
-            outcomes = rankdata(residuals[self.answered])  # equal runs share a mean rank
+            outcomes = rankdata(residuals[self._compared])  # equal runs share a mean rank
         shares = zip(self.properties, self._correlate(outcomes[None])[:, 0].tolist(), strict=True)
         return dict(sorted(shares, key=lambda item: -item[1]))
 
@@ -165,8 +175,8 @@ class VerdictRange(ResultDisplay):
         Of random permutations of the outcomes, the largest share of all properties is the measure
         of chance (Westfall and Young, 1993). There are none where outcomes are all alike.
         """
-        decisive, random = self.decisive[self.answered].astype(float), np.random.default_rng(0)
-        if not self.is_mixed:
+        decisive, random = self.decisive[self._compared].astype(float), np.random.default_rng(0)
+        if np.ptp(decisive) == 0.0:
             return frozenset()
         chance = [random.permutation(decisive) for _ in range(PERMUTATIONS)]
         largest = np.sort(self._correlate(np.array(chance)).max(axis=0))
@@ -175,8 +185,8 @@ class VerdictRange(ResultDisplay):
         return frozenset(name for name, share in self.importance().items() if share > least)
 
     def _correlate(self, outcomes: Array) -> Array:
-        """Return correlation ratios of outcomes (n, answered runs) by property (properties, n)."""
-        columns = (self.dataset[name].values[self.answered] for name in self.properties)
+        """Return correlation ratios of outcomes (n, compared runs) by property (properties, n)."""
+        columns = (self.dataset[name].values[self._compared] for name in self.properties)
         return np.array([_correlation_ratios(each, outcomes) for each in columns])
 
     @property
@@ -484,8 +494,8 @@ class VerdictRange(ResultDisplay):
         Returns:
             The titles of the columns, and a row for each property.
         """
-        decisive, rows = self.decisive[self.answered], []
-        data = self.answers
+        decisive, rows = self.decisive[self._compared], []
+        data = self.dataset.isel(run=np.flatnonzero(self._compared))
         for name, share in self.importance().items():
             groups = _group_values(data[name].values)
             cells = [
