@@ -1350,7 +1350,7 @@ def test_a_wedge_of_a_wall_in_bond_has_the_linear_check_alone(wedge, verified):
     assert found.linear.floor == pytest.approx(least, rel=1e-6)
     assert find_margin([found]) == pytest.approx(least, rel=1e-6)
     assert f"it moves from {0.5 * least:.3g} times the spectrum on (q = 1)" in found.notes[0]
-    apart = found.linear.bodies and f"; {found.linear.ratio:.3g} with the weights apart"
+    apart = found.linear.bodies and f", {found.linear.ratio:.3g} with the weights apart"
     own = f"{found.linear.bodies or found.linear.ratio:.3g} of the mechanism found{apart or ''}"
     assert describe_margin([found]).startswith(f"least margin {least:.3g} with e* = 1 ({own}), by")
     # between the ratio of e* = 1 and that of the mechanism another one decides
