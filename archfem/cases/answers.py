@@ -265,7 +265,7 @@ def state_assessments(
         numbers = ratios._replace(directions=directions)
         if check.outcome == "passes" and check.at_rest:
             outcome += ", for the mechanism does not begin to move"
-            numbers = numbers._replace(displaced=shown.capacity / shown.demand)
+            numbers = numbers._replace(displaced=shown.moved)
         demand, capacity = (f"{x:.4g} {check.unit}" for x in (shown.demand, shown.capacity))
         capacity += f" {_OF_BODIES}" * (shown is not check and ratios.floor is None)
         demand += check.amplified

@@ -684,12 +684,12 @@ class _Oscillator:
 
     def assess(self) -> KinematicAssessment:
         """Return the assessment by the weights of blocks, or by one for each body."""
-        curve, path, structure = self.curve, self.path, self.placed.structure
-        given = self.given
+        path, structure = self.path, self.placed.structure
         # d_0* is of what acts up to the collapse: Circolare 7/2019, C8.7.1.2.1.6
         if path and path.breaks and path.end is not PathEnd.BREAKS:
             path = path.end_broken()
             return replace(self, path=path, holds=min(self.holds, len(path.factors) - 1)).assess()
+        given, curve = self.given, self.curve
         alpha_0, a_0, d_0, secant = np.inf, np.inf, np.inf, np.nan
         mass, control, displacement = 0.0, "", None
         if path is not None:

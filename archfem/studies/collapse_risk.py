@@ -56,6 +56,7 @@ from archfem.statics.equilibrium import MAX_SLIP_AT_REST, Equilibrium
 from archfem.statics.fill_checks import fill_doubts
 from archfem.statics.modes import modes
 from archfem.studies.fragility import (
+    LEAST_DEVIATION,
     Fragility,
     Rate,
     fit_brackets,
@@ -610,7 +611,7 @@ class CollapseRisk(ResultDisplay):
             bins: number of bins.
         """
         curve, every = self.fragility(), np.arange(len(self.answered))[None]
-        place = np.log(curve.median) + curve.dispersion * np.linspace(-15.0, 2.5, 3501)
+        place = np.log(curve.median) + curve.dispersion * np.linspace(LEAST_DEVIATION, 2.5, 3501)
         middle = (place[1:] + place[:-1]) / 2.0
         fits = [(group.mean(), *self._fits(every, group)) for group in self._groups]
         falls = sum(share * ndtr((middle - mean) / wide) for share, mean, wide in fits)

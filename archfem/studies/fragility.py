@@ -38,6 +38,10 @@ MAX_MOTIONS = 1e9
 # Smallest and largest dispersion of a fit [-]
 DISPERSION_RANGE = (0.005, 5.0)
 
+# Least intensity of a rate of collapse, in deviations β from the median. Where hazards fall as a^-b
+# the rate comes from about b β below the median, to 6 deviations on either side: b β up to 9 [-]
+LEAST_DEVIATION = -15.0
+
 
 @dataclass(frozen=True)
 class Rate:
@@ -361,8 +365,8 @@ def _moments(low: Array, high: Array, mean: Array, deviation: Array) -> tuple[Ar
 
 def integrate_rates(means: Array, deviations: Array, hazard: Hazard) -> Array:
     """Return the annual rates (k,) of lognormal fragilities under a hazard curve."""
-    # ∫ rate φ dz, whose peak is b β below the median where rates fall as a^-b
-    z, step = np.linspace(-15.0, 8.0, 921, retstep=True)
+    # ∫ rate φ dz; beyond 8 deviations φ is round-off
+    z, step = np.linspace(LEAST_DEVIATION, 8.0, 921, retstep=True)
     x = np.exp(means[:, None] + deviations[:, None] * z)
     return np.asarray(hazard.rate_of(x) @ _density(z) * step)
 

@@ -27,6 +27,7 @@ from archfem._netcdf import name_flags, read_dataset, write_dataset
 from archfem._validation import validate_arguments
 from archfem.cases.provenance import describe_version
 from archfem.cases.result_text import STATED_DOUBTS, UPPER_BOUNDS, mark_bound
+from archfem.dynamics.history import Ending
 from archfem.errors import InvalidInput, StudyStopped, logger
 from archfem.studies.evaluators import Evaluator
 from archfem.studies.parameter_space import PAIR_KEY, Axis, StudyPoint
@@ -427,7 +428,7 @@ def format_table(table: xr.Dataset, max_rows: int = 50) -> str:
         text += [f"… {len(frame) - max_rows} more points{pushed}"]
     shared = "; ".join(f"{name} = {text}" for name, text in same.items() if text)
     text += [f"the same at all points: {shared}"] * bool(shared)
-    if "ended" in frame and frame["ended"].isin(("parted", "met")).any():
+    if "ended" in frame and frame["ended"].isin([x for x in Ending if x.is_loose]).any():
         words = "of a point that ended 'parted' or 'met', joints are those before its blocks were"
         text.append(f"{words} loose, displacements those to its end")
     return "\n".join(text)

@@ -404,8 +404,10 @@ def _draw_ties(axes: Axes, blocks: PlacedBlocks) -> None:
         label = ""
 
 
-def _draw_capacity_curve(axes: Axes, found: KinematicAssessment, titled: Any) -> None:
-    """Draw the capacity curve, the displacement check, and the spectrum of the demand."""
+def _draw_capacity_curve(
+    axes: Axes, found: KinematicAssessment, titled: KinematicAssessment
+) -> None:
+    """Draw curve and demand of a split of weights, under the title of the whole assessment."""
     check, curve = found.displacement, found.curve
     reduced = curve["a"].values / found.confidence_factor
     last = float(curve["d"][-1])

@@ -270,8 +270,9 @@ def _say_unchecked(data: ReportData) -> tuple[list[str], bool]:
     if (found := margins.find_unchecked_push(data)) is None:
         return [], False
     push, demand = found
-    times = f"{format_ratio(push / demand)} × the demand" if demand > 0.0 else ""
-    beside = f" ({times}, {demand:.3g} g)" * (demand > 0.0)
+    beside = ""
+    if demand > 0.0:
+        beside = f" ({format_ratio(push / demand)} × the demand, {demand:.3g} g)"
     falls = f", where it may overturn from {push:.3g} g on{beside}" * (push > 0.0)
     way = "across the plane of the drawing"
     if np.isnan(push):

@@ -41,6 +41,9 @@ HISTORIES, VARIATIONS = "time histories", "variations"
 # Result of cases beside the given one
 STUDIES = "study"
 
+# What `[verdict.vary]` varies, in the words of the conclusion
+_VARIED_PROPERTIES = "stiffness", "friction", "damping"
+
 
 def list_varied(data: ReportData) -> tuple[str, ...]:
     """Return the properties that the range of the verdict varies; none without a range."""
@@ -235,7 +238,7 @@ def list_unvaried(data: ReportData) -> list[str]:
         return [each for each in needed if computed and each not in studied]
     single = ["motion"] if len(data.runs) == 1 else []
     if not data.verdict_ranges:
-        single += ["lengths", "stiffness", "friction", "damping"]
+        single += ["lengths", *_VARIED_PROPERTIES]
     else:
         single.append("lengths")
         varied = {each.dataset.attrs.get("motion", "") for each in data.verdict_ranges}
@@ -259,8 +262,8 @@ def _list_unvaried_under(data: ReportData, left: Collection[str]) -> list[str]:
     for name in (x for x in data.runs if x in left and len(data.runs) > 1):
         studies = [x for x in data.own_studies if name in x.motions and not x.is_static]
         studied = set[str]().union(*map(list_studied, studies))
-        properties = [x for x in ("stiffness", "friction", "damping") if x not in studied]
-        words = join_words(properties) if len(properties) < 3 else "properties"
+        left_out = [x for x in _VARIED_PROPERTIES if x not in studied]
+        words = join_words(left_out) if studied.intersection(_VARIED_PROPERTIES) else "properties"
         found.setdefault(words, []).append(f"'{name}'")
     return [f"{words} under {join_words(names)}" for words, names in found.items() if words]
 
