@@ -17,7 +17,7 @@ from archfem.joints.large.forces import (
 )
 from archfem.joints.large.overlap_law import FaceLaw
 from archfem.joints.large.point_law import CONTACT_RECORD
-from archfem.joints.large.rates import assemble_rates, find_block_starts, find_rate_pairs
+from archfem.joints.large.rates import assemble_rates, find_rate_blocks
 
 joint_measures = either(face_kinematics.joint_measures)
 step_measures = either(face_kinematics.step_measures)
@@ -103,7 +103,7 @@ def two_joints(shapes, friction, facets, rng, fill=False):
         moves,
         stretch if shapes else stretch[..., :0],
         np.zeros((2, 2, 3)),
-        find_block_starts(index, sizes),
+        find_rate_blocks(index, sizes)[0],
     )
     edges = np.linspace(-0.5, 0.5, count + 1)
     if facets:
@@ -142,14 +142,14 @@ def gathered(joints, before, after, late, slid):
         for side in range(2):
             own = index[joint, side, : sizes[joint, side]]
             force[own] += found.force[joint, side, : len(own)]
-    np.add.at(rate, tuple(find_rate_pairs(joints.kinematics)), assembled(joints, found))
+    np.add.at(rate, tuple(find_rate_blocks(index, sizes)[1]), assembled(joints, found))
     return force, rate, found
 
 
 def assembled(joints, found):
     """Derivatives at the places of all blocks (e,)."""
     sides = joints.kinematics
-    rates = np.zeros(find_rate_pairs(sides).shape[1])
+    rates = np.zeros(find_rate_blocks(sides.index, sides.size)[1].shape[1])
     places, workspace = np.arange(len(rates)), np.empty((2, 3, 5, sides.shapes.shape[3]))
     assemble_rates(sides, found.rates, workspace, places.astype(np.uint32), rates)
     return rates

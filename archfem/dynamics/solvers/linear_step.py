@@ -40,6 +40,7 @@ from archfem.dynamics.solvers.sparse_products import (
     without_round_off,
 )
 from archfem.joints.large.point_law import linear_means
+from archfem.joints.large.rates import list_blocks
 
 
 class LinearSystem(NamedTuple):
@@ -75,7 +76,7 @@ class LinearStepWorkspace(NamedTuple):
 
 def find_tangent_blocks(
     gaps: SparseRows, pairs: NDArray[np.int64]
-) -> tuple[NDArray[np.int64], Any, Any]:
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """List rows and columns of the tangent's entries that joints change, block after block.
 
     The derivative of force i by gap j changes a block: rows of all coordinates on which force i
@@ -84,17 +85,7 @@ def find_tangent_blocks(
     """
     indptr, indices, _ = gaps
     moved = [tuple(indices[a:b].tolist()) for a, b in itertools.pairwise(indptr)]
-    blocks: dict[Any, int] = {}
-    begin, ends, count = [], [], 0
-    for i, j in pairs:
-        key = moved[i], moved[j]
-        if key not in blocks:
-            blocks[key] = count
-            ends.append([end.ravel() for end in np.meshgrid(*key, indexing="ij")])
-            count += len(ends[-1][0])
-        begin.append(blocks[key])
-    rows, columns = np.concatenate(ends, axis=1).astype(np.int64)
-    return np.array(begin), rows, columns
+    return list_blocks((moved[i], moved[j]) for i, j in pairs)
 
 
 def tangent_pattern(equation: Equation) -> sparse.csr_matrix:

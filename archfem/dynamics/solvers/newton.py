@@ -48,7 +48,7 @@ from archfem.joints.large.forces import (
     compute_step_forces,
     joint_energy,
 )
-from archfem.joints.large.rates import JointRates, add_rates, copy_rates, find_rate_pairs
+from archfem.joints.large.rates import JointRates, add_rates, copy_rates, find_rate_blocks
 
 # Evaluations in a step, above which the next one begins with a factor of its own: joints open or
 # slide then, and change their derivatives much
@@ -113,7 +113,7 @@ class NewtonSolver(StepSolver):
         """Return the data of steps with small displacements."""
         linear, pairs, effective = linear_step.linear_system(self._equation, self.order, dt)
         law = linear.law
-        begin, *ends = linear_step.find_tangent_blocks(linear.gaps, pairs)
+        begin, ends = linear_step.find_tangent_blocks(linear.gaps, pairs)
         tangent, places = self._store(effective, ends)
         widest = int(np.diff(linear.gaps[0]).max(initial=0))
         blocks = np.zeros(widest), np.zeros(widest**2)
@@ -147,7 +147,7 @@ class NewtonSolver(StepSolver):
         place, sides = np.argsort(order), model.joints.kinematics
         forces = allocate_step_forces(model.joints)
         sides = sides._replace(index=place[sides.index])
-        tangent, places = self._store(effective, find_rate_pairs(sides))
+        tangent, places = self._store(effective, find_rate_blocks(sides.index, sides.size)[1])
         rates = JointRates(*(np.zeros_like(each) for each in forces.rates))
         # energy then drifts by 1e-8 of what is exchanged; reused factors round ten times as much
         balance = 1e-9 if self._reduction == 0.0 else 1e-8

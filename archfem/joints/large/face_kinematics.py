@@ -182,7 +182,7 @@ class FaceKinematics(NamedTuple):
     stretch: Array
     fixed_pose: Array  # pose of a face of a fixed block, else 0 (j, 2, 3) [m, m, rad]
     # first place of the derivatives of the forces on one face by the coordinates of another, from
-    # `rates.find_block_starts` (j, 2, 2)
+    # `rates.find_rate_blocks` (j, 2, 2)
     block_start: Any
 
 

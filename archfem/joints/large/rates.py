@@ -6,13 +6,14 @@ is the derivative of the law; U and V hold the derivatives of the five numbers b
 mean over the step and at its end. Segments between the same coordinates share a block of places.
 """
 
+from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from archfem._numba import entry, kernel
 from archfem._typing import Array
-from archfem.joints.large.face_kinematics import FaceKinematics, shape_rates
+from archfem.joints.large.face_kinematics import shape_rates
 
 
 class JointRates(NamedTuple):
@@ -28,37 +29,30 @@ class JointRates(NamedTuple):
     bend: Array  # rotation stiffness of each face, by `rotation_stiffness` (j, 2, 5)
 
 
-def find_block_starts(index: Any, size: Any) -> Any:
-    """Return the first place of each block of derivatives (j, 2, 2)."""
-    # segments with the same coordinates on both faces share a block
-    starts, count = np.zeros((len(index), 2, 2), np.int64), 0
+def list_blocks(pairs: Iterable[tuple[tuple[int, ...], tuple[int, ...]]]) -> tuple[Any, Any]:
+    """List the entries of a matrix in blocks, each between the coordinates of rows and columns.
+
+    Equal pairs of coordinates share a block. The first result is where the block of each pair
+    begins among the entries (k,), the second are rows and columns of all entries (2, e).
+    """
     blocks: dict[Any, int] = {}
-    for joint, counts in enumerate(size):
-        coordinates = [tuple(index[joint, side, : counts[side]].tolist()) for side in range(2)]
-        for side, other in np.ndindex(2, 2):
-            key = coordinates[side], coordinates[other]
-            if key not in blocks:
-                blocks[key] = count
-                count += len(key[0]) * len(key[1])
-            starts[joint, side, other] = blocks[key]
-    return starts
+    begin, ends, count = [], [], 0
+    for pair in pairs:
+        if pair not in blocks:
+            blocks[pair] = count
+            ends.append([end.ravel() for end in np.meshgrid(*pair, indexing="ij")])
+            count += len(ends[-1][0])
+        begin.append(blocks[pair])
+    return np.array(begin), np.concatenate(ends, axis=1).astype(np.int64)
 
 
-def find_rate_pairs(sides: FaceKinematics) -> Any:
-    """Return the coordinates of rows and columns of all blocks of derivatives (2, e)."""
-    sizes = sides.size[:, :, None] * sides.size[:, None, :]
-    count = int((sides.block_start + sizes).max(initial=0))
-    pairs, done = np.zeros((2, count), np.int64), set()
-    for joint, side, other in np.ndindex(sides.block_start.shape):
-        start = int(sides.block_start[joint, side, other])
-        rows = sides.index[joint, side, : sides.size[joint, side]]
-        columns = sides.index[joint, other, : sides.size[joint, other]]
-        count = len(rows) * len(columns)
-        if count and start not in done:
-            done.add(start)
-            pairs[0, start : start + count] = np.repeat(rows, len(columns))
-            pairs[1, start : start + count] = np.tile(columns, len(rows))
-    return pairs
+def find_rate_blocks(index: Any, size: Any) -> tuple[Any, Any]:
+    """Return where blocks of derivatives begin (j, 2, 2), and their rows and columns (2, e)."""
+    counts = zip(index, size, strict=True)
+    faces = [[tuple(row[:n].tolist()) for row, n in zip(*both, strict=True)] for both in counts]
+    # segments with the same coordinates on both faces share a block
+    begin, ends = list_blocks((own[a], own[b]) for own in faces for a, b in np.ndindex(2, 2))
+    return begin.reshape(-1, 2, 2), ends
 
 
 @entry

@@ -23,7 +23,7 @@ from archfem.joints.large.face_kinematics import FaceKinematics
 from archfem.joints.large.forces import LargeDisplacementJoints
 from archfem.joints.large.overlap_law import FaceLaw
 from archfem.joints.large.point_law import CONTACT_RECORD
-from archfem.joints.large.rates import find_block_starts
+from archfem.joints.large.rates import find_rate_blocks
 from archfem.joints.normal_law import Facets
 from archfem.masonry.structure import Structure
 from archfem.models.linear_blocks import LinearBlockModel, joint_orientation
@@ -173,7 +173,7 @@ def _build_kinematics(
     if np.abs(stretch).max(initial=0.0) <= PLANE_FACE_TOLERANCE * np.abs(shapes).max(initial=0.0):
         stretch = stretch[:, :, :0]
     arm = segments.middles[:, None] - centres[structure.pairs[segments.joint]]
-    fixed, starts = segments.fixed_poses(model.support_motion), find_block_starts(index, size)
+    fixed, starts = segments.fixed_poses(model.support_motion), find_rate_blocks(index, size)[0]
     return FaceKinematics(index, size, has_frame, arm, shapes, stretch, fixed, starts)
 
 

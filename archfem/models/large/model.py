@@ -26,7 +26,7 @@ from archfem.joints.large.forces import (
     joint_energy,
     measure_states,
 )
-from archfem.joints.large.rates import assemble_rates, find_rate_pairs
+from archfem.joints.large.rates import assemble_rates, find_rate_blocks
 from archfem.joints.operator import Pattern
 from archfem.masonry.block import rotate
 from archfem.masonry.loads import Action, BodyForce, PointLoad
@@ -251,7 +251,7 @@ class LargeDisplacementModel(Model):
         used = np.arange(sides.index.shape[-1]) < sides.size[:, :, None]
         self._forces = np.flatnonzero(used)
         self._rows = sides.index.ravel()[self._forces]
-        pairs = find_rate_pairs(sides)
+        _, pairs = find_rate_blocks(sides.index, sides.size)
         coupled = sparse.csr_matrix((np.ones(len(pairs[0])), pairs), (self.size, self.size))
         pattern = Pattern.of(self.small.mass, self.small.block_stiffness, coupled)
         self.mass = pattern.spread(self.small.mass)
