@@ -20,12 +20,11 @@ from archfem.dynamics.rigid_body.bodies import (
     Bodies,
     FallFrame,
     LooseBlocks,
-    drop_straight_vertices,
     make_bodies,
     split_convex,
 )
 from archfem.masonry.backfill import TILE_AREA, cut_block, stiffen
-from archfem.masonry.block import Block, measure_polygon, rotate
+from archfem.masonry.block import Block, drop_straight_vertices, measure_polygon, rotate
 from archfem.masonry.stiffness_ratio import find_yielding_blocks, list_stones
 from archfem.masonry.structure import Structure
 from archfem.models.model import Doubt

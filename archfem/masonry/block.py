@@ -57,6 +57,14 @@ def rotate(points: Array, angle: float | Array) -> Array:
     return turned
 
 
+def drop_straight_vertices(points: Array, straight: float = 1e-7) -> Array:
+    """Return an outline without vertices at which it turns by less than an angle (m, 2) [m]."""
+    before, after = points - np.roll(points, 1, axis=0), np.roll(points, -1, axis=0) - points
+    turn = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
+    lengths = np.linalg.norm(before, axis=1) * np.linalg.norm(after, axis=1)
+    return points[np.abs(turn) > straight * lengths]
+
+
 def triangulate_polygon(points: Array, tolerance: float = 0.0) -> Numbers:
     """Divide a polygon (n, 2), convex or not, into anticlockwise triangles of vertices (t, 3).
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from archfem._typing import Array
 from archfem._validation import check_number
 from archfem.errors import InvalidInput, InvalidStructure, logger
-from archfem.masonry.block import Block
+from archfem.masonry.block import Block, drop_straight_vertices
 from archfem.masonry.stiffness_ratio import find_soft_blocks
 from archfem.masonry.structure import CONTACT_TOLERANCE, Structure
 
@@ -287,14 +287,6 @@ def _chord_count(block: Block, chord: float = np.radians(15.0)) -> int:
     start, end = block.points[:2] - np.array(block.centre)
     turn = abs(np.arctan2(start[0] * end[1] - start[1] * end[0], start @ end))
     return int(np.ceil(turn / chord - 1e-9))
-
-
-def drop_straight_vertices(points: Array, straight: float = 1e-7) -> Array:
-    """Return an outline without vertices at which it turns by less than an angle (m, 2) [m]."""
-    before, after = points - np.roll(points, 1, axis=0), np.roll(points, -1, axis=0) - points
-    turn = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
-    lengths = np.linalg.norm(before, axis=1) * np.linalg.norm(after, axis=1)
-    return points[np.abs(turn) > straight * lengths]
 
 
 def split_convex(points: Array) -> list[Piece]:

@@ -28,7 +28,7 @@ from archfem._optional import require_package
 from archfem._typing import Array, Numbers
 from archfem._validation import short_repr
 from archfem.errors import InvalidInput
-from archfem.masonry.block import measure_polygon, trace_boundary
+from archfem.masonry.block import drop_straight_vertices, measure_polygon, trace_boundary
 from archfem.masonry.structure import suggest_name
 from archfem.masonry.survey.assemblies import is_assembly, read_plane_assembly, trace_elevation
 from archfem.masonry.survey.dxf import MAX_ENTITIES, POLYLINES, Entity, load_dxf
@@ -504,7 +504,7 @@ def read_physical_surfaces(path: Path, factor: float = 1.0) -> list[tuple[str, A
     surfaces = []
     for tag, cells in sorted(found.items()):
         outline = _trace_outline(cells, points, names.get(tag, str(tag)))
-        surfaces.append((names.get(tag, f"block {tag}"), points[outline]))
+        surfaces.append((names.get(tag, f"block {tag}"), outline))
     return surfaces
 
 
@@ -564,7 +564,7 @@ def _check_plane(
     return points[:, :2]
 
 
-def _trace_outline(cells: list[Numbers], points: Array, name: str) -> list[int]:
+def _trace_outline(cells: list[Numbers], points: Array, name: str) -> Array:
     """Trace the points around cells in order, without points on straight edges."""
     areas = (measure_polygon(points[cell])[0] for cell in cells)
     loop = trace_boundary([c if a > 0.0 else c[::-1] for c, a in zip(cells, areas, strict=True)])
@@ -573,15 +573,10 @@ def _trace_outline(cells: list[Numbers], points: Array, name: str) -> list[int]:
             f"physical surface '{name}' is in pieces or has a hole, or its cells overlap: tag "
             "each block by itself"
         )
-    places = points[loop]
-    before, ahead = places - np.roll(places, 1, axis=0), np.roll(places, -1, axis=0) - places
-    # a point lies on a straight edge if the sine of the turn there vanishes to round-off
-    turn = before[:, 0] * ahead[:, 1] - before[:, 1] * ahead[:, 0]
-    lengths = np.linalg.norm(before, axis=1) * np.linalg.norm(ahead, axis=1)
-    bends = np.abs(turn) > 1e-9 * lengths
-    if np.count_nonzero(bends) < 3:
+    outline = drop_straight_vertices(points[loop], 1e-9)  # up to round-off
+    if len(outline) < 3:
         raise InvalidInput(f"physical surface '{name}' has no area: tag each block with its own")
-    return [point for point, bent in zip(loop, bends, strict=True) if bent]
+    return outline
 
 
 def write_dxf(

@@ -10,10 +10,10 @@ from loose_blocks import G, floor
 import archfem as af
 from archfem.dynamics.rigid_body.bodies import (
     check_rigid_blocks,
-    drop_straight_vertices,
     make_bodies,
     split_convex,
 )
+from archfem.masonry.block import drop_straight_vertices
 
 
 def test_mass_and_moment_of_a_box():
