@@ -26,8 +26,10 @@ from archfem.dynamics.solvers.equation import Equation
 from archfem.dynamics.solvers.rigid_chains import ChainSystem, chain_system, constant_chain_parts
 from archfem.dynamics.solvers.semismooth_newton import (
     Correction,
+    StepWorkspace,
     Tolerances,
     add_share,
+    end_step,
     newton_driver,
     residual_work,
     reverse_correction,
@@ -156,7 +158,9 @@ class NewtonSolver(StepSolver):
         tolerances = Tolerances(balance, balance, round_off, 1e4 * balance, self._reduction)
         return LargeSystem(
             model.joints._replace(kinematics=sides),
-            LargeStepWorkspace(*np.zeros((8, model.size))),
+            StepWorkspace(*np.zeros((6, model.size))),
+            np.zeros(model.size),
+            np.zeros(model.size),
             forces,
             np.zeros_like(forces.irreversible_slip),
             sparse_rows(without_round_off(mass)),
@@ -357,7 +361,9 @@ class LargeSystem(NamedTuple):
     """A structure of large displacements."""
 
     joints: LargeDisplacementJoints  # kinematics and law
-    work: "LargeStepWorkspace"
+    work: StepWorkspace
+    pulled: Array  # K q at the start of the step (n,)
+    momentum: Array  # M v there (n,)
     forces: JointStepForces  # workspace of the joints' forces over a step
     slip: Array  # irreversible slip of the points before the step (p,) [m]
     mass: SparseRows
@@ -375,24 +381,11 @@ class LargeSystem(NamedTuple):
     tolerances: Tolerances
 
 
-class LargeStepWorkspace(NamedTuple):
-    """Vectors of a step with large displacements, each (n,)."""
-
-    before: Array  # coordinates at its start
-    after: Array  # and at its end, as tried
-    move: Array  # Δq
-    correction: Array  # of Δq
-    residual: Array  # forces out of balance
-    pulled: Array  # K q at the start of the step
-    momentum: Array  # M v there
-    constant: Array  # forces that do not depend on the end of the step
-
-
 def _start_large_run(system, state, memory):  # type: ignore
     """Copy memory and state, and discard the factor of an earlier run."""
     system.factored[0] = False
-    multiply(system.blocks, state[0], system.work.pulled)
-    multiply(system.mass, state[1], system.work.momentum)
+    multiply(system.blocks, state[0], system.pulled)
+    multiply(system.mass, state[1], system.momentum)
     for point in range(len(memory)):
         system.slip[point] = memory[point]
 
@@ -404,9 +397,9 @@ def _sum_loads(system, work, old, ground):  # type: ignore
     for k in range(len(constant)):
         work.before[k] = old[0, k]
         # gravity, ground motion, 2 M v/Δt, and blocks at the start
-        inertia = 2.0 / system.step[0] * work.momentum[k]
+        inertia = 2.0 / system.step[0] * system.momentum[k]
         constant[k] = system.weight[k] + inertia - ground[0] * body[0, k] - ground[1] * body[1, k]
-        constant[k] -= work.pulled[k]
+        constant[k] -= system.pulled[k]
 
 
 @kernel
@@ -504,11 +497,7 @@ def _solve_large_step(system, step, states, ground):  # type: ignore
         iterations = _solve_large(system, work, system.tolerances, limits)
         total += abs(iterations)
         if iterations > 0:
-            # the midpoint rule: velocity and acceleration from the change of coordinates
-            for k in range(len(work.move)):
-                new[0, k] = work.after[k]
-                new[1, k] = (2.0 / dt) * work.move[k] - old[1, k]
-                new[2, k] = (new[1, k] - old[1, k]) / dt
+            end_step(work, dt, old, new)
             return total
         system.factored[0] = False
     return -1
@@ -535,14 +524,14 @@ def _evaluate_energies(system, work, new, ground, energy):  # type: ignore
     for k in range(len(forces.dissipation)):
         energy[3] += forces.dissipation[k]
     for k in range(len(move)):
-        work.momentum[k] = row_times(system.mass, k, new[1])
-        energy[0] += 0.5 * new[1, k] * work.momentum[k]
+        system.momentum[k] = row_times(system.mass, k, new[1])
+        energy[0] += 0.5 * new[1, k] * system.momentum[k]
         energy[1] -= system.weight[k] * new[0, k]
         energy[2] -= move[k] * (ground[0] * system.body[0, k] + ground[1] * system.body[1, k])
         # blocks: their energy, and damping proportional to their stiffness
         more = row_times(system.blocks, k, move)
-        work.pulled[k] += more
-        energy[1] += 0.5 * new[0, k] * work.pulled[k]
+        system.pulled[k] += more
+        energy[1] += 0.5 * new[0, k] * system.pulled[k]
         energy[3] += lag * move[k] * more + move[k] * row_times(system.viscous, k, move) / dt
     energy[1] += joint_energy(system.joints, new[0], system.slip)
 

@@ -16,8 +16,10 @@ from archfem.dynamics.solvers.base import is_kind, overload_steps
 from archfem.dynamics.solvers.equation import Equation
 from archfem.dynamics.solvers.semismooth_newton import (
     Correction,
+    StepWorkspace,
     Tolerances,
     add_share,
+    end_step,
     newton_driver,
     residual_work,
     reverse_correction,
@@ -63,7 +65,7 @@ class ChainSystem(NamedTuple):
     mass: Array  # diagonal of M (n,)
     weight: Array  # forces of gravity (n,)
     body: Array  # forces per unit ground acceleration (2, n)
-    work: "ChainWorkspace"
+    work: StepWorkspace  # with zeros for the ground
     # derivatives of each joint: of forces on jump and angles (16), of the middles of both faces by
     # the angle, mean and at the end (8), rotation stiffness of both (2) (26, j)
     rates: Array
@@ -88,17 +90,6 @@ class ChainSystem(NamedTuple):
     tolerances: Tolerances
 
 
-class ChainWorkspace(NamedTuple):
-    """Vectors of a step, each with zeros for the ground (n + 3,)."""
-
-    before: Array  # coordinates at its start
-    after: Array  # and at its end, as tried
-    move: Array  # Δq
-    correction: Array  # of Δq
-    residual: Array  # forces out of balance
-    constant: Array  # forces that do not depend on the end of the step
-
-
 def chain_system(equation: Equation, tree: stone_tree.StoneTree, dt: float) -> ChainSystem:
     """Return the data of steps of one length [s]."""
     model: Any = equation.model
@@ -116,7 +107,7 @@ def chain_system(equation: Equation, tree: stone_tree.StoneTree, dt: float) -> C
         model.mass.diagonal()[order],
         equation.weight[order],
         np.ascontiguousarray(model.mass_influence[order].T),
-        ChainWorkspace(*np.zeros((6, model.size + 3))),
+        StepWorkspace(*np.zeros((6, model.size + 3))),
         np.zeros((26, size)),
         np.zeros((36, size)),
         np.zeros((12, size)),
@@ -476,11 +467,8 @@ def _solve_chain_step(system, step, states, ground):  # type: ignore
         iterations = _solve_chain(system, work, system.tolerances, limits)
         total += abs(iterations)
         if iterations > 0:
-            # the midpoint rule: velocity and acceleration from the change of coordinates
+            end_step(work, dt, old, new)
             for k in range(len(system.mass)):
-                new[0, k] = work.after[k]
-                new[1, k] = (2.0 / dt) * work.move[k] - old[1, k]
-                new[2, k] = (new[1, k] - old[1, k]) / dt
                 system.past[k] = old[2, k]
             system.known[0] += 1
             return total

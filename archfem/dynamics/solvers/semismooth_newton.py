@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from archfem._numba import inlined_kernel, summing_kernel
+from archfem._typing import Array
 
 # Shares of a correction that a line search tries, at most
 MAX_SEARCH_EVALUATIONS = 14
@@ -23,6 +24,17 @@ class Tolerances(NamedTuple):
     round_off: float  # correction that changes nothing [m]
     rounded: float  # largest residual after such a correction [N]
     reduction: float  # of the residual in an iteration, to which the last factor serves again [-]
+
+
+class StepWorkspace(NamedTuple):
+    """Vectors of a step with large displacements, each (n,)."""
+
+    before: Array  # coordinates at its start
+    after: Array  # and at its end, as tried
+    move: Array  # Δq
+    correction: Array  # of Δq
+    residual: Array  # forces out of balance
+    constant: Array  # forces that do not depend on the end of the step
 
 
 class Correction(NamedTuple):
@@ -59,6 +71,15 @@ def reverse_correction(system, work):  # type: ignore
     """Turn the correction around."""
     for k in range(len(system.weight)):
         work.correction[k] = -work.correction[k]
+
+
+@inlined_kernel
+def end_step(work, dt, old, new):  # type: ignore
+    """Fill the state at the end of a step (3, n) by the midpoint rule from its change Δq."""
+    for k in range(new.shape[1]):
+        new[0, k] = work.after[k]
+        new[1, k] = (2.0 / dt) * work.move[k] - old[1, k]
+        new[2, k] = (new[1, k] - old[1, k]) / dt
 
 
 def line_search(evaluate_residual: Any, correction: Correction) -> Any:
