@@ -19,7 +19,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.path import Path
 from matplotlib.text import Text
-from matplotlib.transforms import Bbox, IdentityTransform
+from matplotlib.transforms import Affine2D, Bbox
 
 from archfem._typing import Array
 from archfem.dynamics.history import History
@@ -41,9 +41,10 @@ class Canvas:
     ) -> None:
         self.size = window[2] - window[0], window[3] - window[1]
         self._renderer, self._window = renderer, Bbox.from_extents(*window)
-        room, self._identity = np.array(self._window.size), IdentityTransform()
-        self._scale = float(np.min(room / (high - low)))
-        self._origin = np.array(window[:2]) + 0.5 * room - 0.5 * self._scale * (low + high)
+        room = np.array(self._window.size)
+        scale = float(np.min(room / (high - low)))
+        origin = np.array(window[:2]) + 0.5 * room - 0.5 * scale * (low + high)
+        self._pixels = Affine2D().scale(scale).translate(*origin)
         # line widths are those of a window of 1100 pixels; in smaller ones lines are thinner
         self._line_scale = max(0.6, self._window.width / 1100.0) * 72.0 / renderer.dpi
 
@@ -54,22 +55,21 @@ class Canvas:
         style.set_capstyle("round")
         # the renderer limits the size of a path
         for first in range(0, len(segments), 4000):
-            self._draw_path(style, segments[first : first + 4000], [Path.MOVETO, Path.LINETO])
+            points = segments[first : first + 4000].reshape(-1, 2)
+            path = Path(points, np.tile([Path.MOVETO, Path.LINETO], len(points) // 2))
+            path.should_simplify = False
+            self._renderer.draw_path(style, path, self._pixels)
 
     def fill(self, outlines: Array, colour: str, opacity: float = 1.0) -> None:
         """Fill polygons of equal numbers of corners (n, k, 2)."""
-        if not len(outlines):
-            return
-        style = self._style(colour, opacity)
-        style.set_linewidth(0.0)
-        closed = np.concatenate([outlines, outlines[:, :1]], axis=1)
-        codes = [Path.MOVETO, *[Path.LINETO] * (outlines.shape[1] - 1), Path.CLOSEPOLY]
-        self._draw_path(style, closed, codes, style.get_rgb())
+        if len(outlines):
+            style, path = self._style(colour, opacity), Path.make_compound_path_from_polys(outlines)
+            style.set_linewidth(0.0)
+            self._renderer.draw_path(style, path, self._pixels, style.get_rgb())
 
     def shade(self, corners: Array, colours: Array) -> None:
         """Fill triangles (t, 3, 2) with colours that vary linearly between corners (t, 3, 4)."""
-        style, points = self._style("white"), self._pixels(corners)
-        self._renderer.draw_gouraud_triangles(style, points, colours, self._identity)
+        self._renderer.draw_gouraud_triangles(self._style("white"), corners, colours, self._pixels)
 
     def paste(self, image: Image) -> None:
         """Fill the window with an image (height, width, 3)."""
@@ -77,19 +77,6 @@ class Canvas:
         # the renderer counts rows from the bottom
         pixels = np.ascontiguousarray(np.concatenate([image, opaque], axis=2)[::-1])
         self._renderer.draw_image(self._style("white"), *self._window.min, pixels)
-
-    def _draw_path(
-        self, style: GraphicsContextBase, pieces: Array, codes: list[Any], face: Any = None
-    ) -> None:
-        """Draw pieces (n, k, 2) of equal path codes (k,) as a single path."""
-        all_codes = np.tile(np.array(codes, dtype=Path.code_type), len(pieces))
-        path = Path(self._pixels(pieces).reshape(-1, 2), all_codes)
-        path.should_simplify = False
-        self._renderer.draw_path(style, path, self._identity, face)
-
-    def _pixels(self, points: Array) -> Array:
-        """Convert points (…, 2) from metres to pixels."""
-        return self._origin + self._scale * points
 
     def _style(self, colour: str, opacity: float = 1.0) -> GraphicsContextBase:
         """Return a graphics context that is clipped to the window."""
