@@ -366,18 +366,14 @@ class Bodies:
 
     def sparse_rates(self, contacts: Sequence[Contact]) -> list[csr_matrix]:
         """Return the rates of gaps and of slips, each (n_contacts, 3 n_bodies)."""
-        rates = jump_rates(*self._jumps(contacts))
-        return [rates[: len(contacts)], rates[len(contacts) :]]
-
-    def _jumps(self, contacts: Sequence[Contact]) -> tuple[Array, Array, Numbers, Array]:
-        """Return directions, places and bodies of gaps and then of slips, and all references."""
         points = np.array([contact.point for contact in contacts]).reshape(-1, 2)
         normal = np.array([contact.normal for contact in contacts]).reshape(-1, 2)
         along = np.stack([normal[:, 1], -normal[:, 0]], axis=1)
         # a jump is the motion of the corner's block less that of the face's
         pairs = np.array([(c.face, c.corner) for c in contacts], dtype=np.intp).reshape(-1, 2)
         places, bodies = (np.concatenate([each, each]) for each in (points, self.body[pairs]))
-        return np.concatenate([normal, along]), places, bodies, self.references
+        rates = jump_rates(np.concatenate([normal, along]), places, bodies, self.references)
+        return [rates[: len(contacts)], rates[len(contacts) :]]
 
     @cached_property
     def tie_forces(self) -> csr_matrix:

@@ -308,17 +308,12 @@ class Rating(ResultDisplay):
     def table(self) -> str:
         """Return factors [-], axles and loaded road [m] where loads count, as rows of CSV."""
         head = "direction,position of the vehicle's middle [m],factor [-],axles [-]"
-        rows = [f"{head},road under the distributed load [m]"]
-        for way in DRIVING_DIRECTIONS:
-            here = self.moving.factors.sel(direction=way)
-            values = (here[key].values for key in ("position", "factor", "axles", "loaded"))
-            each = zip(*values, strict=True)
-            rows += [
-                f"{way},{x:.6g},{f:.6g},{n},{length:.4g}"
-                for x, f, n, length in each
-                if np.isfinite(f)
-            ]
-        return "\n".join(rows)
+        head = f"{head},road under the distributed load [m]"
+        every = self.moving.factors.to_dataframe(["direction", "position"]).reset_index()
+        rows = every[np.isfinite(every["factor"])]
+        rows = rows.assign(loaded=rows["loaded"].map("{:.4g}".format))
+        look = {"index": False, "header": False, "float_format": "%.6g", "lineterminator": "\n"}
+        return f"{head}\n{rows.to_csv(**look)}".rstrip()
 
     def _summary(self) -> str:
         """Describe the result in one line."""
