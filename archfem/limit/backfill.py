@@ -427,15 +427,8 @@ class BlocksWithFill:
         assert self.fill is not None
         if (level := self.fill.backing) is None:
             return -np.inf
-        check_number(level, "fill, backing")
         heights = np.array([face.ends[:, 1] for face in faces])
-        lowest, highest = heights.min(), heights.max()
-        if not lowest < level < highest:
-            raise InvalidInput(
-                f"fill, backing {level:.4g} m holds {'all' if level > lowest else 'none'} of the "
-                f"stones, whose faces below the fill are {lowest:.4g} to {highest:.4g} m high: "
-                "give a level between, or leave it out"
-            )
+        _check_backing(level, heights, "faces below the fill")
         return float(level)
 
     def _cut_faces(self, faces: Sequence[Face], level: float) -> list[Array]:
@@ -580,20 +573,27 @@ def hold_backed(structure: Structure, level: float | None) -> Structure:
     """Return a structure whose stones of rings and piers below a level do not move."""
     if level is None:
         return structure
-    check_number(level, "fill, backing")
     stones = [n for n in structure.free if structure.blocks[n].role != "other"]
     heights = structure.centroids[stones, 1]
+    _check_backing(level, heights, "centroids")
     held = {number for number, y in zip(stones, heights, strict=True) if y < level}
-    if not held or len(held) == len(stones):
-        raise InvalidInput(
-            f"fill, backing {level:.4g} m holds {'all' if held else 'none'} of the stones, whose "
-            f"centroids are {heights.min():.4g} to {heights.max():.4g} m high: give a level between"
-        )
     blocks = [
         replace(block, fixed=block.fixed or number in held)
         for number, block in enumerate(structure.blocks)
     ]
     return replace(structure, blocks=tuple(blocks))
+
+
+def _check_backing(level: float, heights: Array, places: str) -> None:
+    """Refuse a level of backing that holds none or all of the places of stones at some heights."""
+    check_number(level, "fill, backing")
+    lowest, highest = heights.min(), heights.max()
+    if not lowest < level < highest:
+        raise InvalidInput(
+            f"fill, backing {level:.4g} m holds {'all' if level > lowest else 'none'} of the "
+            f"stones, whose {places} are {lowest:.4g} to {highest:.4g} m high: "
+            "give a level between, or leave it out"
+        )
 
 
 def refuse_missing_fill(soil: Collection[Any]) -> None:

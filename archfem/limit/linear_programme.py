@@ -17,7 +17,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from copy import copy
 from dataclasses import dataclass, field, replace
-from functools import cache, cached_property
+from functools import cached_property
 
 import highspy
 import numpy as np
@@ -269,12 +269,6 @@ class Limits:
         return Limits(rows, np.concatenate([self.bounds, other.bounds]))
 
 
-@cache
-def no_limits(joint_count: int) -> Limits:
-    """Return an empty set of limits on the joint forces."""
-    return Limits(sparse.csr_matrix((0, 3 * joint_count)), np.zeros(0))
-
-
 def uneven_compression(joint_count: int) -> Array:
     """Return a cost of compressions whose least state is unique, so that crushing cuts converge."""
     # weights from 1 to 2 without regularity
@@ -369,7 +363,11 @@ class Programme:
         thrust = state.forces.reshape(3, -1)[:2].sum(axis=0)
         crushes = np.flatnonzero(np.isfinite(self.crushing))
         cuts = crushing_cuts(crushes, thrust[crushes], self.crushing)
-        return replace(self, limits=(self.limits or no_limits(len(thrust))).joined(cuts))
+        return self.limited(cuts)
+
+    def limited(self, further: Limits) -> "Programme":
+        """Return the programme with further limits on the joint forces."""
+        return replace(self, limits=self.limits.joined(further) if self.limits else further)
 
     def objective(self, state: Optimum) -> float:
         """Return the objective a·x + b·z at a state of another programme of the same unknowns."""
@@ -389,7 +387,8 @@ class Programme:
         Without forces, until the objective and its mechanism, from below, no longer change, or the
         objective is above `enough`.
         """
-        limits = self.limits or no_limits(len(self.friction))
+        empty = sparse.csr_matrix((0, 3 * len(self.friction)))
+        limits = self.limits or Limits(empty, np.zeros(0))
         if self.crushing is not None:  # this tangent bounds every thrust by the crushing force
             crushes = np.flatnonzero(np.isfinite(self.crushing))
             limits = limits.joined(crushing_cuts(crushes, self.crushing[crushes], self.crushing))

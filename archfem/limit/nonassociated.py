@@ -35,7 +35,7 @@ from archfem._display import ProgressReport
 from archfem._recent import RecentResults
 from archfem._typing import Array
 from archfem.errors import DidNotConverge, Interrupted
-from archfem.limit.linear_programme import Limits, Optimum, Programme, no_limits, uneven_compression
+from archfem.limit.linear_programme import Limits, Optimum, Programme, uneven_compression
 
 # States from which the search starts besides the associated one; fewer for many joints
 MAX_START_COUNT = 40
@@ -196,8 +196,7 @@ def _require_weaker(programme: Programme, value: float) -> Programme:
         upper_bounds = np.concatenate([[max(-least, 0.0)], programme.upper_bounds[1:]])
         return replace(programme, upper_bounds=upper_bounds)
     row = Limits(sparse.csr_matrix(-programme.force_cost[None, :]), np.array([-least]))
-    limits = programme.limits or no_limits(len(programme.friction))
-    return replace(programme, limits=limits.joined(row))
+    return programme.limited(row)
 
 
 def friction_coefficients(programme: Programme) -> Array:
