@@ -39,7 +39,7 @@ LATE_BOUND_METHODS: Mapping[str, str] = {
     "CaseResult.player": "cases.report.report:player_of_case",
     "CaseResult.report": "cases.report.report:write_report_of_case",
     "Collapse.plot": "view.collapse:draw_collapse_result",
-    "CollapseRisk.plot": "view.studies:draw_collapse_risk",
+    "CollapseRisk.plot": "studies.collapse_risk:draw_risk_result",
     "CollapseScale.verdict_range": "studies.variations:verdict_range_of_bracket",
     "Ensemble.plot": "studies.ensemble:draw_ensemble_result",
     "Equilibrium.plot": "view.statics:draw_dead_load",

@@ -740,3 +740,10 @@ class CollapseRisk(ResultDisplay):
             InvalidInput: there is no such file, or it is damaged or of another version.
         """
         return cls(read_dataset(path, FILE_KIND))
+
+
+def draw_risk_result(found: CollapseRisk) -> Any:
+    """Draw fragility, hazard, and the intensities of the falls."""
+    from archfem.view.studies import draw_collapse_risk  # matplotlib is slow to import
+
+    return draw_collapse_risk(found)
