@@ -59,6 +59,7 @@ class LinearSolution:
 
     x: Array  # unknowns (n,)
     equation_multipliers: Array  # derivatives of the objective by the right sides
+    limit_multipliers: Array
     cost: Array  # (n,)
     basis: HighsBasis
 
@@ -107,7 +108,7 @@ def solve_linear(
         if status == HighsModelStatus.kOptimal:
             found = highs.getSolution()
             x, duals = np.array(found.col_value), np.array(found.row_dual)
-            return LinearSolution(x, duals[:count], cost, highs.getBasis())
+            return LinearSolution(x, duals[:count], duals[count:], cost, highs.getBasis())
         if status == HighsModelStatus.kTimeLimit:
             break
     words = highs.modelStatusToString(status)

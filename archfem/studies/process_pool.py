@@ -7,7 +7,6 @@ replaced.
 """
 
 import atexit
-import multiprocessing
 import os
 import pickle
 import re
@@ -19,7 +18,14 @@ from collections.abc import Collection, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from functools import cache
 from itertools import islice
-from multiprocessing import forkserver
+from multiprocessing import (
+    Pipe,
+    current_process,
+    forkserver,
+    get_all_start_methods,
+    get_context,
+    parent_process,
+)
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from pathlib import Path
@@ -47,7 +53,7 @@ Row = dict[str, Any]
 MAX_DEATHS_PER_POINT = 3
 
 # Windows starts each worker anew
-START_METHOD = "forkserver" if "forkserver" in multiprocessing.get_all_start_methods() else "spawn"
+START_METHOD = "forkserver" if "forkserver" in get_all_start_methods() else "spawn"
 
 _evaluation_lock = threading.Lock()
 
@@ -194,9 +200,9 @@ class Worker:
     """A process that evaluates points, and the pipe to it."""
 
     def __init__(self, log: str, shared: Path | None) -> None:
-        self.pipe, remote = multiprocessing.Pipe()
+        self.pipe, remote = Pipe()
         arguments = remote, log, shared
-        context: Any = multiprocessing.get_context(START_METHOD)
+        context: Any = get_context(START_METHOD)
         self._process = context.Process(target=_serve, args=arguments)
         with remote:  # the end of the worker then closes the pipe
             _start(self._process)
@@ -336,7 +342,7 @@ def _make_socket_folder() -> None:
     """Give multiprocessing a folder for the fork server's socket that no kill leaves for good."""
     stack = ExitStack()
     folder = stack.enter_context(temporary_folder())
-    multiprocessing.current_process()._config["tempdir"] = str(folder)  # type: ignore[attr-defined]
+    current_process()._config["tempdir"] = str(folder)  # type: ignore[attr-defined]
     atexit.register(stack.close)
 
 
@@ -391,7 +397,7 @@ def _serve(pipe: Connection, log: str, shared: Path | None) -> None:
 
 def _end_with_driver() -> None:
     """End this worker when its driver has ended, in the midst of a point if need be."""
-    driver = multiprocessing.parent_process()
+    driver = parent_process()
     assert driver is not None
     driver.join()
     os._exit(1)

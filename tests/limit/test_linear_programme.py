@@ -132,6 +132,7 @@ def test_a_programme_starts_from_the_last_and_ends_at_its_own_optimum(change, ru
     expected = linprog(cost, rows, right, *equations)
     assert known.x == pytest.approx(expected.x, abs=1e-7)
     assert known.equation_multipliers == pytest.approx(expected.eqlin.marginals, abs=1e-7)
+    assert known.limit_multipliers == pytest.approx(expected.ineqlin.marginals, abs=1e-7)
     assert abs(known.x - found[0].x).max() > 1e-3
     assert runs[1].iterations < 0.5 * runs[0].iterations
 
