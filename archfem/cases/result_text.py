@@ -422,7 +422,7 @@ def _compare_senses(found: Collapse, opposite: Collapse) -> str:
         return "which sense bears less is not known"
     if found.over_fill and opposite.over_fill:
         least, other = found.over_fill.values, opposite.over_fill.values
-        rank = "higher" if all(other[key] > least[key] for key in least) else rank
+        rank = "higher" if all(other.get(key, 0.0) > least[key] for key in least) else rank
     if np.allclose(opposite.range, found.range, rtol=1e-4):
         rank = "the same"
     searched = any(each.solutions and each.solutions.may_be_less for each in (found, opposite))

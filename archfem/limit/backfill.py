@@ -8,7 +8,7 @@ in a fan down to the stones that it meets first (Flamant).
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import pairwise
 from math import radians, tan
 from typing import Any, NamedTuple
@@ -73,6 +73,7 @@ def _centroid_share(heights: Array) -> Array:
     return np.asarray(share)
 
 
+@lru_cache(maxsize=8)
 def slice_blocks(structure: Structure) -> BlockSlices:
     """Cut the blocks of a structure along the verticals through all their corners."""
     outlines = [block.drawn() for block in structure.blocks]

@@ -174,10 +174,8 @@ class PlacedBlocks:
     @cached_property
     def ties(self) -> list[Tie]:
         """Ties; those between two blocks pull along their present chord."""
-        found = []
-        for block, place, load in self.attached:
-            if not (load.passive and any(load.force)):
-                continue
+        found, pulled = [], [x for x in self.loads if x.passive and any(x.force)]
+        for block, place, load in self.attach(pulled):
             force, anchor, rest = np.array(load.force), None, np.array(load.point)
             stretch = (rest - place) @ force / np.hypot(*force)
             if load.anchor is not None:

@@ -2,14 +2,16 @@
 
 Horizontal forces on a fill act at the feet of its columns or at their centroids. From the feet,
 shear carries their moment to ends that hold; at the centroids the stones below carry all of it. Its
-passive pressure needs movement to develop, and backing behind haunches is seldom opened. All are
-assumed, so a result must hold for all of their values.
+passive pressure needs movement to develop. Its active pressure is that of smooth faces and of
+settled fill, which holds haunches and may push other stones over. Backing is seldom opened. All are
+assumed, so a result must hold for all of their values. In a part of the active pressure between
+none and all, a factor is concave: the least is at an end.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain, combinations, product
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from archfem.limit.fill_strength import Fill, change_fill, has_backing
 
@@ -24,15 +26,20 @@ WEAKER_FILLS: Mapping[str, Sequence[str]] = {
     "full_pressure": ("by_pressure", "factor", "without_backing"),
 }
 
-BACKED, _NONE = "the backing", "no backing"
+# Changes of a fill: its active pressure alone, none, no backing
+_ACTIVE: Mapping[str, Any] = {"mobilisation": 0.0, "active": 1.0}
+_NO_PRESSURE: Mapping[str, Any] = {"mobilisation": 0.0, "active": 0.0}
+_BARE: Mapping[str, Any] = {"backing": None, "backing_height": None}
+
+BACKED = "the backing"
 _FALLS = "; it does not stand"
 
 
 class FillAssumption(NamedTuple):
-    """Words of one assumption on a fill: on its inertia, passive pressure and backing."""
+    """Words of one assumption on a fill: on its inertia, pressure and backing."""
 
     inertia: str
-    pressure: str  # empty where no pressure counts
+    pressure: str  # empty without a strength
     backing: str = ""  # empty where none is given
 
     def __str__(self) -> str:
@@ -45,34 +52,35 @@ def vary_fill(fill: Fill | None) -> dict[FillAssumption, tuple[float, Fill | Non
 
     Without a strength, where the fill is weight and mass alone, its inertia varies.
     """
-    own = (0.0, 0.0) if fill is None else (fill.lever, fill.mobilisation)
-    pairs = [own, *product((1.0, 0.0), (own[1], 0.0))]
+    own, states, backed = 0.0, list[Fill | None]([fill]), has_backing(fill)
+    if fill is not None:
+        changes = product(({}, _BARE)[: 1 + backed], ({}, _ACTIVE, _NO_PRESSURE))
+        own, states = fill.lever, [change_fill(fill, **x, **y) for x, y in changes]
     assumed = dict[FillAssumption, tuple[float, Fill | None]]()
-    for (backing, held), (lever, mobilisation) in product(_vary_backing(fill).items(), pairs):
-        between = f"lever of {lever:g}"
-        place = {0.0: "columns' feet", 1.0: "columns' centroids"}.get(lever, between)
-        pressure = f"{say_part(mobilisation)} of its passive pressure"
-        words = f"the fill's inertia at its {place}", "" if fill is None else pressure, backing
-        changed = held and change_fill(held, lever=lever, mobilisation=mobilisation)
-        assumed.setdefault(FillAssumption(*words), (lever, changed))
+    for state, lever in [(fill, own), *product(states, (1.0, 0.0))]:
+        place = {0.0: "columns' feet", 1.0: "columns' centroids"}.get(lever, f"lever of {lever:g}")
+        backing = (BACKED if has_backing(state) else "no backing") * backed
+        key = FillAssumption(f"the fill's inertia at its {place}", _say_pressure(state), backing)
+        assumed.setdefault(key, (lever, state and change_fill(state, lever=lever)))
     return assumed
 
 
-def _vary_backing(fill: Fill | None) -> dict[str, Fill | None]:
-    """Return a fill as it is and, where backing is given, without it, by words."""
-    if fill is None or not has_backing(fill):
-        return {"": fill}
-    return {BACKED: fill, _NONE: change_fill(fill, backing=None, backing_height=None)}
+def _say_pressure(fill: Fill | None) -> str:
+    """Return the largest pressure of a fill, in words; empty without a strength."""
+    if fill is None:
+        return ""
+    if fill.mobilisation:
+        return f"{say_part(fill.mobilisation)} of its passive pressure"
+    part = f"{say_part(fill.active)} of " * (fill.active < 1.0)
+    return f"{part}its active pressure" if fill.active else "no pressure"
 
 
 def vary_pressure(fill: Fill) -> dict[str, Fill]:
     """Return a fill with none and with all of its passive pressure, and without its backing."""
-    none = {"mobilisation": 0.0, "active": 0.0}
-    fills = {"without_pressure": change_fill(fill, **none)}
-    fills["full_pressure"] = change_fill(fill, mobilisation=1.0)
-    if bare := _vary_backing(fill).get(_NONE):
-        fills |= {"without_backing": bare, "without_either": change_fill(bare, **none)}
-    return fills
+    changes = {"without_pressure": _NO_PRESSURE, "full_pressure": {"mobilisation": 1.0}}
+    if has_backing(fill):
+        changes |= {"without_backing": _BARE, "without_either": {**_BARE, **_NO_PRESSURE}}
+    return {name: change_fill(fill, **values) for name, values in changes.items()}
 
 
 def say_part(mobilisation: float) -> str:
@@ -154,8 +162,7 @@ class FillRange:
             f"{own.format_ends(unit, digits)}{name} ({state}{_FALLS * (own.ends[0] == 0.0)})"
             for state, own in sorted(states.items(), key=lambda each: each[1].ends)
         ]
-        each = "each with its active pressure, by the place of its inertia, feet or centroids"
-        return f"{begin}, {each}: {'; '.join(texts)}"
+        return f"{begin}, by the place of its inertia, feet or centroids: {'; '.join(texts)}"
 
     @property
     def outcome(self) -> str:

@@ -120,6 +120,8 @@ class LinkageState:
     @cached_property
     def shortening_rates(self) -> Array:
         """Rates at which the held ties become shorter (n_held, 3 n_bodies)."""
+        if not len(self.linkage.held):
+            return np.zeros((0, 3 * self.bodies.count))
         forces = self.bodies.tie_forces[self.linkage.held].toarray()
         return np.asarray(forces / self.held_sizes[:, None])
 

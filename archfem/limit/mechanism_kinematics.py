@@ -60,6 +60,7 @@ class RigidRegions:
         return whole
 
 
+@lru_cache(maxsize=8)
 def find_rigid_regions(structure: Structure) -> RigidRegions:
     """Remove the yielding bodies, and the blocks that do not stand on fixed ground without them."""
     everything = set(range(len(structure.blocks)))

@@ -2,12 +2,14 @@
 
 import json
 from dataclasses import dataclass, replace
-from itertools import product
+from itertools import pairwise, product
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from backfilled import SOIL, rectangle
+from scipy.optimize import linprog
+from shapely import LineString, Polygon, box
 
 import archfem as af
 from archfem.cases.analysis_keys import LimitAnalysis
@@ -26,35 +28,34 @@ FEET, CENTROIDS = (
     "the fill's inertia at its columns' feet",
     "the fill's inertia at its columns' centroids",
 )
-THIRD, NONE = "a third of its passive pressure", "none of its passive pressure"
+THIRD, ACTIVE, NONE = "a third of its passive pressure", "its active pressure", "no pressure"
 
 
-def buried_stone():
+def buried_stone(breadth=BREADTH):
     """A stone on rock below a fill, and beside it, to its right."""
     parts = [
         rectangle(-2.0, -1.0, 9.0, 0.0, "rock", fixed=True),
-        rectangle(0.0, 0.0, BREADTH, HEIGHT, "stone", part="wall", role="pier"),
-        rectangle(0.0, HEIGHT, BREADTH, HEIGHT + DEPTH, "above", SOIL),
-        rectangle(BREADTH, 0.0, 9.0, HEIGHT + DEPTH, "beside", SOIL),
+        rectangle(0.0, 0.0, breadth, HEIGHT, "stone", part="wall", role="pier"),
+        rectangle(0.0, HEIGHT, breadth, HEIGHT + DEPTH, "above", SOIL),
+        rectangle(breadth, 0.0, 9.0, HEIGHT + DEPTH, "beside", SOIL),
     ]
     return af.masonry.assembled(parts, af.masonry.SOIL_TO_STONE)
 
 
-def turning_factors(passive, mobilisation=1.0 / 3.0):
+def turning_factors(passive, mobilisation=1.0 / 3.0, breadth=BREADTH):
     """Factors at which the stone turns into the fill, about its toe, by assumption; and e*."""
-    weights = np.array([HEIGHT * af.STONE.unit_weight, DEPTH * SOIL.unit_weight]) * BREADTH
+    weights = np.array([HEIGHT * af.STONE.unit_weight, DEPTH * SOIL.unit_weight]) * breadth
     top = HEIGHT + DEPTH
     # of the pressure m K_p γ (top - y) on 0 < y < HEIGHT
     moment = passive * SOIL.unit_weight * (top * HEIGHT**2 / 2.0 - HEIGHT**3 / 3.0)
     active = SOIL.unit_weight / passive * (top * HEIGHT**2 / 2.0 - HEIGHT**3 / 3.0)
     expected = {}
-    for lever, part in product((0.0, 1.0), (mobilisation, 0.0)):
+    pressures = {THIRD: max(mobilisation * moment, active), ACTIVE: active, NONE: 0.0}
+    for lever, (pressure, held) in product((0.0, 1.0), pressures.items()):
         heights = np.array([HEIGHT / 2.0, HEIGHT + lever * DEPTH / 2.0])
-        held = max(part * moment, active)
-        factor = (weights.sum() * BREADTH / 2.0 + held) / (weights @ heights)
+        factor = (weights.sum() * breadth / 2.0 + held) / (weights @ heights)
         share = (weights @ heights) ** 2 / (weights.sum() * (weights @ heights**2))
-        words = CENTROIDS if lever else FEET, THIRD if part else NONE
-        expected[FillAssumption(*words)] = factor, share
+        expected[FillAssumption(CENTROIDS if lever else FEET, pressure)] = factor, share
     return expected
 
 
@@ -72,9 +73,9 @@ def test_an_assumption_without_a_state_is_left_out_of_the_range(monkeypatch, cap
     fill = af.limit.Fill(friction_angle=30.0)
     live = af.BodyForce(1.0)
     found = af.collapse_factor(buried_stone(), live=live, friction="nonassociated", fill=fill)
-    assert len(calls) == 4
+    assert len(calls) == 6
     assert [*found.over_fill.values.values()] == [found.factor]
-    assert caplog.text.count("the range over the fill leaves out the fill's inertia at") == 3
+    assert caplog.text.count("the range over the fill leaves out the fill's inertia at") == 5
     assert "with which no state without dilatancy was found" in caplog.text
 
 
@@ -101,10 +102,9 @@ def test_a_stone_turns_into_a_fill_at_a_factor_by_each_assumption(verified):
     # whatever is given, both ends are found
     raised = replace(fill, lever=1.0, mobilisation=0.0)
     raised = af.collapse_factor(buried_stone(), live=live, friction=None, fill=raised)
-    assert raised.factor == pytest.approx(low)
-    assert sorted(raised.over_fill.values.values()) == pytest.approx(
-        [low, expected[FillAssumption(FEET, NONE)]]
-    )
+    assert raised.factor == pytest.approx(expected[FillAssumption(CENTROIDS, ACTIVE)])
+    less = {key: factor for key, factor in expected.items() if key.pressure != THIRD}
+    assert raised.over_fill.values == pytest.approx(less)
     # what is drawn is the lower end
     settings = LimitAnalysis((live,), None, fill=fill)
     least = settings.solve(buried_stone()).least
@@ -115,27 +115,157 @@ def test_a_stone_turns_into_a_fill_at_a_factor_by_each_assumption(verified):
     assert down.over_fill is None
 
 
+@pytest.mark.slow
+def test_active_pressure_stays_in_the_range_where_it_pushes_a_stone_over(verified):
+    """To the left, away from the fill, the stone turns sooner than without any pressure."""
+    fill = af.limit.Fill(friction_angle=30.0)
+    found = af.collapse_factor(buried_stone(), live=af.BodyForce(-1.0), friction=None, fill=fill)
+    weights = np.array([HEIGHT * af.STONE.unit_weight, DEPTH * SOIL.unit_weight]) * BREADTH
+    top = HEIGHT + DEPTH
+    active = SOIL.unit_weight / 3.0 * (top * HEIGHT**2 / 2.0 - HEIGHT**3 / 3.0)
+    expected = {}
+    pressures = {THIRD: active, ACTIVE: active, NONE: 0.0}
+    for (place, lever), pressure in product(((FEET, 0.0), (CENTROIDS, 1.0)), pressures):
+        arms = np.array([HEIGHT / 2.0, HEIGHT + lever * DEPTH / 2.0])
+        held = weights.sum() * BREADTH / 2.0 - pressures[pressure]
+        expected[FillAssumption(place, pressure)] = held / (weights @ arms)
+    assert found.over_fill.values == pytest.approx(expected, rel=1e-9)
+    least = expected[FillAssumption(CENTROIDS, ACTIVE)]
+    verified("stone pushed away from a fill: least factor", least, "moments", found.range[0])
+    # whoever neglects the active pressure has both as well
+    less = af.limit.Fill(friction_angle=30.0, active=0.0)
+    less = af.collapse_factor(buried_stone(), live=af.BodyForce(-1.0), friction=None, fill=less)
+    assert less.range == pytest.approx((least, max(expected.values())), rel=1e-9)
+
+
+def unequal_bridge():
+    """Two unequal arches on a pier, with fill between walls that differ."""
+    arches = [
+        af.shapes.Arch(span=4.0, rise=1.2, thickness=0.3, voussoirs=9, name="left arch"),
+        af.shapes.Arch(span=2.5, rise=1.0, thickness=0.3, voussoirs=7, name="right arch"),
+    ]
+    walls = [
+        af.shapes.Sidewall(length=1.0, height=1.0, state="fixed", name=f"{side} wall")
+        for side in ("left", "right")
+    ]
+    pier = af.shapes.Pier(breadth=1.0, height=1.0, course=0.5, name="pier")
+    fill = af.shapes.Backfill(cover=0.4)
+    return af.bridge(arches=arches, piers=[pier], sidewalls=walls, backfill=fill)
+
+
+def weigh_columns(structure):
+    """Stone, foot, centroid and weight of each column of fill, by the polygons of the blocks."""
+    shapes = [Polygon(block.drawn()) for block in structure.blocks]
+    is_fill = [block.role == "other" and not block.fixed for block in structure.blocks]
+    cuts = np.unique(np.concatenate([block.drawn()[:, 0] for block in structure.blocks]).round(9))
+    for left, right in pairwise(cuts):
+        strip = box(left, -99.0, right, 99.0)
+        parts = [shape.intersection(strip) for shape in shapes]
+        below = [k for k, part in enumerate(parts) if part.area > 1e-9 and not is_fill[k]]
+        stone = max(below, key=lambda k: parts[k].centroid.y)
+        for number in np.flatnonzero(is_fill):
+            column = parts[number]
+            if column.area > 1e-9:
+                x, y = column.centroid.coords[0]
+                foot = parts[stone].intersection(LineString([(x, -99.0), (x, 99.0)])).bounds[3]
+                unit = structure.blocks[number].material.unit_weight
+                yield stone, (x, foot), (x, y), unit * column.area * structure.width
+
+
+def push_stones(structure, lever):
+    """Largest push in equilibrium of stones that bear the weight of a fill alone, by linprog."""
+    free = [k for k in structure.free if structure.blocks[k].role != "other"]
+    row, columns = {k: 3 * n for n, k in enumerate(free)}, []
+    dead, live = np.zeros(3 * len(free)), np.zeros(3 * len(free))
+
+    def spread(force, point, block):
+        """Force on a block about its centroid."""
+        column = np.zeros(3 * len(free))
+        if block in row:
+            arm = np.array(point) - structure.centroids[block]
+            moment = arm[0] * force[1] - arm[1] * force[0]
+            column[row[block] : row[block] + 3] = *force, moment
+        return column
+
+    for k in free:
+        block = structure.blocks[k]
+        weight, place = block.area * block.material.unit_weight, structure.centroids[k]
+        dead += spread((0.0, -weight * structure.width), place, k)
+        live += spread((weight * structure.width, 0.0), place, k)
+    for stone, foot, centroid, weight in weigh_columns(structure):
+        dead += spread((0.0, -weight), foot, stone)
+        live += spread((weight, 0.0), centroid if lever else foot, stone)
+    bounds = []
+    for joint in structure.joints:
+        if any(structure.blocks[k].role == "other" and k in structure.free for k in joint.blocks):
+            continue
+        ends = np.array(joint.ends)
+        along = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
+        normal = np.array([along[1], -along[0]])
+        away = structure.centroids[joint.blocks[1]] - structure.centroids[joint.blocks[0]]
+        normal *= np.sign(normal @ away)
+        # compression at both ends, and shear without a limit, on one block and its neighbour
+        for force, point, bound in (
+            (normal, ends[0], (0.0, None)),
+            (normal, ends[1], (0.0, None)),
+            (along, ends[0], (None, None)),
+        ):
+            on_one, on_other = (
+                spread(s * force, point, k) for s, k in zip((-1, 1), joint.blocks, strict=True)
+            )
+            columns.append(on_one + on_other)
+            bounds.append(bound)
+    scale = np.abs(dead).max()
+    balance = np.column_stack([*columns, live / scale])
+    cost = np.append(np.zeros(len(columns)), -1.0)
+    found = linprog(cost, A_eq=balance, b_eq=-dead / scale, bounds=[*bounds, (0.0, None)])
+    return -found.fun
+
+
+@pytest.mark.slow
+def test_a_bridge_without_pressure_is_pushed_as_by_a_programme_of_its_own(verified):
+    """The fill is weight alone: the equations of its stones are set up here from the drawing."""
+    structure, fill = unequal_bridge(), af.limit.Fill(friction_angle=35.0)
+    for way in (1.0, -1.0):
+        options = {"live": af.BodyForce(way), "friction": None}
+        found = af.collapse_factor(structure, fill=fill, **options)
+        values = found.over_fill.values
+        assert len(values) == 6
+        bare = replace(fill, mobilisation=0.0, active=0.0)
+        assert af.collapse_factor(structure, fill=bare, **options).factor == pytest.approx(
+            values[FillAssumption(FEET, NONE)], rel=1e-9
+        )
+        assert found.range[0] == values[FillAssumption(CENTROIDS, NONE)]
+        if way > 0.0:
+            for lever, place in enumerate((FEET, CENTROIDS)):
+                least = push_stones(structure, lever)
+                # round-off of both programmes, and of the polygons
+                assert values[FillAssumption(place, NONE)] == pytest.approx(least, rel=1e-6)
+            verified("bridge of unequal arches: least push", least, "own programme", found.range[0])
+
+
 @pytest.mark.parametrize(
     ("angle", "doubtful"), [pytest.param(35.0, False, marks=pytest.mark.slow), (25.0, True)]
 )
 def test_what_happens_at_the_upper_end_of_a_range_alone_is_a_note(angle, doubtful, caplog):
     """Fill of 35° slides at tan φ = 0.7, between the ends, and one of 25° below both."""
     fill, live = af.limit.Fill(friction_angle=angle), af.BodyForce(1.0)
-    factors = [x for x, _ in turning_factors(np.tan(np.radians(45.0 + angle / 2.0)) ** 2).values()]
-    slope = np.tan(np.radians(angle))
+    breadth, passive = 1.7, np.tan(np.radians(45.0 + angle / 2.0)) ** 2
+    factors = [x for x, _ in turning_factors(passive, breadth=breadth).values()]
+    structure, slope = buried_stone(breadth), np.tan(np.radians(angle))
     assert (min(factors) > slope) == doubtful
-    found = af.collapse_factor(buried_stone(), live=live, friction=None, fill=fill)
+    found = af.collapse_factor(structure, live=live, friction=None, fill=fill)
     slides = "at a factor of {:.4g} the fill itself slides, at"
     upper = slides.format(max(factors))
     assert [note.startswith(upper) for note in found.notes] == [True]
     noted, limit = f"with the fill as given, {upper}", LimitAnalysis((), None)
-    assert f"\nnote: {noted}" in describe_collapse(buried_stone(), found, limit)
-    case = SimpleNamespace(structure=buried_stone(), limit=limit, parapets=0.0, motion=None)
+    assert f"\nnote: {noted}" in describe_collapse(structure, found, limit)
+    case = SimpleNamespace(structure=structure, limit=limit, parapets=0.0, motion=None)
     stated = json.loads(limit_files(case, found, "", None, [])["limit.json"])
     _, own = stated["notes"]  # and what is not checked across the plane
     assert own.startswith(noted)
     assert found.least.notes == found.notes
-    checked = af.kinematic_assessment(buried_stone(), SITE, friction=None, fill=fill)
+    checked = af.kinematic_assessment(structure, SITE, friction=None, fill=fill)
     assert checked.alpha_0 == pytest.approx(max(factors))
     assert (checked.least.alpha_0 > slope) == doubtful
     # doubts are of the least factor, and of the least margin
@@ -159,10 +289,11 @@ def test_a_stone_turns_into_a_fill_with_and_without_its_backing(verified):
     # moment of γ (top - y) above the backing
     levels, top = np.array([level, HEIGHT]), HEIGHT + DEPTH
     above = SOIL.unit_weight * np.diff(top * levels**2 / 2.0 - levels**3 / 3.0)[0]
-    for place, pressure in product((FEET, CENTROIDS), (THIRD, NONE)):
+    pressures = {THIRD: passive / 3.0, ACTIVE: 1.0 / passive, NONE: 0.0}
+    for place, pressure in product((FEET, CENTROIDS), pressures):
         heights = np.array([HEIGHT / 2.0, HEIGHT + DEPTH / 2.0 * (place == CENTROIDS)])
         held = weights.sum() * BREADTH / 2.0 + strength * level**2 / 2.0
-        held += above * (passive / 3.0 if pressure == THIRD else 1.0 / passive)
+        held += above * pressures[pressure]
         key = FillAssumption(place, pressure, "the backing")
         expected[key] = held / (weights @ heights)
     assert found.over_fill.values == pytest.approx(expected, rel=1e-9)
@@ -185,7 +316,7 @@ def test_a_stone_turns_into_a_fill_with_and_without_its_backing(verified):
     assert "least_push_on_backing" not in evaluate_limit(case)
     # a reader takes the state that is known, at the worse place of the inertia
     line = describe_collapse(buried_stone(), found, settings).splitlines()[2]
-    for state in product((THIRD, NONE), ("the backing", "no backing")):
+    for state in product(pressures, ("the backing", "no backing")):
         low, high = (expected[FillAssumption(place, *state)] for place in (CENTROIDS, FEET))
         assert f" {low:.4g} to {high:.4g} g ({', '.join(state)})" in line
 
@@ -231,7 +362,11 @@ def test_an_assessment_passes_only_with_what_it_needs():
             assert found.least.alpha_0 == pytest.approx(alone.alpha_0)
             assert found.least.displacement.capacity == pytest.approx(alone.displacement.capacity)
             assert f"all else is under one assumption: {assumption}" in str(found.least)
-    between = np.mean(sorted(ratios.values())[1:3])
+    by_pressure = {
+        words: [ratio for key, ratio in ratios.items() if key.pressure == words]
+        for words in (THIRD, ACTIVE, NONE)
+    }
+    between = np.mean([max(by_pressure[ACTIVE]), min(by_pressure[THIRD])])
     weaker = af.Eurocode8(ag=0.25 * between, ground="C")
     partly = af.kinematic_assessment(structure, weaker, fill=fill, **options).linear
     assert partly.outcome == f"passes only with {THIRD}"
@@ -305,7 +440,9 @@ def test_what_does_not_stand_without_pressure_says_so():
     found = af.collapse_factor(structure, live=af.BodyForce(1.0), friction=None, fill=fill)
     assert found.factor > 0.0
     assert found.range == (0.0, found.factor)
-    assert found.describe_range().startswith(f"at 0 g ({CENTROIDS}, {NONE}; it does not stand) to")
+    assert found.describe_range().startswith(
+        f"at 0 g ({CENTROIDS}, {ACTIVE}; it does not stand) to"
+    )
     assert found.describe_range().endswith(f"({FEET}, all of its passive pressure)")
     # the mechanism of the least is the fall at rest: the upper stone about the edge of the lower
     (hinge,) = found.least.hinges
@@ -313,7 +450,7 @@ def test_what_does_not_stand_without_pressure_says_so():
     assert {structure.blocks[k].name for k in joint.blocks} == {"stone", "leaning"}
     assert getattr(joint, hinge[1])[0] == pytest.approx(1.0)
     most = f"else at up to {found.factor:.4g} g, pushed to the right"
-    state = f"it does not stand under its own weight (fill: {NONE})"
+    state = f"it does not stand under its own weight (fill: {ACTIVE})"
     assert found.least.sentence == f"{state}: {found.least.mechanism_name}; {most}"
     assert describe_collapse(
         structure, found.least, LimitAnalysis((af.BodyForce(1.0),), None, fill=fill)
