@@ -38,6 +38,15 @@ class PushFactors(NamedTuple):
     proved: float | None = None  # bound from below, where a search may have missed the least
     bounded: bool = False  # whether they are upper estimates, as `Collapse.bounded`
 
+    @property
+    def outcome(self) -> str:
+        """Whether the site's acceleration is withstood as a push, in words."""
+        if self.least < 1.0:
+            only = "is withstood only by what is assumed of the fill"
+            return only if self.most >= 1.0 else "is not withstood"
+        unproved = self.bounded if self.proved is None else self.proved < 1.0
+        return "is withstood by an upper estimate alone" if unproved else "is withstood"
+
     def __str__(self) -> str:
         """Return both factors in words, and the bound from below where the search has one."""
         text = f"{'≤ ' * self.bounded}{Ends((self.least, self.most)):.{3 if self.site else 4}g}"

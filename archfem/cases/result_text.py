@@ -402,7 +402,10 @@ def describe_limit(
         others.append(f"in the other sense: {opposite.sentence} ({rank})")
     others += filter(None, [defaults.describe_fill_defaults(case)])
     beside = f"{site} times {site.site}" if site else compare_with_motion(case, found)
-    others += [f"it begins to move at {beside}"] * bool(beside)
+    said = ""  # a sense without a state may bear less
+    if site and Outcome.BRACKETED not in (found.outcome, opposite and opposite.outcome):
+        said = f"a push by the ground {site.outcome}: "
+    others += [f"{said}it begins to move at {beside}"] * bool(beside)
     others += defaults.note_loads_left_out(case)
     text = describe_collapse(case.structure, found, case.limit, case.parapets)
     return found, "\n".join([text, *others]), site

@@ -4,8 +4,8 @@ Horizontal forces on a fill act at the feet of its columns or at their centroids
 shear carries their moment to ends that hold; at the centroids the stones below carry all of it. Its
 passive pressure needs movement to develop. Its active pressure is that of smooth faces and of
 settled fill, which holds haunches and may push other stones over. Backing is seldom opened. All are
-assumed, so a result must hold for all of their values. In a part of the active pressure between
-none and all, a factor is concave: the least is at an end.
+assumed, so a result must hold for all of their values. An associated factor is concave in the
+part of the active pressure: the least is at an end.
 """
 
 from collections.abc import Iterable, Mapping, Sequence

@@ -47,7 +47,8 @@ class Fill:
             whole of it needs more movement than a bridge may have [-].
         active: part a of the active pressure that always acts, from 0 to 1 [-]. Neglecting it
             is customary for arches, and wrong for walls that hold a fill back. Where some passive
-            pressure beyond it is counted on, the whole is on the safe side of any part.
+            pressure beyond it is counted on, the whole is on the safe side of any part. Results of
+            a push also state both ends, no pressure and the active one alone.
         dispersal: distribution of a load within the fan: "boussinesq", as through an elastic
             half-plane under a line load, or "uniform", evenly on each level.
         spread: half the angle of the fan, from the vertical [degrees]. The part that Boussinesq's

@@ -262,7 +262,13 @@ def test_limit_analysis_in_words(ring):
         for bounded in (False, True):
             words = describe_limit(case, replace(mirrored, bounded=bounded), None)[1]
             most = f"{'≤ ' * bounded}{ratio:.3g} times the site's {named}"
-            assert words.endswith(f"\nit begins to move at {most}")
+            outcome = f"is withstood{' by an upper estimate alone' * bounded}"
+            assert words.endswith(f"\na push by the ground {outcome}: it begins to move at {most}")
+    assert "a push by the ground" not in describe_limit(case, pushed, lost)[1]
+    strong = 1.1 * pushed.factor
+    case.target = af.motion.TableSpectrum([0.0, 1.0], [strong, strong])
+    outcome = "a push by the ground is not withstood: it begins to move at 0.909 times"
+    assert outcome in describe_limit(case, pushed, None)[1]
     case.target = None
     least = replace(pushed, solutions=SimpleNamespace(may_be_less=True))
     words = describe_limit(case, least, mirrored)[1]
@@ -311,7 +317,13 @@ def test_a_push_is_compared_with_the_site_by_the_lesser_sense_of_each_state(
     for first, other in (senses, senses[::-1]):
         found, words, site = describe_limit(case, first, other)
         assert (site.least, site.most) == pytest.approx((low / 0.23, high / 0.23))
-        assert words.endswith(f"\nit begins to move at {site} times the demand of 0.23 g")
+        decided = (
+            "is withstood only by what is assumed of the fill"
+            if high > 0.23
+            else "is not withstood"
+        )
+        move = f"it begins to move at {site} times the demand of 0.23 g"
+        assert words.endswith(f"\na push by the ground {decided}: {move}")
         assert found.push == (-1.0 if low == 0.0 else 1.0)
         files = limit_files(case, found, words, site, [])
         assert json.loads(files["limit.json"])["rows"][0][4]["most"] == site.most
