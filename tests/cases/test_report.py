@@ -980,7 +980,7 @@ pier = { breadth = "1.2 m", height = "2 m", course = "1 m" }
         (
             "limit",
             ["--set", "limit.horizontal=1.0"],
-            "Limit analysis: four-hinge mechanism (of the least), at 0.5143 to 0.8787 g",
+            "Limit analysis: four-hinge mechanism (of the least), at 0.507 to 0.8787 g",
         ),
     ],
 )
@@ -1177,7 +1177,7 @@ def test_an_assessment_takes_the_fill_of_the_limit_analysis(undrawn, tmp_path, c
     pressed = capsys.readouterr().out
     assert "of the passive pressure, friction angle 35°" in pressed
     margin = r"least margin with one weight a body (\S+) \(the fill's inertia at its columns' \w+,"
-    margin += r" none of its passive pressure\) to (\S+) \(the fill's"
+    margin += r" (?:no|its active) pressure\) to (\S+) \(the fill's"
     least, most = re.search(margin, pressed).groups()
     assert float(least) < float(most)
     assert af.commands.main(["report", str(folder)]) == 0
