@@ -26,9 +26,10 @@ from archfem.masonry.structure import Structure, join_names
 from archfem.motion.design_spectra import DesignSpectrum
 from archfem.motion.motion import Motion
 from archfem.statics import mechanism_assessment
+from archfem.statics.assessed_mechanism import KinematicAssessment
 from archfem.statics.assessment_checks import LimitState
 from archfem.statics.equilibrium import Equilibrium
-from archfem.statics.mechanism_assessment import KinematicAssessment, kinematic_assessment
+from archfem.statics.mechanism_assessment import kinematic_assessment
 from archfem.statics.pushover import Pushover, Stop, pushover
 from archfem.units import G, MPa, describe_if_in_g, kN
 

@@ -27,6 +27,7 @@ from archfem.masonry.structure import Structure
 from archfem.models.model import Doubt, read_doubts, write_doubts
 from archfem.motion.hazard import DESIGN_PERIOD, MEASURES
 from archfem.motion.motion import Motion
+from archfem.statics.assessed_mechanism import KinematicAssessment
 from archfem.statics.assessment_checks import (
     NOT_SHOWN,
     UPPER_BOUND,
@@ -35,7 +36,6 @@ from archfem.statics.assessment_checks import (
     doubt_assumed,
 )
 from archfem.statics.first_mechanism import describe_tied_length
-from archfem.statics.mechanism_assessment import KinematicAssessment
 from archfem.units import STANDARD_GRAVITY, Ends, format_ratio, kN
 
 # Results by the names of their files

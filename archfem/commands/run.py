@@ -36,8 +36,8 @@ from archfem.masonry.structure import join_words
 from archfem.models.model import Doubt, group_doubts, merge_doubts
 from archfem.motion.motion import Motion
 from archfem.motion.suite import Suite
+from archfem.statics.assessed_mechanism import KinematicAssessment
 from archfem.statics.first_mechanism import OF_TIES
-from archfem.statics.mechanism_assessment import KinematicAssessment
 from archfem.statics.modes import Modes
 from archfem.statics.pushover import Pushover
 from archfem.view.collapse import draw_ratings, draw_worst_places

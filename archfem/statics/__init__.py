@@ -1,5 +1,6 @@
 """Static analyses: dead load, pushover, modes, stress and free bodies.
 
+    assessed_mechanism    result of a kinematic assessment
     assessment_checks     rules of codes, capacity against demand
     continuation          load and displacement control
     equilibrium           equilibrium under dead load, plausibility checks

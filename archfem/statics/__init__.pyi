@@ -1,3 +1,4 @@
+from .assessed_mechanism import KinematicAssessment as KinematicAssessment
 from .assessment_checks import LIMIT_STATES as LIMIT_STATES
 from .assessment_checks import AssessmentCheck as AssessmentCheck
 from .assessment_checks import LimitState as LimitState
@@ -7,7 +8,6 @@ from .equilibrium import equilibrium_under as equilibrium_under
 from .equilibrium import self_weight as self_weight
 from .free_body import FreeBody as FreeBody
 from .free_body import forces_on as forces_on
-from .mechanism_assessment import KinematicAssessment as KinematicAssessment
 from .mechanism_assessment import assess_parts as assess_parts
 from .modes import Modes as Modes
 from .newton import Newton as Newton

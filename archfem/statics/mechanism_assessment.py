@@ -10,9 +10,10 @@ Spectral acceleration and displacement are those of a control point C along the 
     a* = α g / e*,   d* = d_C Σ P δ² / (δ_C Σ P δ).
 
 a*(d*) is the capacity curve; it begins at a₀* and vanishes at d₀*. C is the centroid that moves
-fastest along x at rest, of all blocks that are equally fast. The checks compare a₀*, raised by a
-behaviour factor, with the ground acceleration. They compare a share of d₀* with the displacement
-spectrum at a secant period.
+fastest along x at rest, of all blocks that are equally fast, or that of all weights that move, with
+d* = d_C / e*, whose displacement capacity is the lesser multiple of the demand. The checks compare
+a₀*, raised by a behaviour factor, with the ground acceleration. They compare a share of d₀* with
+the displacement spectrum at a secant period.
 
 References:
     Circolare 21 January 2019 n. 7 C.S.LL.PP. on the NTC 2018, C8.7.1.2.1.1 to C8.7.1.2.1.8.
@@ -27,32 +28,27 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from archfem._display import DOUBT_MARK, NOTE_MARK, ResultDisplay
-from archfem._files import align_columns
 from archfem._typing import Array, CrushingStrength, Numbers, Seconds
 from archfem._validation import check_between, check_choice, validate_arguments
 from archfem.errors import DidNotConverge, InvalidInput
 from archfem.limit.backfill import attach_fill
-from archfem.limit.collapse import ONE_OF_MANY, slides_anywhere
 from archfem.limit.displaced_blocks import TOUCHING, KinematicChain, PlacedBlocks, Tie
 from archfem.limit.fill_range import FillAssumption, vary_fill
 from archfem.limit.fill_strength import Fill, PlasticFill
 from archfem.limit.finite_mechanism import MechanismPath, PathEnd, PathFollower
-from archfem.limit.mechanism_names import name_mechanism
 from archfem.limit.self_weight import check_options
-from archfem.masonry.loads import AttachedLoad, BodyForce, name_side
+from archfem.masonry.loads import AttachedLoad, BodyForce
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import (
-    CLEAR_TURNS,
     HasStructure,
     Structure,
     join_names,
-    list_or_count,
     structure_of,
 )
 from archfem.models.model import Doubt
 from archfem.motion.design_spectra import DesignSpectrum
 from archfem.motion.motion import Motion
+from archfem.statics.assessed_mechanism import KinematicAssessment
 from archfem.statics.assessment_checks import (
     LIMIT_STATES,
     UPPER_BOUND,
@@ -60,7 +56,6 @@ from archfem.statics.assessment_checks import (
     LimitState,
     add_fill_ranges,
     check_assessable,
-    describe_difference,
     describe_floor,
     find_height_left_out,
     first_acceleration,
@@ -68,7 +63,6 @@ from archfem.statics.assessment_checks import (
     list_lower,
     place_spectrum,
     secant_period,
-    spectral_acceleration,
 )
 from archfem.statics.first_mechanism import (
     DoesNotStand,
@@ -85,199 +79,10 @@ from archfem.statics.first_mechanism import (
     select_joints,
     take_fill_as_loads,
 )
-from archfem.units import STANDARD_GRAVITY, Ends, MPa, format_ratio, kN
+from archfem.units import format_ratio
 
-
-@dataclass(frozen=True, eq=False, repr=False)
-class KinematicAssessment(ResultDisplay):
-    """Kinematic assessment of a mechanism.
-
-    Attributes:
-        structure: assessed structure, without a fill.
-        spectrum: design spectrum or ground motion of the demand.
-        direction: sense of the horizontal forces along x, 1 or -1.
-        alpha_0: factor α₀ of the horizontal forces that sets the mechanism in motion [-]; infinite
-            where none does.
-        M_star: participating mass M* [kg].
-        e_star: participating share e* of the mass that moves [-].
-        a_0_star: spectral acceleration a₀* that sets it in motion, without the confidence factor
-            [m/s²].
-        d_0_star: spectral displacement d₀* at which α vanishes [m]; infinite where the path ends
-            before, as that of a body that slides without turning.
-        T_s: secant period 2π √(d_s* / a*(d_s*)) at d_s* = 0.16 d₀* [s]: 0.4 of the 0.4 d₀* of
-            NTC-2008; undefined (NaN) where d₀* is infinite.
-        curve: capacity curve over place: `d` [m], `a` [m/s²], `alpha` [-], and `d_control`, the
-            horizontal displacement of the control point [m]; its attribute `holds` is the last
-            place from which on it is no upper bound.
-        linear: check of the acceleration with the behaviour factor.
-        displacement: check of the displacement; None where the mechanism cannot move.
-        limit_state: rules of the displacement check.
-        confidence_factor: FC, by which accelerations of the curve are divided in both checks [-].
-        strength: compressive strength at which joints crush [Pa]; infinite where they do not.
-        control: name of the block whose centroid is the control point, or of several.
-        path: finite motion of the mechanism; None where nothing moves.
-        notes: assumptions of the result, and omissions on the safe side.
-        doubts: why a ratio may be too high, or too low to pass, by how much is not known, each with
-            a remedy.
-        least: that under the assumption on a fill that has the least ratio; None without a fill.
-        of_bodies: the same with one weight for each body that moves as one, at its centroid, and
-            one for each load, which raises e* and lowers both ratios; None of an assessment with
-            such weights.
-        above: that of what is above a bed of a stack, if it has a lower ratio than the mechanism of
-            least α₀, as above a tie; it must pass too.
-    """
-
-    structure: Structure
-    spectrum: DesignSpectrum | Motion
-    direction: float
-    alpha_0: float
-    M_star: float
-    e_star: float
-    a_0_star: float
-    d_0_star: float
-    T_s: float
-    curve: xr.Dataset
-    linear: AssessmentCheck
-    displacement: AssessmentCheck | None
-    limit_state: LimitState
-    confidence_factor: float
-    strength: float
-    control: str
-    path: MechanismPath | None
-    notes: tuple[str, ...]
-    doubts: tuple[Doubt, ...]
-    of_bodies: "KinematicAssessment | None" = None
-    least: "KinematicAssessment | None" = None
-    above: "KinematicAssessment | None" = None
-
-    @property
-    def mechanism_name(self) -> str:
-        """The mechanism in words; "" where nothing moves."""
-        return name_mechanism(self.structure, self.path.velocity) if self.path else ""
-
-    @property
-    def hinges(self) -> tuple[tuple[int, str], ...]:
-        """Joints that turn at first, with the face where the blocks stay in contact."""
-        return tuple((c.joint, end) for c, end in self._contacts if c.joint not in self.sliding)
-
-    @cached_property
-    def sliding(self) -> tuple[int, ...]:
-        """Numbers of the joints that slide at first."""
-        return tuple(sorted({c.joint for c, _ in self._contacts if c.slip}))
-
-    @cached_property
-    def _contacts(self) -> list[tuple[Any, str]]:
-        """Contacts of the first mechanism, with the end of the joint where they are."""
-        found = []
-        for contact in self.path.mechanisms[0].contacts if self.path else ():
-            away = np.linalg.norm(self.structure.ends[contact.joint] - contact.point, axis=1)
-            found.append((contact, ("intrados", "extrados")[int(away.argmin())]))
-        return found
-
-    @property
-    def checks(self) -> list[AssessmentCheck]:
-        """Linear check, and that of the displacement where the mechanism moves."""
-        return [self.linear, *([self.displacement] if self.displacement else [])]
-
-    @property
-    def passes(self) -> bool:
-        """Whether the displacement check passes, or without it the linear one.
-
-        It must pass under every assumption on a fill, `checks[-1].over_fill` having the range, and
-        with one weight for each body, and, where alpha_0 is searched, with e* = 1. Where its ratio
-        is an upper bound, which passes none, the linear check must pass. `above` must pass too.
-        """
-        last = self.checks[-1]
-        shown = last.passes or (last.outcome == "passes" and self.linear.passes)
-        return shown and (self.above is None or self.above.passes)
-
-    def demand(self, periods: Array) -> tuple[Array, Array]:
-        """Return spectral displacements [m] and accelerations [m/s²] of the demand.
-
-        Args:
-            periods: natural periods (n,) [s].
-
-        Returns:
-            Displacement and pseudo-acceleration spectrum at the damping of the limit state.
-        """
-        acceleration = spectral_acceleration(self.spectrum, periods, self.limit_state.damping)
-        return acceleration * (periods / (2.0 * np.pi)) ** 2, acceleration
-
-    def table(self) -> str:
-        """Return the quantities and both checks, a line each."""
-        units = {"alpha_0": "-", "e_star": "-", "M_star": "kg"}
-        units["a_0_star"] = f"m/s² ({self.a_0_star / STANDARD_GRAVITY:.3f} g)"
-        units |= {"d_0_star": "m", "T_s": "s"} if np.isfinite(self.d_0_star) else {}
-        rows = [(name, getattr(self, name), unit) for name, unit in units.items()]
-        for check in self.checks:
-            own = {"capacity": check.unit, "demand": check.unit, "ratio": "-"}
-            rows += [(f"{check.name}: {key}", getattr(check, key), own[key]) for key in own]
-        texts = [[name, f"{value:.4g}", unit] for name, value, unit in rows]
-        filled = [x for x in self.checks if x.over_fill is not None]
-        texts += [[f"{x.name}: ratio over the fill", x.ratios, "-"] for x in filled]
-        return align_columns(["quantity", "value", "unit"], texts)
-
-    def _summary(self) -> str:
-        """Describe the result in one line."""
-        vanishes = f"d_0* {self.d_0_star:.4g} m, " if np.isfinite(self.d_0_star) else ""
-        last, both = self.checks[-1], [(x.decisive, x.ratio) for x in self.checks[::-1]]
-        outcome = last.outcome if last.unshown else describe_difference(*both) or last.outcome
-        return (
-            f"KinematicAssessment of '{self.structure.name}': alpha_0 {self.alpha_0:.4g}, a_0* "
-            f"{self.a_0_star:.4g} m/s², {vanishes}{'; '.join([outcome, *self._lower])}"
-        )
-
-    def __str__(self) -> str:
-        """Describe mechanism, oscillator, checks and notes, a line each."""
-        side = name_side(self.direction)
-        lines = [f"kinematic assessment of {self.structure.name}, pushed to the {side}"]
-        if self.path is None:
-            crush = " unless joints crush" * bool(np.isfinite(self.strength))
-            lines.append(f"no horizontal force makes it a mechanism{crush}")
-        else:
-            joints = self.structure.joints
-            sides = [(joints[k], side) for k, side in self.hinges]
-            turning = [f"{x.name} at the {x.name_face(side)}" for x, side in sides]
-            hinges = list_or_count(turning, CLEAR_TURNS)
-            sliding = list_or_count([joints[k].name for k in self.sliding])
-            many = not hinges and sliding and slides_anywhere(self.structure, self.alpha_0)
-            vanishes = f", d_0* = {self.d_0_star:.4g} m, T_s = {self.T_s:.3f} s"
-            weight = self.M_star * self.structure.gravity / self.e_star / kN
-            divided = f", which the checks divide by FC = {self.confidence_factor:g}"
-            lines += [
-                f"{self.mechanism_name}{ONE_OF_MANY * bool(many)}; hinges: {hinges or 'none'}; "
-                f"sliding: {sliding or 'none'}",
-                f"alpha_0 = {self.alpha_0:.4g}, e* = {self.e_star:.3f} of the {weight:.4g} kN that "
-                f"move, M* = {self.M_star:.4g} kg{' of this body' * bool(many)}, "
-                f"a_0* = {self.a_0_star:.4g} m/s² ({self.a_0_star / STANDARD_GRAVITY:.3f} g)"
-                f"{divided}{vanishes if np.isfinite(self.d_0_star) else ''}",
-            ]
-            moved = abs(self.curve["d"].values.round(5))
-            places = self.path.first_changes
-            changes = [f"{text} at d* = {moved[k]:.3g} m" for text, k in places.items()]
-            changed = f"along the path the mechanism changes: {join_names(changes, '; ')}"
-            if np.isfinite(self.strength) and self.hinges:
-                back = Ends.of(self.path.blocks.setback[[k for k, _ in self.hinges]])
-                crushed = f"joints crush at {self.strength / MPa:.3g} MPa: hinges are set back by"
-                lines.append(f"{crushed} {back:mm}")
-            lines += [changed] * bool(changes)
-            lines += [self.path.ending] if self.displacement else []
-            lines += map(str, self.checks)
-            if (over_fill := self.checks[-1].over_fill) is not None:
-                lines.append(over_fill.describe_states(digits=3, name=" times the spectrum"))
-                own = (k for k, x in over_fill.values.items() if x == self.checks[-1].assumed)
-                lines += [f"all else is under one assumption: {key}" for key in [*own][:1]]
-        lines += [f"{NOTE_MARK}{note}" for note in [*self.notes, *self._lower]]
-        return "\n".join([*lines, *(f"{DOUBT_MARK}{doubt}" for doubt in self.doubts)])
-
-    @property
-    def _lower(self) -> list[str]:
-        """Mechanism and ratios of what is above a bed, if they are lower."""
-        if not self.above or not (lower := list_lower(self.above.checks, self.checks)):
-            return []
-        moves = f"from alpha_0 = {self.above.alpha_0:.4g} on"
-        ratios = "; ".join(f"{format_ratio(x.decisive)} by {x.name}, {x.words}" for x in lower)
-        return [f"{self.above.mechanism_name}, {moves}, has a lower ratio: {ratios}"]
+# Largest difference of d₀* of two control points that are as good as one [-]: ratios differ by less
+SAME_POINT = 0.01
 
 
 @validate_arguments
@@ -528,6 +333,7 @@ class _Oscillator:
     by_body: bool = False  # whether each body that moves as one has one weight, beside the loads
     searched: Doubt | None = None  # about a factor that was searched without dilatancy
     ties: str = ""  # forces of the ties, in words
+    centred: bool = False  # whether the control point is the centroid of all weights
 
     @cached_property
     def weights(self) -> tuple[Array, Array]:
@@ -572,6 +378,29 @@ class _Oscillator:
         fast = np.abs(along) >= (1.0 - 1e-6) * np.abs(along).max()
         return free[fast & ((along > 0.0) == (along[fast].max() > 0.0))]
 
+    @property
+    def moved(self) -> float:
+        """Capacity over demand of the displacement check [-]."""
+        return self.displacement.moved if self.displacement else np.inf
+
+    def _follow_control(self) -> Array:
+        """Return the displacement of the control point along x (n,) [m]."""
+        assert self.path is not None
+        if not self.centred:
+            return self.path.follow_centroid(self.control)
+        body, rest = self.path.mechanisms[0].body, self.placed.masses
+        places = [self.placed.moved(each).masses for each in self.path.displacements]
+        moved = [[x[1][0] - y[1][0] for x, y in zip(each, rest, strict=True)] for each in places]
+        weights = [weight * (body[k] >= 0) for k, _, weight in rest]
+        return np.average(moved, axis=1, weights=weights)
+
+    @cached_property
+    def other(self) -> "_Oscillator | None":
+        """The same by the other control point, if its displacements are others."""
+        other = replace(self, centred=not self.centred)
+        own, moved = (float(x.curve["d"][-1]) for x in (self, other))
+        return other if abs(moved - own) > SAME_POINT * own and moved > 0.0 else None
+
     @cached_property
     def e_star(self) -> float:
         """Participating share of the weight that moves [-]."""
@@ -586,10 +415,11 @@ class _Oscillator:
         factors, control, moved = np.zeros(0), np.zeros(0), np.zeros(0)
         if self.path is not None:
             factors, moved = self.path.factors, np.zeros(len(self.path.factors))
-            control = self.placed.direction * self.path.follow_centroid(self.control)
+            control = self.placed.direction * self._follow_control()
             if self.path.velocity.any():
                 weight, speed = self.weights
                 own = self.placed.direction * self.path.velocity[self.control[0], 0]
+                own = (weight @ speed) / weight.sum() if self.centred else own
                 moved = control / own * (weight @ speed**2) / (weight @ speed)
         acceleration = factors * self.placed.structure.gravity / self.e_star
         values = {"d": moved, "a": acceleration, "alpha": factors, "d_control": control}
@@ -602,6 +432,14 @@ class _Oscillator:
         if self.path is None:
             return []
         found = describe_loads(self.path, self.given.loads, self.ties, self.stretches)
+        if self.displacement and self.other:
+            names = self.control_name if len(self.control) < 4 else f"{len(self.control)} blocks"
+            own, other = (f"{names}, at first the fastest", "all weights")[:: 1 - 2 * self.centred]
+            found.append(
+                f"d* is of the centroid of {own}, whose capacity is {self.moved:.3g} times the "
+                f"demand: no more than the {self.other.moved:.3g} times by that of {other}, "
+                f"with a d_0* of {self.other.curve['d'].values[-1]:.4g} m"
+            )
         collapse = self.path.mechanisms[0].factor
         if factor < (1.0 - 1e-3) * collapse:
             found.append(
@@ -695,9 +533,11 @@ class _Oscillator:
         if path is not None:
             alpha_0, a_0 = float(curve["alpha"][0]), float(curve["a"][0])
             mass = self.e_star * (self.weights[0].sum() / structure.gravity)
-            control = join_names([structure.blocks[number].name for number in self.control])
-            if len(path.factors) > 1:
-                displacement = self._check_displacement()
+            control = "all weights" if self.centred else self.control_name
+            displacement = self.displacement
+            other = self.other if displacement and not self.centred else None
+            if other and other.moved < self.moved:
+                return other.assess()
             if path.end is PathEnd.FALLS:
                 d_0 = float(curve["d"][-1])
                 secant = secant_period(curve["d"].values, curve["a"].values, 0.16 * d_0)
@@ -739,10 +579,19 @@ class _Oscillator:
         tied = "not decided, as runs leave out ties: count on what it withstands without them"
         return tied if self.placed.ties else "a time history with large displacements can test it"
 
-    def _check_displacement(self) -> AssessmentCheck:
-        """Check the displacement of the capacity curve against the spectrum."""
+    @cached_property
+    def control_name(self) -> str:
+        """Names of the fastest blocks."""
+        blocks = self.placed.structure.blocks
+        return join_names([blocks[number].name for number in self.control])
+
+    @cached_property
+    def displacement(self) -> AssessmentCheck | None:
+        """Check of the displacement against the spectrum, of a mechanism that moves."""
+        if self.path is None or len(self.path.factors) == 1:
+            return None
         given, curve = self.given, (self.curve["d"].values, self.curve["a"].values)
         check = given.rules.check(self.spectrum, given.confidence_factor, *curve, given.free_period)
         higher = not check.at_rest and bool(self.opens or doubt_stretches(self.stretches))
-        at_least = self.path is not None and self.path.end is not PathEnd.FALLS
+        at_least = self.path.end is not PathEnd.FALLS
         return replace(check, bounded=self.bounded or higher, at_least=at_least)

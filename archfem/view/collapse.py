@@ -26,8 +26,8 @@ from archfem.limit.vehicles import MovingLoad
 from archfem.masonry.loads import PointLoad
 from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import Structure, join_words, list_first
+from archfem.statics.assessed_mechanism import KinematicAssessment
 from archfem.statics.assessment_checks import UPPER_BOUND, AssessmentCheck
-from archfem.statics.mechanism_assessment import KinematicAssessment
 from archfem.view import style
 from archfem.view.joint_marks import Marker, outline_moving_blocks, scale_motion
 from archfem.view.positions import FallingBlocks

@@ -1079,6 +1079,9 @@ def test_the_ring_of_the_readme(ring, verified):
     assert found.sliding == ()
     assert found.curve["a"].values[0] == found.a_0_star
     assert found.curve["d"].values[-1] == found.d_0_star
+    # of the centroid of all weights, d_C / e*, by the displacements of equal voussoirs
+    moved = found.path.displacements[-1][list(RING.free), 0].mean() / found.e_star
+    assert f"all weights, with a d_0* of {moved:.4g} m" in found.notes[0]
 
 
 def test_an_arch_on_piers_has_the_mass_of_its_moving_blocks(verified):
@@ -1647,7 +1650,8 @@ def test_notes_tell_where_the_curve_is_an_upper_bound(ring):
             RING, ring.spectrum, 1.0, "coulomb", None, None, (), *rules
         )
         oscillator = mechanism_assessment._Oscillator(given, placed, ring.path, holds, False)
-        notes = [*oscillator.notes(share * factor), *oscillator.doubts]
+        own = [x for x in oscillator.notes(share * factor) if not x.startswith("d* is of")]
+        notes = [*own, *oscillator.doubts]
         assert all(str(x).startswith(start) for x, start in zip(notes, said, strict=True))
         checks = oscillator.assess().checks
         assert tuple(check.bounded for check in checks) == bounded
@@ -1749,7 +1753,7 @@ def test_a_check_that_one_weight_a_body_fails_is_no_pass(scale, count):
     assert not whole.doubts
 
 
-def test_a_wall_held_at_its_top_moves_as_by_hand():
+def test_a_wall_held_at_its_top_moves_as_by_hand(verified):
     """A wall 3 m high and 0.4 m thick bends at 2.1 m; a tie beam holds it from 2.7 m up.
 
     Two bodies: the lower one turns about its outer foot, the upper one slides up the beam's corner.
@@ -1804,14 +1808,20 @@ def test_a_wall_held_at_its_top_moves_as_by_hand():
     work, inertia = weights @ rates, weights @ rates**2
     parted = brentq(push_of_beam, 1e-4, 0.13)
     assert factor(parted) > 0.0  # there the upper body leaves the beam and falls
-    control = np.abs(rates).argmax()
-    moved = (places(parted)[0] - places(0.0)[0])[control].real
+    moved = (places(parted)[0] - places(0.0)[0]).real
     assert found.alpha_0 == pytest.approx(0.5266106, rel=1e-6)
     assert found.alpha_0 == pytest.approx(factor(0.0), rel=1e-6)
-    assert found.e_star == pytest.approx(work**2 / (weights.sum() * inertia), rel=1e-5)
-    expected = moved * inertia / (rates[control] * work)
+    share = work**2 / (weights.sum() * inertia)
+    assert found.e_star == pytest.approx(share, rel=1e-5)
+    # the centroid of all weights has the lesser capacity, d* = d_C / e*; the fastest is course 6
+    expected = (weights @ moved) / weights.sum() / share
     assert found.d_0_star == pytest.approx(expected, rel=1e-4)
     assert found.displacement.capacity == pytest.approx(0.4 * expected, rel=1e-4)
+    verified("wall held at its top: d_0* of all weights", expected, "by hand", found.d_0_star)
+    control = np.abs(rates).argmax()
+    fastest = moved[control] * inertia / (rates[control] * work)
+    assert found.control == "all weights"
+    assert f"of course 6, at first the fastest, with a d_0* of {fastest:.4g} m" in found.notes[0]
 
 
 def test_a_load_with_a_wrong_sign_or_unit_is_in_doubt():

@@ -428,7 +428,10 @@ def _define_assessment(data: ReportData, text: str, moves: bool) -> Grid:
         ),
     ]
     if moves:
-        rows.append(("d_0*", "displacement at which it resists nothing, or the end of its motion"))
+        point = "centroid of the blocks that move fastest, or of all weights that move where its "
+        point += "ratio is less, d* = d / e*"
+        ends = "displacement at which it resists nothing, or the end of its motion"
+        rows += [("d_0*", ends), ("d*, d_0*", f"spectral displacements of the {point}")]
         rows += [("T_s", "secant period at 0.16 d_0*, that of NTC-2008")] * ("T_s" in text)
         rows += [("T", period), (rules.name, checked)]
     return Grid((), rows, "Quantities of the assessment; Circolare 7/2019, C8.7.1.2.1")
