@@ -404,6 +404,11 @@ class _Tied(NamedTuple):
     ratios: Ratios  # of the check that decides
     bounded: bool  # whether one is an upper bound
     breaks: bool  # whether a tie does, at the end of a path
+    by_name: Mapping[str, float]  # least ratio of each mechanism [-]
+
+    def margin_but(self, mechanism: str) -> float:
+        """Return the least ratio of all mechanisms but one [-]."""
+        return min((x for name, x in self.by_name.items() if name != mechanism), default=MOST_TIED)
 
 
 @dataclass(frozen=True, eq=False)
@@ -438,14 +443,21 @@ class _TieSearch:
         margin = min(MOST_TIED, *(x.decisive for x, _ in listed))
         linear = min(MOST_TIED, *(x.decisive for x, _ in listed if x.linear))
         breaks = any(each.path and each.path.end is PathEnd.BREAKS for each in found.values())
-        given = ratios, any(x.bounded for x, _ in listed), breaks
+        by_name: dict[str, float] = {}
+        for x, each in listed:
+            by_name[each] = min(x.decisive, by_name.get(each, MOST_TIED))
+        given = ratios, any(x.bounded for x, _ in listed), breaks, by_name
         return self.tried.setdefault(scale, _Tied(margin, linear, name, *given))
 
     def find_multiple(self, name: str) -> float:
-        """Return from which multiple on a ratio is 1 at all that are tried; infinite if at none."""
+        """Return from which multiple on a ratio is 1 at all that are tried; infinite if at none.
+
+        The ratio is a field of what is found, or that of all mechanisms but the named one.
+        """
 
         def exceed(scale: float) -> float:
-            return float(getattr(self.solve(scale), name)) - 1.0
+            found = self.solve(scale)
+            return float(getattr(found, name, found.margin_but(name))) - 1.0
 
         if exceed(MOST_TIED) <= 0.0:
             return np.inf
@@ -481,6 +493,12 @@ class _TieSearch:
             if most.ratios.unshown:
                 text = f"with {times} it {NOT_SHOWN} by displacements: {most.mechanism}"
             text += f" has a ratio of {most.ratios.range}"
+            own = self.solve(1.0).by_name.get(name := most.mechanism, np.inf)
+            # no tie holds it: its ratio is the same with each
+            if abs(own / most.by_name[name] - 1.0) < 1e-3:
+                scale, length = self.find_multiple(name), describe_tied_length(self.case.structure)
+                passes = f"; all else passes from {self.say_forces(scale)} on, {length}"
+                text += passes * (0.0 < scale < np.inf)
         linear = self.find_multiple("linear")
         if linear >= 0.99 * scale:
             return text

@@ -13,7 +13,7 @@ import xarray as xr
 from archfem._validation import validate_arguments
 from archfem.cases import rating_text, result_text
 from archfem.cases.analysis_keys import rate_case
-from archfem.cases.answers import doubt_fill, find_margin
+from archfem.cases.answers import doubt_fill, find_margin, list_ratios
 from archfem.cases.case import Case
 from archfem.cases.provenance import hash_inputs, remove_presentation
 from archfem.cases.push_factors import compare_with_site, site_acceleration
@@ -237,8 +237,9 @@ def evaluate_assessment(case: Case) -> Findings:
         found = case.assessment.solve(case.structure, case.demand).values()
     doubts += [doubt for each in found for doubt in each.doubts]
     least = {"least_margin": find_margin(found), "alpha_0": min(float(x.alpha_0) for x in found)}
-    checks = [check for each in found for check in each.checks]
-    bounds = ["least_margin"] * any(x.bounded and not x.unshown for x in checks)
+    # another check that is an upper bound is in its doubt, and not in a margin that is exact
+    decides = min((x for each in found for _, x in list_ratios(each)), key=lambda x: x.decisive)
+    bounds = ["least_margin"] * decides.bounded
     bounds += ["alpha_0"] * any(each.linear.bounded for each in found)
     return least | _name_bounds(bounds) | _state_doubts(doubts)
 

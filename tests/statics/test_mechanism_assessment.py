@@ -360,7 +360,8 @@ def test_no_force_of_a_tie_suffices_where_what_is_above_it_fails():
     # all of it at e* = 1: q α g / FC = PGA, and α 160 2 = 160 0.25 + 2 t
     pga = 0.25 * (1.4 - 0.4 * 2.4 * 0.25) * 9.80665 / 9.81
     needed = 160.0 * (1.35 * pga / 2.0 - 0.125)
-    says += f"; the linear check alone is passed from {needed:.3g} kN of the tie at block 1 on"
+    says += f"; all else passes from {needed:.3g} kN of the tie at block 1 on, in all for 4 m of "
+    says += "wall at its foot, without a factor on the tie"
     assert note_ties(case) == [f"note: pushed to the right, {says}"]
     found = case.assessment.solve(case.structure, None)
     assert list(found) == ["right", f"right, {name}"]
@@ -480,6 +481,11 @@ def test_a_check_that_alone_fails_is_in_every_headline_with_the_force_of_a_tie()
     assert [x.linear.ratio for x in found.values()] == pytest.approx(ratios, rel=1e-4)
     free = found["left"]
     assert free.passes  # by displacements
+    # the margin is that of the linear check to the left, which is exact
+    assert found["right"].displacement.bounded
+    assert not evaluate_assessment(case).get("upper_bounds")
+    high = af.Case.of({"structure": column | {"above": 8.0}, "assessment": {"spectrum": spectrum}})
+    assert "least_margin" in evaluate_assessment(high)["upper_bounds"]
     moved = f"{free.displacement.ratio:.3g}"
     says = f"passes by displacements ({moved}), fails by the linear check ({ratios[1]:.3g}); no "
     says += "clause that was read says which governs"
