@@ -51,6 +51,9 @@ def columns_across(wall: Structure, *, above: Metres | None = None) -> dict[str,
     The pier is that which overturns first of those beside openings, also at an end of the wall. It
     carries the wall up to the middle of the openings beside it, but what is below their heads.
 
+    A course of a gable acts at the middle of its height, higher than its centre, and its tip at its
+    centre: of five courses the factor of overturning is 1 % too low, of more less.
+
     Args:
         wall: structure in its plane; its width is the thickness of the wall.
         above: level from whose next bed on it is taken, such as that of the eaves; None for all
@@ -140,12 +143,19 @@ def take_highest_strip(
     return replace(whole, blocks=filled, name=f"{whole.name}, highest strip"), moved
 
 
+def describe_lengths(structure: Structure) -> str:
+    """Say what the length of a wall across its plane is where its courses have different ones."""
+    differ = any(block.material.stands_for == COURSE_LENGTH for block in structure.blocks)
+    return ", as its lowest course on average" * differ
+
+
 def _split_high(
     blocks: Sequence[Block], levels: Array, shares: Array, areas: Array
 ) -> tuple[Array, Array, Array]:
     """Return weights, areas and levels with courses of high centre as two blocks with that centre.
 
-    Those of low centre stay one block, on the safe side: its centre is higher.
+    So is the tip of a gable. Others of low centre stay one block, on the safe side: its centre is
+    higher.
     """
     ends = np.array([[block.points[:, 1].min(), block.points[:, 1].max()] for block in blocks])
     low, high = (np.clip(ends[:, [k]], levels[:-1], levels[1:]) for k in (0, 1))
@@ -157,7 +167,7 @@ def _split_high(
     weights = unit_weights @ areas
     centres = unit_weights @ (areas * (middles + higher[:, None])) / weights
     up = (centres - levels[:-1]) / np.diff(levels)
-    for k in np.flatnonzero(up > 0.51)[::-1]:
+    for k in np.flatnonzero((up > 0.51) | (up < 0.4))[::-1]:
         # cut at the centre, of which both halves are half a height away
         levels, areas = np.insert(levels, k + 1, centres[k]), np.insert(areas, k, areas[:, k], 1)
         weights = np.insert(weights, k, (1.0 - up[k]) * weights[k])

@@ -8,6 +8,7 @@ import pytest
 
 import archfem as af
 from archfem.masonry.out_of_plane import (
+    describe_lengths,
     describe_transverse_push,
     find_openings,
     find_transverse_push,
@@ -128,7 +129,7 @@ def test_courses_across_the_plane_are_between_beds_over_most_of_the_length(bread
         assert each.weight / each.width == pytest.approx(0.6 * 3.0 * 20e3)
 
 
-def test_the_tip_of_a_gable_is_one_block_with_the_course_below_it_across_the_plane():
+def test_the_tip_of_a_gable_and_the_course_below_it_have_their_centre_across_the_plane(verified):
     """A triangle of eight courses: the upper ones weigh 1, 3, 5 and 7, the lower ones 9 to 15."""
     half, height, thick = 2.0, 4.0, 0.5
     blocks = [af.Block(((-3, -1), (3, -1), (3, 0), (-3, 0)), af.STONE, "ground", fixed=True)]
@@ -142,19 +143,27 @@ def test_the_tip_of_a_gable_is_one_block_with_the_course_below_it_across_the_pla
     gable = af.masonry.assembled(blocks, af.Contact(1e9, 4e8, friction=0.7), width=thick)
     columns = af.masonry.columns_across(gable)
     # a fifth of the median, 8, is more than 1, and less than 3 + 1
-    assert [len(each.free) for each in columns.values()] == [7, 7]
+    assert [len(each.free) for each in columns.values()] == [7, 8]
     whole = columns["whole"]
     weights = np.array([x.area * x.material.unit_weight for x in whole.blocks[1:]])
-    assert weights / weights.sum() == pytest.approx(np.array([15, 13, 11, 9, 7, 5, 4]) / 64)
-    assert np.ptp(whole.blocks[-1].points[:, 1]) == pytest.approx(1.0)
-    # half the thickness over the height of the centre, a hundredth below that of the triangle
+    parts = np.array([15, 13, 11, 9, 7, 5, 8 / 3, 4 / 3])
+    assert weights / weights.sum() == pytest.approx(parts / 64, rel=1e-5)
+    # the two are cut at the centre of their triangle
+    assert np.ptp(whole.blocks[-1].points[:, 1]) == pytest.approx(2.0 / 3.0)
+    # half the thickness over the height of the centre, less than a hundredth below the triangle's
     found = af.collapse_factor(whole, live=af.BodyForce(1.0), friction=None).factor
-    middles = np.array([0.25, 0.75, 1.25, 1.75, 2.25, 2.75, 3.5])
-    centre = middles @ [15, 13, 11, 9, 7, 5, 4] / 64
+    middles = np.array([0.25, 0.75, 1.25, 1.75, 2.25, 2.75, 19 / 6, 11 / 3])
+    centre = middles @ parts / 64
     assert found == pytest.approx(0.5 * thick / centre, rel=2e-3)
-    assert 0.98 < found / (1.5 * thick / height) < 1.0
+    exact = 1.5 * thick / height
+    verified("gable across its plane: factor", exact, "centre of a triangle", found)
+    assert 0.99 < found / exact < 1.0
     # its weight is no load, which would act higher
     assert not describe_carried(whole)
+    # the lowest course is 4 m long at its foot, and 3.5 m at its top
+    assert whole.width == pytest.approx(3.75)
+    assert describe_lengths(whole) == ", as its lowest course on average"
+    assert not describe_lengths(columns["strip"])
 
 
 def test_a_wall_across_its_plane_may_begin_at_its_eaves():

@@ -34,6 +34,7 @@ from archfem.cases.report.report_data import SHOWN_RESULTS, ReportData
 from archfem.cases.report.scales import find_first_failures, list_scales, say_fragile
 from archfem.cases.report.study_findings import MAX_TIE_DIFFERENCE, say_what_changes
 from archfem.dynamics.collapse_state import COLLAPSE_STATES, RANGE_REMEDY
+from archfem.masonry.out_of_plane import describe_lengths
 from archfem.masonry.structure import Structure, join_names, join_words
 from archfem.models.model import Doubt
 from archfem.units import Ends, format_ratio
@@ -101,7 +102,7 @@ def list_facts(data: ReportData) -> list[tuple[str, str]]:
 def describe_width(structure: Structure) -> str:
     """Say how wide a structure is across its drawing, which is the length of a wall across it."""
     word = "long" if structure.above is not None else "thick" if structure.heads.any() else "wide"
-    return f"{structure.width:.4g} m {word}"
+    return f"{structure.width:.4g} m {word}{describe_lengths(structure)}"
 
 
 def list_joint_facts(parts: Mapping[str, ReportData]) -> list[tuple[str, str]]:

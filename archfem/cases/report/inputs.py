@@ -19,7 +19,7 @@ from archfem.limit.collapse import collapse_factor
 from archfem.masonry.joint_closing import FINISHED_KEYS
 from archfem.masonry.loads import AttachedLoad
 from archfem.masonry.materials import Contact, Material
-from archfem.masonry.out_of_plane import find_openings
+from archfem.masonry.out_of_plane import describe_lengths, find_openings
 from archfem.masonry.shapes.bridge_parts import Backfill
 from archfem.masonry.structure import Structure, describe_piers, find_clear_spans, join_words
 from archfem.motion.design_spectra import CodeSpectrum
@@ -215,7 +215,8 @@ def _structure_rows(data: ReportData) -> Iterator[Row]:
             yield part or "pier", words, "inferred"
     shape = structure_keys.list_shapes()[table["shape"]]
     yield "structure", _list_left_out(shape, {*table}), "default"
-    yield "width", f"{structure.width:g} m", *_mark_key(table, "structure.width")
+    length = f"{structure.width:g} m{describe_lengths(structure)}"
+    yield "width", length, *_mark_key(table, "structure.width")
     yield "gravity", f"{structure.gravity:g} m/s²", *_mark_key(table, "structure.gravity")
     if "joints" not in table and table["shape"] in ("blocks", "outlines"):
         yield "joints", f"{counts['joints']}, where outlines touch", "inferred"
