@@ -373,31 +373,40 @@ def describe_floor(spectrum: Demand) -> str:
 
 
 def judge_floor(
-    spectrum: Demand, foot: float, free_period: float | None, checks: Sequence["AssessmentCheck"]
+    spectrum: Demand,
+    foot: float,
+    free_period: float | None,
+    checks: Sequence["AssessmentCheck"],
+    shared: bool = False,
 ) -> tuple[list[str], list[Doubt]]:
     """Return notes on the spectrum where a floor shakes a foot, and doubts of checks that pass.
 
-    The linear check is of what does not vibrate by itself: by T_0 those in doubt may fail.
+    The linear check is of what does not vibrate by itself: by T_0 those in doubt may fail. So may
+    those with a T_0 of 0 that is shared, given for the whole too, which cross walls hold.
     """
     if not isinstance(spectrum, FloorSpectrum) or not (floor := spectrum.at(foot)).amplification:
         return [], []
     height = spectrum.height or np.inf
     words = f"its foot, z = {foot:.4g} m, is above H = {height:.4g} m of the spectrum: z = H is "
     notes = [f"{words}taken, where the first mode of eq. C7.2.10 is 1"] * (foot > height + 1e-6)
-    if free_period is not None:
-        taken = f"free_period = {free_period:g} s is T_0 of what moves above z = {foot:.4g} m"
-        return [*notes, taken], []
+    given = free_period is not None
+    if given:
+        notes.append(f"free_period = {free_period:g} s is T_0 of what moves above z = {foot:.4g} m")
+        if free_period or not shared:
+            return notes, []
     values = spectral_acceleration(floor, floor.own_period * np.linspace(0.0, 1.0, 21), 0.05)
     times = float(values.max() / values[0])
-    notes.append(
+    taken = (
         "the linear check takes a_Z, that of what cross walls hold until it moves; of what "
         "vibrates freely, as a parapet or a gable above its eaves, eq. C8.7.1.9 takes the spectrum "
         f"at its own period T_0, up to {times:.3g} times as much"
     )
+    notes += [taken] * (not given)
     # what passes once it moves does not depend on when it begins to
     least = [(x, max(x.decisive / times, x.moved * (x.unit == "m"))) for x in checks]
     words = "{} passes with a_Z, and of what vibrates freely its ratio may be {:.3g}, by T_0"
     remedy = "give free_period, its T_0, or 0 if cross walls hold it until it moves"
+    remedy = "assess it alone, with its own free_period" if given else remedy
     turn = [Doubt(words, remedy, (x.name, low)) for x, low in least if x.decisive >= 1.0 > low]
     return notes, turn
 

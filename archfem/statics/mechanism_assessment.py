@@ -564,7 +564,7 @@ class _Oscillator:
                 found = replace(found, displacement=moved)
         doubts = [y for x in found.checks for y in (*x.doubt_split(), *x.doubt_end(self.remedy))]
         given = self.given.spectrum, self.foot, self.given.free_period
-        more, turn = judge_floor(*given, whole.checks)
+        more, turn = judge_floor(*given, whole.checks, self.given.bed is not None)
         ratios = [f"{x.bodies:.3g} by {x.name}" for x in found.checks if x.bodies is not None]
         split = (
             "weights are at the centroids of blocks: one for each body that moves as one gives "

@@ -1980,6 +1980,22 @@ def test_what_vibrates_freely_takes_the_spectrum_at_its_own_period(verified):
     assert ground.linear.demand == pytest.approx(0.54 * af.units.STANDARD_GRAVITY)
 
 
+def test_a_free_period_of_0_of_the_whole_is_in_doubt_above_its_tie():
+    """What is above a tie at the top of the building may vibrate freely, with the most by T_0."""
+    floor = af.motion.FloorSpectrum(replace(GROUND, ag=0.05), 0.29, height=10.5, storeys=3)
+    wall = replace(af.column(breadth=0.5, heights=[10.5, 2.0]), above=0.0)
+    tie = af.masonry.AttachedLoad("block 1", (0.0, 10.5), force=(-12e3, 0.0), passive=True)
+    held, free = (
+        af.kinematic_assessment(wall, floor, loads=[tie], free_period=x).above for x in (0.0, 0.12)
+    )
+    alpha = 0.5 / 2.0
+    ratio = 2.0 / 1.35 * alpha * G / af.units.STANDARD_GRAVITY / floor_level(0.0, 0.05)
+    assert held.linear.ratio == pytest.approx(ratio, rel=1e-3)
+    (doubt,) = (str(x) for x in held.doubts if "vibrates freely" in str(x) and "linear" in str(x))
+    assert f"its ratio may be {ratio * 0.05**0.5 / 1.1:.3g}, by T_0; assess it alone" in doubt
+    assert not any("vibrates freely" in str(x) for x in free.doubts)
+
+
 def test_a_mechanism_at_rest_by_a_z_alone_is_in_doubt(verified):
     """What vibrates freely is set in motion by S_eZ(T_0), and then displacements decide."""
     ground = replace(GROUND, ag=0.05)
