@@ -245,6 +245,12 @@ def _convert(text: str, unit: str, key: str) -> float:
     registry = _registry()
     number, name = _split_quantity(text, unit, key)
     target = "dimensionless" if unit == "1" else unit
+    try:
+        registry.Unit(target)
+    except Exception as error:  # also of pint's tokenizer
+        raise InvalidInput(
+            f"{unit!r}, into which {key} is converted, is no unit: {error}"
+        ) from error
     name = re.sub(r"\b([A-Za-z]+)([23])\b", r"\1**\2", name)  # as in kN/m3
     if unit == "m/s**2":  # here g is gravity and gal the unit of Galileo, not gram and gallon
         name = re.sub(r"\bg\b", "g_0", re.sub(r"\bgal\b", "Gal", name))

@@ -95,6 +95,12 @@ def test_another_number_or_sign_than_one_before_the_unit_is_refused(text, unit, 
     assert f"x = {text!r} is not a quantity, for {rest!r} is no unit" in str(error.value)
 
 
+@pytest.mark.parametrize("unit", ["metre per", "foo", "m/sec_"])
+def test_an_unknown_unit_is_to_blame_and_not_the_value(unit):
+    with pytest.raises(af.InvalidInput, match=f"^'{unit}', into which x is converted, is no unit"):
+        af.units.in_unit("5 m", unit, "x")
+
+
 @pytest.mark.parametrize("text", ["~5 m", "<5 m", "(5) m", "½ m", "m"])
 def test_a_quantity_begins_with_its_number(text):
     with pytest.raises(af.InvalidInput, match="does not begin with a number: write one number"):

@@ -269,7 +269,7 @@ def list_finish_ranges(
     first = f"{_range_text(law.initial, 1e9)} MPa/mm at first{across}"
     found = {"normal_stiffness": ("k_n", first)}
     if contact.closure:
-        found["closure"] = "closing", f"{_range_text(law.closure, mm)} mm at most{across}"
+        found["closure"] = "closing", f"{_range_text(law.closure, mm)} mm at most (as k_n)"
     depth = format_mm(usual_depth(structure, contact))
     of = f"at {USUAL_STRESS / MPa:g} MPa on joints {depth} deep, their median ({'; '.join(along)})"
     return found | {"shear_stiffness": ("k_s", f"{_range_text(law.shear, 1e9)} MPa/mm {of}")}

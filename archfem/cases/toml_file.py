@@ -245,6 +245,16 @@ def _convert_row(values: Any, kind: Any, key: str) -> list[Any]:
     return [_convert(value, kind, f"{key}[{n}]") for n, value in enumerate(values)]
 
 
+def _refuse_none(value: Any, key: str) -> Any:
+    """Return a value, and refuse that of limit.strength where a material has its own."""
+    if value == "none" and key.endswith(".strength"):
+        raise InvalidInput(
+            f"{key} = 'none' is no stress: a material may leave its strength out, and "
+            'limit.strength = "none" leaves crushing out of limit analysis'
+        )
+    return value
+
+
 def _convert(value: Any, kind: Any, key: str) -> Any:
     """Convert one value to the kind of its key."""
     if kind == "degree":
@@ -252,7 +262,7 @@ def _convert(value: Any, kind: Any, key: str) -> Any:
         # A quantity keeps its unit: "5 degree" confirms a small angle, a bare 5 may be radians.
         return value if isinstance(value, str) else number
     if isinstance(kind, str):
-        return in_unit(value, kind, key)
+        return in_unit(_refuse_none(value, key), kind, key)
     if isinstance(kind, NumberOrWord):
         try:
             return None if value == kind.word else in_unit(value, kind.unit, key)

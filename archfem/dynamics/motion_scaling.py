@@ -36,7 +36,7 @@ from archfem.dynamics.scale_search import (
 )
 from archfem.dynamics.schemes import EffectiveDamping, Viscous
 from archfem.dynamics.solvers.integrator import Stepper
-from archfem.dynamics.time_history import time_history
+from archfem.dynamics.time_history import LEAVE_OUT, OR_LEAVE_OUT, time_history
 from archfem.dynamics.verdict import ROCKS_SOFTLY
 from archfem.dynamics.verdict_range import VerdictRange
 from archfem.errors import DidNotConverge, InvalidInput
@@ -210,7 +210,9 @@ class CollapseScale:
     def _say_tested(self) -> str:
         """Return in words how closely scales were run up to `lower`; "" where none stands."""
         stood = sorted({scale for scale, _ in self._list_held()})
-        gaps = [gap for gap in pairwise(stood) if gap[1] > FILLED_SHARE * self.lower]
+        # from that share of the smallest fall on the search has filled them
+        top = min(self.first_falls[0], max((run.scale for run in self._runs), default=inf))
+        gaps = [gap for gap in pairwise(stood) if gap[1] > FILLED_SHARE * top]
         if not gaps:
             return ""
         ratio = max(high / low for low, high in gaps)
@@ -471,6 +473,12 @@ def _search_steps(
     return searches
 
 
+def _choose_shorter(doubt: Doubt) -> Doubt:
+    """Return a doubt of a run whose time step the search has chosen, and no case gives."""
+    remedy = doubt.remedy.replace(LEAVE_OUT, "give shorter ones by analysis.dt")
+    return replace(doubt, remedy=remedy.removesuffix(OR_LEAVE_OUT))
+
+
 def _admissible_step(searches: Mapping[float, MechanismScales]) -> float:
     """Return the step that follows sliding in all runs that bound a fall [s]; infinite if any."""
     if any(search.interrupted for search in searches.values()):
@@ -560,7 +568,8 @@ def collapse_scale(
         met, follows = run.mechanisms, run.dataset.attrs.get("admissible_step", inf)
         # one too small to matter does not move the structure
         met = {name: found and found.decisive for name, found in met.items()}
-        ended = run.ending, run.outcome, run.fall, run.doubts, follows, whole
+        doubts = tuple(map(_choose_shorter, run.doubts)) if shortens else run.doubts
+        ended = run.ending, run.outcome, run.fall, doubts, follows, whole
         known[key] = ScaledRun(scale, met, *ended)
         return known[key]
 

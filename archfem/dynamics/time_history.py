@@ -46,6 +46,10 @@ from archfem.statics.equilibrium import Equilibrium, dead_load
 from archfem.statics.fill_checks import fill_doubts
 from archfem.statics.newton import Newton
 
+# Remedies of steps that a case gives
+LEAVE_OUT = "leave dt out, and each step is as long as its error allows"
+OR_LEAVE_OUT = ", or leave dt out"
+
 
 @takes_analysis
 @single_threaded
@@ -196,8 +200,7 @@ def _doubt_constant_steps(tolerance: float, share: float, dt: float) -> list[Dou
     """Return a doubt of a constant step [s] where three quarters of them missed the tolerance."""
     # displacements of rings and stacks then differed by 6 % and more from those of short steps
     words = f"steps of {1e3 * dt:g} ms are long: in {{:.0%}} of them |e| may err by more than "
-    remedy = "leave dt out, and each step is as long as its error allows"
-    return [Doubt(f"{words}{tolerance:g}", remedy, (share,))] if share > 0.75 else []
+    return [Doubt(f"{words}{tolerance:g}", LEAVE_OUT, (share,))] if share > 0.75 else []
 
 
 def _doubt_steps_of_sliding(history: History, slip_error: SlipError, dt: float) -> list[Doubt]:
@@ -222,10 +225,10 @@ def _doubt_steps_of_sliding(history: History, slip_error: SlipError, dt: float) 
         return []
     sizes: tuple[float, ...] = error, largest
     said = "{:mm}, where the largest slip is {:mm}"
-    remedy = "or leave dt out"
+    remedy = OR_LEAVE_OUT
     if error > max(largest, limit / 0.3):  # a sum of bounds, which says nothing of the step
         said, sizes = "as much as it is, {:mm} at most", (largest,)
-        remedy = "and compare, or leave dt out"
+        remedy = f", and compare{OR_LEAVE_OUT}"
         error = max(largest, limit / 0.3)
     # the error varies with the square of the step, and faster where steps miss peaks
     shorter = dt * (limit / error) ** 0.5
@@ -233,7 +236,7 @@ def _doubt_steps_of_sliding(history: History, slip_error: SlipError, dt: float) 
     shorter = floor(shorter / unit) * unit
     history.dataset.attrs["admissible_step"] = shorter
     words = f"steps of {1e3 * dt:g} ms are long for sliding: of '{{}}' the slip may be wrong by"
-    remedy = f"take {1e3 * shorter:g} ms or less, `--set analysis.dt={shorter:g}`, {remedy}"
+    remedy = f"take {1e3 * shorter:g} ms or less, `--set analysis.dt={shorter:g}`{remedy}"
     return [Doubt(f"{words} {said}", remedy, (str(dataset["name"].values[worst]), *sizes))]
 
 

@@ -257,15 +257,8 @@ class VerdictRange(ResultDisplay):
 
     @property
     def displacements(self) -> str:
-        """Range of the largest displacements, with the number of runs that hardly move."""
-        if not self.displacement_ends:
-            return ""
-        text = f"largest displacements {self.displacement_ends}"
-        _, hardly, alike = self._held_displacements
-        # runs that rest, as under a joint rule without a mechanism, say little of the others
-        if not hardly.any() or alike:
-            return text
-        return f"{text}; {hardly.sum()} of them moved by less than 1 % of the largest"
+        """Range of the largest displacements, in words; empty without any."""
+        return f"largest displacements {self.displacement_ends}" * bool(self.displacement_ends)
 
     @property
     def single_changes(self) -> "list[SingleChange]":

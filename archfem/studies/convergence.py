@@ -55,6 +55,8 @@ class Convergence:
 def converged(sizes: Sequence[float] | Array, values: Sequence[float] | Array) -> Convergence:
     """Return observed order, extrapolated limit and error bar of a value.
 
+    An order from 0.5 to 2.1 is plausible: beyond, values are not extrapolated.
+
     Args:
         sizes: sizes of cells or steps, three or more, in any unit, the coarsest first (n,).
         values: values (n,).

@@ -125,11 +125,21 @@ def test_two_studies_of_the_same_cases_have_one_order():
         assert names == ["case 0", "case 1", "case 2"]
 
 
+def test_a_study_of_ratings_has_a_column_for_all_of_the_passive_pressure():
+    factors = {"factor": [2.5, 2.0], "without_pressure": [0.7, 0.5], "full_pressure": [5.9, 4.0]}
+    columns = {name: ("case", values) for name, values in factors.items()}
+    table = xr.Dataset(columns, {"case": ["as given", "thin"]})
+    found = study_findings.collect_findings("ring", "", table)
+    shown = study_findings.tabulate_study(found)
+    assert shown.head == ["case", "factor", "without pressure", "full pressure"]
+    assert shown.rows[1] == ["thin", "2", "0.5", "4"]
+
+
 @pytest.mark.parametrize(("key", "own"), [("structure.thickness", True), ("model.dt", False)])
 def test_a_study_of_lengths_says_that_the_limit_of_dislocation_is_that_of_the_case(ring, key, own):
     """A tenth of the joints' depth, of which the line in the picture is the one of the case."""
     found = study(cases=3, varied=key)
-    data = SimpleNamespace(case=SimpleNamespace(structure=ring))
+    data = SimpleNamespace(case=SimpleNamespace(structure=ring), runs={})
     *_, figure = sections._build_study(data, found)
     limit = f"{100.0 * np.median(ring.depths):.3g} mm"
     assert f"dotted the limit of dislocation of the case, {limit}" in figure.caption

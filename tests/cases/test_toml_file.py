@@ -253,3 +253,15 @@ def test_numbers_are_written_without_their_type():
 
     text = format_tables({"a": Number(0.1), "b": [np.int64(3), np.float64(1e-30)]})
     assert tomllib.loads(text) == {"a": 0.1, "b": [3, 1e-30]}
+
+
+def test_a_material_without_strength_is_sent_to_limit_analysis():
+    """`none` is a word of limit.strength alone."""
+    settings = {
+        "structure": {"shape": "column", "breadth": 0.5, "heights": [1.0]},
+        "materials": {"stone": {"strength": "none"}},
+    }
+    with pytest.raises(af.InvalidInput, match=r'materials.stone.strength.*limit.strength = "none"'):
+        af.Case.of(settings)
+    settings |= {"materials": {}, "limit": {"strength": "none"}}
+    assert af.Case.of(settings).limit.strength == np.inf

@@ -25,6 +25,7 @@ from archfem.dynamics.scale_search import (
     ScaledRun,
     search_scales,
 )
+from archfem.dynamics.time_history import LEAVE_OUT, OR_LEAVE_OUT
 from archfem.dynamics.verdict import ROCKS_SOFTLY
 from archfem.errors import logger as log
 from archfem.models.model import Doubt
@@ -566,6 +567,21 @@ def test_the_scale_from_which_rigid_blocks_fall_is_stated(scales, stated):
     (cause,) = (doubt.cause for doubt in found.doubts)
     assert "under this motion of 0.2 g: " in cause
     assert cause.endswith(stated)
+
+
+def test_scales_are_as_close_from_half_of_the_smallest_fall_on_as_the_pages_say():
+    """Of a fall at 4.76 scales from 2.38 on are 1.1 apart; one at 2 is below its half."""
+    near = [2.0, 2.32, *(2.32 * 1.09**k for k in range(1, 9)), -4.76]
+    found = CollapseScale({0.001: fallen(1.0, *near)})
+    assert found.lower == pytest.approx(2.32 * 1.09**8)  # 4.62, half of which is below 2.32
+    assert "from 2.32 × on they are up to a factor of 1.09 apart" in str(found)
+
+
+@pytest.mark.parametrize("words", [LEAVE_OUT, f"take 1 ms or less{OR_LEAVE_OUT}"])
+def test_a_search_that_chose_its_steps_does_not_advise_to_leave_them_out(words):
+    doubt = motion_scaling._choose_shorter(af.models.model.Doubt("steps are long", words))
+    assert "dt out" not in doubt.remedy
+    assert doubt.remedy in ("give shorter ones by analysis.dt", "take 1 ms or less")
 
 
 def test_collapse_is_between_a_stable_and_a_falling_run_at_every_step():

@@ -110,7 +110,7 @@ def tabulate_capacities(parts: Mapping[str, ReportData]) -> list[Grid]:
     words = dict.fromkeys(_FACTORS[name] for name in _FACTORS if name in stated)
     factors = f". Factors are multiples of the demand: {'; '.join(words)}" * bool(words)
     head = (*["case"] * (len(parts) > 1), "", "demand", "capacity or outcome", "factor")
-    return [Grid(head, rows, f"Demand and capacity{factors}", "words")] if rows else []
+    return [Grid(head, rows, f"Demand and capacity{factors}", "words outcomes")] if rows else []
 
 
 def _mark_rows(data: ReportData) -> Iterator[tuple[str, ...]]:

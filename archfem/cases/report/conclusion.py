@@ -26,7 +26,6 @@ from archfem.cases.report.doubts import (
     list_notes,
     list_unvaried,
     peak_of_ground,
-    spans_run,
 )
 from archfem.cases.report.motion_rules import find_missed, find_rule, is_of_norm, name_norm
 from archfem.cases.report.outcomes import sentence
@@ -457,9 +456,9 @@ def _build_paragraphs(data: ReportData, doubtful: Sequence[str]) -> dict[str, li
         told = [each for each in stated if len(data.statements) == 1 or not each.rows]
         ordered = (sorted(x.sentences, key=lambda y: not is_of_norm(data, y)) for x in told)
         answer += chain.from_iterable(ordered)
-    answer += [*outcomes.describe_ends(data), *_describe_ranges(data)]
-    causes = ([*[x.where] * x.is_mixed, *x.what_changes] for x in data.verdict_ranges)
-    changes = [*outcomes.say_by_motion(data.verdict_ranges, causes)]
+    answer += outcomes.describe_ends(data)
+    said = {*margins.say_least_check(data)} if data.runs else set[str]()  # in the head
+    changes = list[str]()
     if not data.runs:  # the head has them beside runs
         changes += [text for study in data.own_studies for text in say_what_changes(study)]
     if fill := join_names(list_elastic_fill(data)):
@@ -476,23 +475,11 @@ def _build_paragraphs(data: ReportData, doubtful: Sequence[str]) -> dict[str, li
         changes.append(f"no motion was run, though [{given[0]}] is in the case")
     return {
         "What else was found?" if data.runs else "Result:": answer,
-        "By which margin?": [*dict.fromkeys(margins.describe_margin(data))],
+        "By which margin?": [
+            x for x in dict.fromkeys(margins.describe_margin(data)) if x not in said
+        ],
         "What would change the answer?": changes,
     }
-
-
-def _describe_ranges(data: ReportData) -> Iterator[str]:
-    """Yield how often the structure falls in variations, and how far it moves at most."""
-    ranges = data.verdict_ranges
-    for each in ranges:
-        motion, answers = each.dataset.attrs.get("motion"), each.answers["sampled"].values.any()
-        under = f"under '{motion}' it " if motion else "it "
-        groups = f"; by groups: {each.groups}" if len(ranges) == 1 else ""
-        yield f"{under}{each.count}{groups}{each.unanswered}" if answers else each.sentence
-    if moved := [each for each in ranges if each.displacements and spans_run(data, each)]:
-        far = max(moved, key=lambda x: np.nanmax(x.dataset["displacement"].values[~x.falls]))
-        most = f"it moves farthest under '{far.dataset.attrs.get('motion')}': " * (len(ranges) > 1)
-        yield f"{most}largest displacements are {far.displacement_ends}"
 
 
 def build_signatures(report: Mapping[str, str]) -> Grid:

@@ -41,6 +41,9 @@ HISTORIES, VARIATIONS = "time histories", "variations"
 # Result of cases beside the given one
 STUDIES = "study"
 
+# Stiffnesses of contacts that it varies, by its names
+_STIFFNESSES = {"k_n": "normal_stiffness", "k_s": "shear_stiffness"}
+
 # What `[verdict.vary]` varies, in the words of the conclusion
 _VARIED_PROPERTIES = "stiffness", "friction", "damping"
 
@@ -210,7 +213,17 @@ def list_ranges(data: ReportData, found: VerdictRange) -> list[tuple[str, str, s
             rows.append((property_text(name), words, mark))
             continue
         ends, unit = Ends.of(values), " × that of the case"
-        if name in found.dataset.attrs:
+        own = dict[str, list[float]]()  # of each contact, which may be of stones or of fill
+        for joint in data.case.structure.joints if name in found.dataset.attrs else ():
+            own.setdefault(joint.contact.name, []).append(
+                getattr(joint.contact, _STIFFNESSES[name]) / 1e9
+            )
+        if len(own) > 1:
+            spans = (
+                f"{k} {Ends((ends[0] * min(x), ends[1] * max(x))):.3g}" for k, x in own.items()
+            )
+            unit = f" × that of each joint: {'; '.join(spans)} MPa/mm"
+        elif name in found.dataset.attrs:
             given = found.dataset.attrs[name] / 1e9
             ends, unit = Ends(given * end for end in ends), " MPa/mm"
         unit = " added to that of the case" if name == "friction" else unit

@@ -174,7 +174,11 @@ def list_margins(
         for push in (x for x in read_numbers(PushFactors, data.statements[name]) if x.site):
             texts = [*describe_push(data, name, push)]
             least = np.inf if NO_MARGIN in texts[0] else push.least
-            yield least, False, texts[not data.runs or push.least < 1.0 :]
+            # the table has a plain factor, and the head what it has without runs
+            plain = push.proved is None and push.most == push.least
+            in_table = plain and not push.bounded and "pushover" in data.statements
+            said = not data.runs or push.least < 1.0 or (in_table and least < np.inf)
+            yield least, False, texts[said:]
     for least, words, _ in say_less(data):
         yield least, False, [words] * (bool(data.runs) and least >= 1.0)
 

@@ -151,7 +151,12 @@ def say_what_decides(ranges: Sequence[VerdictRange]) -> list[str]:
             most, own = (format_mm(found.measure(each)) for each in (changes[0], given))
             ends = f"{most} in place of {own}" + " at the end" * found.is_dislocation_worst
             return [f"of what was varied, {changes[0].name} displaces it most: {ends}"]
-    return said or ["no property that was varied decides" if ranges else "no property was varied"]
+    none = "no property that was varied decides" if ranges else "no property was varied"
+    unanswered = any(x.name == UNVARIED and x.rank < 0 for y in ranges for x in y.single_changes)
+    none = (
+        "which property decides is unknown, for the unvaried run has no answer" * unanswered or none
+    )
+    return said or [none]
 
 
 def _say_changed(found: VerdictRange) -> list[str]:

@@ -20,8 +20,8 @@ from archfem.view.pages.player import Player
 from archfem.view.pages.word import write_word
 from archfem.view.style import limit_width
 
-# Width of the figures that a report draws [mm]: two stand on a page, with type of 7 points and more
-FIGURE_WIDTH = 128.0
+# Width of the figures that a report draws [mm]: their captions stand beside them on paper
+FIGURE_WIDTH = 110.0
 
 
 def write_report(data: ReportData, path: str | Path, *others: ReportData) -> Path:

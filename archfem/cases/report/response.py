@@ -87,7 +87,8 @@ def _build_spectra(data: ReportData, motions: list[Motion]) -> list[Any]:
     if target is not None and not find_matched_band(own):
         caption += "; they were not matched to the target"
         caption += ", which is the spectrum of [assessment]" * (data.case.target is None)
-    return [FigureBlock.of(draw_suite(suite, target), caption)]
+    with limit_width(HALF_WIDTH):
+        return [FigureBlock.of(draw_suite(suite, target), caption)]
 
 
 def build_run_sections(data: ReportData) -> list[Section]:
@@ -130,7 +131,8 @@ def _build_envelopes(data: ReportData) -> list[FigureBlock]:
         worst = find_worst_run(data)
         others = [run for name, run in data.runs.items() if name != worst]
         runs = {worst: data.runs[worst], f"{len(others)} other motions": others}
-    figures = draw_envelopes(runs, data.dead)
+    with limit_width(HALF_WIDTH):
+        figures = draw_envelopes(runs, data.dead)
     for figure in figures:
         figure.suptitle("")  # which the head of the report says
     part = f"; part {{}} of {len(figures)} of the motions" if len(figures) > 1 else ""

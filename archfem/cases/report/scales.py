@@ -9,7 +9,6 @@ from archfem.cases.report.doubts import peak_of_ground
 from archfem.cases.report.report_data import ReportData
 from archfem.dynamics.collapse_state import COLLAPSE_STATES, FALLEN_STATES
 from archfem.dynamics.monitor import PULLED
-from archfem.dynamics.rigid_body.rocking_body import say_again
 from archfem.dynamics.scale_search import UNFINISHED
 from archfem.masonry.structure import join_words
 from archfem.units import Ends
@@ -118,11 +117,7 @@ def describe_scales(data: ReportData) -> Iterator[tuple[float, list[str]]]:
     words += f" on '{first.motion}', at a PGA of {_bound(first) * first.pga:.3g} g"
     words += ", beyond which it fails" * is_failed
     words += f", of {len(made)} motions" if made[1:] else ", under one motion"
-    falls = [x for x in searches if {"falls", "mechanism"} & x.states.keys()]
-    under = "under '{}' " * (len(searches) > 1)
-    # a crossing is not claimed
-    again = [f"{under.format(x.motion)}it {say_again(x.again)}" for x in falls if x.again]
-    texts = [words, "; ".join([_say_first_states(searches), *again]), *_say_as_one(searches)]
+    texts = [words, *_say_as_one(searches)]
     # a search without a scale that holds may have the least of all
     if none := [f"'{each.motion}'" for each in searches if not each.held]:
         texts.append(f"no scale is known up to which it stands under {join_words(none)}")
@@ -143,23 +138,6 @@ def _met(search: Scales) -> float:
 def _was(count: int) -> str:
     """Return the verb of some motions."""
     return "were" if count > 1 else "was"
-
-
-def _say_first_states(searches: list[Scales]) -> str:
-    """Say each state with its least scale of all motions, which are named if there are several."""
-    least = dict[str, Scales]()
-    for state in _STATES:
-        if found := [x for x in searches if state in x.states]:
-            least[state] = min(found, key=lambda x: (x.states[state], x.pga))
-    motions, texts = {each.motion for each in least.values()}, list[str]()
-    for state, each in least.items():
-        less = " or less" * (state == "moves" and each.moves_in_all)
-        of = f" '{each.motion}'" * (len(motions) > 1)
-        texts.append(f"{_STATES[state][0]} at {each.states[state]:#.3g} ×{of}{less}")
-    texts += ["falls at none"] * (not {"falls", "mechanism"} & least.keys())
-    alone = motions if len(searches) > 1 and len(motions) == 1 else ()
-    under = "".join(f" under '{motion}'" for motion in alone)
-    return f"of the scales that were run{under} it first {join_words(texts)}"
 
 
 def _bound(search: Scales) -> float:

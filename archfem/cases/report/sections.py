@@ -13,23 +13,31 @@ import xarray as xr
 
 from archfem._display import DOUBT_MARK, NOTE_MARK
 from archfem._files import read_listed
-from archfem.cases.answers import Ratios, read_numbers
+from archfem.cases.answers import RESULTS, Ratios, read_numbers
 from archfem.cases.case import REPORT_KEYS
 from archfem.cases.defaults import describe_margins_at_rest
 from archfem.cases.report import response
 from archfem.cases.report.capacities import tabulate_capacities
 from archfem.cases.report.conclusion import (
     HEAD,
+    MAX_DOUBTS,
     build_conclusion,
     build_signatures,
     describe_width,
     list_facts,
 )
-from archfem.cases.report.doubts import list_elastic_fill, list_ranges, list_varied, spans_run
+from archfem.cases.report.doubts import (
+    list_doubts,
+    list_elastic_fill,
+    list_ranges,
+    list_varied,
+    spans_run,
+)
 from archfem.cases.report.inputs import compare_inputs, describe_value, tabulate_inputs
 from archfem.cases.report.motion_rules import find_rule
 from archfem.cases.report.outcomes import sentence
 from archfem.cases.report.report_data import STATIC_RESULTS, ReportData
+from archfem.cases.report.scales import list_scales
 from archfem.cases.report.study_findings import (
     StudyFindings,
     list_studied,
@@ -42,7 +50,7 @@ from archfem.dynamics.collapse_state import DISLOCATION, FALLEN_STATES, shallowe
 from archfem.dynamics.history import SIGN_CONVENTION
 from archfem.dynamics.motion_scaling import NO_ANSWER
 from archfem.dynamics.recorder import library_versions
-from archfem.dynamics.verdict_range import COUNTED, VerdictRange
+from archfem.dynamics.verdict_range import COUNTED, VerdictRange, property_text
 from archfem.errors import InvalidInput
 from archfem.joints.criteria import assessed_joints
 from archfem.masonry.block import Block
@@ -80,6 +88,9 @@ MAX_WIDTH = 170.0  # of a figure of many panels [mm]
 
 _PLAYER_CAPTION = "The structure at the instant above it, the ground acceleration, and one joint."
 
+# Sections on references, and on programs and digests, of which several cases have one at the end
+METHODS, VERSIONS = "Norms and methods", "Versions and digests"
+
 # References of the methods, with the file of the result that was made by each
 _METHODS = (
     ("", "joints, criteria", "Demirel and Aldemir, Buildings 11 (2021)"),
@@ -108,7 +119,7 @@ def build_joint_sections(parts: Mapping[str, ReportData]) -> list[Section]:
         Section("Signatures and drawings", [build_signatures(report), *drawn]),
         Section("Inputs of all cases", compare_inputs(parts)),
     ]
-    known = dict[str, list[Section]]()
+    known, last = dict[str, list[Section]](), dict[str, dict[Sequence[str], list[str]]]()
     # in the head of all
     said = {HEAD[0], HEAD[-1], *(key.replace("_", " ") for key in REPORT_KEYS)}
     for label, data in parts.items():
@@ -116,9 +127,16 @@ def build_joint_sections(parts: Mapping[str, ReportData]) -> list[Section]:
         known[label] = build_sections(data)
         sections.append(Section(data.name, [Grid((), facts)]))
         for each in known[label]:
+            if each.title in (METHODS, VERSIONS):
+                for row in each.pieces[0].rows:
+                    last.setdefault(each.title, {}).setdefault(tuple(row), []).append(label)
+                continue
             first = next(other for other, own in known.items() if each in own)
             pieces = each.pieces if first == label else [TextBlock(f"As of case {first}.")]
             sections.append(replace(each, pieces=pieces, level=each.level + 1))
+    for title, rows in last.items():
+        of_all = [(f"{row[0]} ({join_words(own)})", *row[1:]) for row, own in rows.items()]
+        sections.append(Section(title, [Grid((), of_all)]))
     return sections
 
 
@@ -384,7 +402,9 @@ def _build_assessment(data: ReportData) -> list[Any]:
     """Build text and pictures of kinematic assessments from the files of the folder."""
     if (text := data.read_text("assessment.txt")) is None:
         return []
-    texts = text.split("\n\n")
+    # the conclusion has its notes
+    kept = [x for x in text.splitlines() if not x.startswith(NOTE_MARK)]
+    texts = "\n".join(kept).strip().split("\n\n")
     names = sorted(name for name in data.files if name.startswith("assessment_"))
     checks = read_numbers(Ratios, data.statements.get("assessment"))
     moved = {way for each in checks if not each.linear for way in each.directions}
@@ -438,8 +458,12 @@ def _define_assessment(data: ReportData, text: str, moves: bool) -> Grid:
 
 
 def _build_scale(data: ReportData) -> list[Any]:
-    """Build text and picture of each search of scales, without the table of its runs."""
-    built = list[Any]()
+    """Build text of each search of scales, and the picture of the least.
+
+    The capacities have its scales, and its doubts stand once below, with their motions.
+    """
+    built, drawn = list[Any](), list[tuple[float, Any]]()
+    held = {each.motion: each.held for each in list_scales(data)}
     for pair, place in data.list_parts("scale.txt").items():
         name, under = place.removesuffix(".txt"), f" under '{pair}'" if pair else ""
         caption = (
@@ -450,8 +474,13 @@ def _build_scale(data: ReportData) -> list[Any]:
         runs = data.read_text(f"{name}.csv") or ""
         answered = {row[3] for row in [*reader(runs.splitlines())][1:]} - {NO_ANSWER}
         shown = text.text.rpartition("\n\n")[0] if runs else text.text
-        built += [replace(text, text=shown), *figures * bool(answered)]
-    return built
+        lines = [x for x in shown.splitlines() if not x.startswith(DOUBT_MARK)]
+        built.append(replace(text, text="\n".join(lines)))
+        drawn += [(held.get(pair, 0.0), each) for each in figures * bool(answered)]
+    doubts = [doubt for result, doubt in list_doubts(data) if result == RESULTS["scale"]]
+    texts = [f"{DOUBT_MARK}{replace(doubt, remedy='')}" for doubt in doubts]
+    built += [TextBlock("\n".join(texts), "lines")] * (len(texts) > MAX_DOUBTS)
+    return [*built, *(figure for _, figure in sorted(drawn, key=lambda x: x[0])[:1])]
 
 
 def _build_study(data: ReportData, found: StudyFindings) -> list[Any]:
@@ -463,8 +492,9 @@ def _build_study(data: ReportData, found: StudyFindings) -> list[Any]:
             TextBlock(found.text, "lines", caption),
             FigureBlock.read(found.folder / "study.png", caption),
         ]
-    blocks: list[Any] = [TextBlock(sentence(text)) for text in say_what_changes(found)]
-    blocks.append(tabulate_study(found))
+    # the conclusion says it where there are no runs
+    said = say_what_changes(found) if data.runs or not found.is_own else ()
+    blocks: list[Any] = [*(TextBlock(sentence(text)) for text in said), tabulate_study(found)]
     limit, key = DISLOCATION * shallowest_part(data.case.structure)[0], "residual displacement"
     with suppress(InvalidInput), limit_width(MAX_WIDTH):  # no number differs
         figure = draw_findings(found.numbers, max_panels=4, limits={key: 1e3 * limit})
@@ -479,67 +509,95 @@ def _build_study(data: ReportData, found: StudyFindings) -> list[Any]:
 
 
 def _build_range(data: ReportData) -> list[Any]:
-    """Build text and pictures of ranges; where all stand, single changes say more than shares."""
-    caption = (
-        "Residual displacement over the properties that explain most of it, at most six; falls are "
-        "above a dashed line, and displacements below the axis at its lower end."
-    )
-    table = (
-        "{} by the value of each property: of k_n, k_s and damping ratio factors on the values of "
-        "the case, of friction what is added"
-    )
-    built, ranges, varied = list[Any](), iter(data.verdict_ranges), iter(_tabulate_varied(data))
+    """Build a paragraph on each range, tables with a column for each, and the worst's picture."""
+    built, found, ranges = list[Any](), dict[str, VerdictRange](), iter(data.verdict_ranges)
     for pair, place in data.list_parts("verdict_range.txt").items():
-        # the picture of a pair is named by it, since there may be several
-        named = f"Under '{pair}': {caption[:1].lower()}{caption[1:]}" if pair else caption
         # a command without an answer leaves its reason alone
-        found = next(ranges) if place.replace(".txt", ".nc") in data.files else None
-        changes = [] if found is None else _tabulate_single_changes(data, found, pair)
-        titled = table.format(COUNTED[found.counted if found else "falls"][0].capitalize())
-        blocks = data.read_result(place.removesuffix(".txt"), named, table=titled)
-        if found is not None and found.decisive.any():
-            text = blocks[0].text.removesuffix(found.table()).rstrip()
-            blocks[:1] = [TextBlock(text, "lines"), Grid(*found.tabulate(), titled, "words")]
-        elif found is not None:
-            told = filter(None, [found.sentence, found.displacements * spans_run(data, found)])
-            blocks[: 2 if changes else 1] = [TextBlock(sentence("; ".join(told)))]
-        if found is not None:
-            blocks[1:1] = next(varied)
-        built += [*blocks, *changes]
-    return built
+        if place.replace(".txt", ".nc") not in data.files:
+            built += data.read_result(place.removesuffix(".txt"))
+            continue
+        found[pair] = each = next(ranges)
+        moved = each.displacements * spans_run(data, each)
+        told = filter(None, [each.sentence, moved, *each.what_changes])
+        built.append(TextBlock(sentence("; ".join(told))))
+    if not found:
+        return built
+    # what falls or is dislocated most is the worst
+    order = sorted(found, key=lambda x: (-found[x].falls.sum(), -found[x].dislocated.sum()))
+    found = {pair: found[pair] for pair in order}
+    count = found[order[0]].dataset["sampled"].values.sum()
+    varied = {k: {x: f"{y} ({m})" for x, y, m in list_ranges(data, v)} for k, v in found.items()}
+    built += _set_abreast(varied, "property", f"Varied properties; {count} samples, and each alone")
+    changes = _tabulate_single_changes(data, found)
+    if any(each.decisive.any() for each in found.values()):
+        built += _tabulate_counts(found)
+    elif changes:  # where all stand, these say more than shares
+        return [*built, *changes]
+    under = f" under '{order[0]}'" * bool(order[0])
+    caption = (
+        f"Residual displacement{under} over the properties that explain most of it, at most six; "
+        "falls are above a dashed line, and displacements below the axis at its lower end"
+    )
+    others = join_words([f"'{pair}'" for pair in order[1:]])
+    caption += f". Those of {others} are in the folder of the results" * bool(others)
+    name = data.list_parts("verdict_range.txt")[order[0]].replace(".txt", ".png")
+    return [*built, *changes, *data.read_figure(name, f"{caption}.")]
 
 
-def _tabulate_varied(data: ReportData) -> list[list[Grid]]:
-    """Tabulate the varied properties of each motion, with the first alone where all are alike."""
-    head, tables = ("property", "varied over", "mark"), list[Grid]()
-    for found in data.verdict_ranges:
-        count = found.dataset["sampled"].values.sum()
-        caption = f"Varied properties; {count} samples, and each alone"
-        tables.append(Grid(head, list_ranges(data, found), caption, "words"))
-    if len(tables) < 2 or any(each != tables[0] for each in tables):
-        return [[each] for each in tables]
-    caption = f"{tables[0].caption}, under each of {len(tables)} motions"
-    return [[replace(tables[0], caption=caption)], *[list[Grid]() for _ in tables[1:]]]
+def _set_abreast(cells: Mapping[str, Mapping[str, str]], head: str, caption: str) -> list[Grid]:
+    """Tabulate texts by row, with a column for each motion, or one for all that are alike."""
+    alike = len(cells) > 1 and len({tuple(own.items()) for own in cells.values()}) == 1
+    caption += f", under each of {len(cells)} motions" * alike
+    columns = dict([*cells.items()][:1]) if alike else cells
+    names = dict.fromkeys(name for own in columns.values() for name in own)
+    rows = [(name, *(own.get(name, "-") for own in columns.values())) for name in names]
+    titles = (f"'{pair}'" * (len(columns) > 1) for pair in columns)
+    return [Grid((head, *titles), rows, caption, "words")] if rows else []
 
 
-def _tabulate_single_changes(data: ReportData, found: VerdictRange, pair: str) -> list[Grid]:
-    """Tabulate the runs in which one property differs, the worst first."""
-    if not found.what_changes:
-        return []
-    caption = "Single changes" + f" under '{pair}'" * bool(pair)
-    if found.is_dislocation_worst:
+def _tabulate_counts(found: Mapping[str, VerdictRange]) -> list[Grid]:
+    """Tabulate how many runs fall or are dislocated by the value of each property."""
+    tables = {pair: each.tabulate()[1] for pair, each in found.items()}
+    cells = {k: {x: ": ".join(own) for x, *own in rows} for k, rows in tables.items()}
+    telling = {property_text(x) for each in found.values() for x in each.beyond_chance}
+    counted = dict.fromkeys(COUNTED[each.counted][0] for each in found.values())
+    caption = (
+        f"{join_words([*counted]).capitalize()} by the value of each property: of k_n, k_s and "
+        "damping ratio factors on the values of the case, of friction what is added"
+    )
+    if telling:
+        caption += ". Before it stands the share of the variance of the outcome that it explains"
+        if others := [x for x in next(iter(cells.values())) if x not in telling]:
+            caption += f"; {join_words(others)} explain no more than chance"
+        cells = {k: {x: own[x] for x in own if x in telling} for k, own in cells.items()}
+    return _set_abreast(cells, "property", caption)
+
+
+def _tabulate_single_changes(data: ReportData, found: Mapping[str, VerdictRange]) -> list[Grid]:
+    """Tabulate the runs in which one property differs, the worst of the first motion first."""
+    shown = {pair: each for pair, each in found.items() if each.what_changes}
+    caption = (
+        "Single changes, the worst first: outcome, if it does not stand, largest displacement, and "
+        "that at the end"
+    )
+    if any(each.is_dislocation_worst for each in shown.values()):
         limit = DISLOCATION * shallowest_part(data.case.structure)[0]
-        caption += f", by the displacement at the end; beyond {format_mm(limit)} it is dislocated"
-    steps = f"; other time steps alone may change displacements {found.step_ratio:.2g} times"
-    steps *= not found.is_quiet
-    head = ("single change", "outcome", "largest displacement", "at the end")
-    rows = [
-        # of a fall it is the way to the ground
-        (each.name, each.outcome, *["-" if each.outcome in FALLEN_STATES else x for x in ends])
-        for each in found.single_changes
-        for ends in [map(format_mm, (each.displacement, each.residual))]
-    ]
-    return [Grid(head, rows, f"{caption}; the worst first{steps}")]
+        caption += f"; beyond {format_mm(limit)} at the end it is dislocated"
+    ratios = [each.step_ratio for each in shown.values() if not each.is_quiet]
+    if ratios:
+        caption += f"; other time steps alone may change displacements {max(ratios):.2g} times"
+    cells = {
+        pair: {
+            # of a fall it is the way to the ground
+            x.name: x.outcome
+            if x.outcome in FALLEN_STATES
+            else f"{x.outcome}, ".removeprefix("stands, ")
+            + f"{format_mm(x.displacement)}, {format_mm(x.residual)}"
+            for x in each.single_changes
+        }
+        for pair, each in shown.items()
+    }
+    return _set_abreast(cells, "single change", caption)
 
 
 def build_method_section(data: ReportData) -> Section:
@@ -556,7 +614,8 @@ def build_method_section(data: ReportData) -> Section:
     if find_rule(data) is SELECTION_RULES["EC8"]:
         without = {"assessment": "; EN 1998-1 itself has no such check"}
         used = [(name, text + without.get(name, "")) for name, text in used]
-    return Section("Norms and methods", [Grid((), [*norm, *spectra, *used])])
+    methods = [("methods", "; ".join(f"{name}: {text}" for name, text in used))]
+    return Section(METHODS, [Grid((), [*norm, *spectra, *methods])])
 
 
 def build_source_section(data: ReportData) -> Section:
@@ -573,4 +632,4 @@ def build_source_section(data: ReportData) -> Section:
     rows.append(("SHA-256 of the case", sha256(data.case.text().encode()).hexdigest()))
     place = "case.toml in the folder of the results"
     rows.append(("the case as a file", place if data.folder else "attribute 'case' of the history"))
-    return Section("Versions and digests", [Grid((), rows)])
+    return Section(VERSIONS, [Grid((), rows)])

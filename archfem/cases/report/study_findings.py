@@ -27,7 +27,7 @@ from archfem.view.pages.document import Grid
 OVER_SITE = "over the site's acceleration"
 _FACTORS = (
     *("least_margin", "least_push", "push", OVER_SITE),
-    *("factor", "without_pressure", "without_backing", "without_either"),
+    *("factor", "without_pressure", "full_pressure", "without_backing", "without_either"),
 )
 _SIZES = ("largest_displacement", "residual_displacement")
 MAX_CASES = 24

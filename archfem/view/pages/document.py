@@ -3,7 +3,7 @@
 from abc import ABC, abstractmethod
 from base64 import b64decode, b64encode
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from html import escape
 from io import BytesIO
@@ -70,7 +70,8 @@ class FigureBlock:
     source: str  # the picture as a data URI
     caption: str  # below the figure
     inches: float  # width of the figure; it shrinks with a narrower page
-    figure: Figure | None = None  # that was drawn, not read from a file
+    # that was drawn, not read from a file; equal pictures have equal sources
+    figure: Figure | None = field(default=None, compare=False)
     beside: bool = False  # whether another one stands beside it
 
     kind = "plate"
