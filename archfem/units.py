@@ -236,6 +236,16 @@ def _refuse_mass(quantity: Any, unit: str, words: str) -> None:
         raise InvalidInput(f"{words} is {noun}: give its weight, times g: '{weight}'")
 
 
+def _check_unit(registry: Any, unit: str, key: str) -> None:
+    """Refuse a unit of the result that the registry does not know."""
+    try:
+        registry.Unit(unit)
+    except Exception as error:  # also of pint's tokenizer
+        raise InvalidInput(
+            f"{unit!r}, into which {key} is converted, is no unit: {error}"
+        ) from error
+
+
 def _convert(text: str, unit: str, key: str) -> float:
     """Convert a quantity in text to a unit."""
     import pint
@@ -245,12 +255,7 @@ def _convert(text: str, unit: str, key: str) -> float:
     registry = _registry()
     number, name = _split_quantity(text, unit, key)
     target = "dimensionless" if unit == "1" else unit
-    try:
-        registry.Unit(target)
-    except Exception as error:  # also of pint's tokenizer
-        raise InvalidInput(
-            f"{unit!r}, into which {key} is converted, is no unit: {error}"
-        ) from error
+    _check_unit(registry, target, key)
     name = re.sub(r"\b([A-Za-z]+)([23])\b", r"\1**\2", name)  # as in kN/m3
     if unit == "m/s**2":  # here g is gravity and gal the unit of Galileo, not gram and gallon
         name = re.sub(r"\bg\b", "g_0", re.sub(r"\bgal\b", "Gal", name))

@@ -212,7 +212,7 @@ class CollapseScale:
         stood = sorted({scale for scale, _ in self._list_held()})
         # from that share of the smallest fall on the search has filled them
         top = min(self.first_falls[0], max((run.scale for run in self._runs), default=inf))
-        gaps = [gap for gap in pairwise(stood) if gap[1] > FILLED_SHARE * top]
+        gaps = [gap for gap in pairwise(stood) if gap[1] >= FILLED_SHARE * top]
         if not gaps:
             return ""
         ratio = max(high / low for low, high in gaps)
@@ -473,10 +473,15 @@ def _search_steps(
     return searches
 
 
-def _choose_shorter(doubt: Doubt) -> Doubt:
-    """Return a doubt of a run whose time step the search has chosen, and no case gives."""
-    remedy = doubt.remedy.replace(LEAVE_OUT, "give shorter ones by analysis.dt")
-    return replace(doubt, remedy=remedy.removesuffix(OR_LEAVE_OUT))
+def _choose_shorter(run: ScaledRun, is_chosen: bool) -> ScaledRun:
+    """Return a run with remedies that give another step, if the search has chosen its own."""
+    if not is_chosen:
+        return run
+    given = (
+        (x, x.remedy.replace(LEAVE_OUT, "give shorter ones by analysis.dt")) for x in run.doubts
+    )
+    doubts = (replace(x, remedy=remedy.removesuffix(OR_LEAVE_OUT)) for x, remedy in given)
+    return replace(run, doubts=tuple(doubts))
 
 
 def _admissible_step(searches: Mapping[float, MechanismScales]) -> float:
@@ -568,9 +573,8 @@ def collapse_scale(
         met, follows = run.mechanisms, run.dataset.attrs.get("admissible_step", inf)
         # one too small to matter does not move the structure
         met = {name: found and found.decisive for name, found in met.items()}
-        doubts = tuple(map(_choose_shorter, run.doubts)) if shortens else run.doubts
-        ended = run.ending, run.outcome, run.fall, doubts, follows, whole
-        known[key] = ScaledRun(scale, met, *ended)
+        ended = run.ending, run.outcome, run.fall, run.doubts, follows, whole
+        known[key] = _choose_shorter(ScaledRun(scale, met, *ended), shortens)
         return known[key]
 
     limits, limit = admissible_range(between, motion), (COLLAPSE_DEFINITION,)

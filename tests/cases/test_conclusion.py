@@ -24,6 +24,7 @@ from archfem.cases.report import (
     margins,
     outcomes,
     report_data,
+    response,
     sections,
 )
 from archfem.cases.report.outcomes import sentence
@@ -1177,7 +1178,7 @@ def test_single_changes_are_tabulated_the_worst_first(case):
     found.dataset["sign"] = "run", np.array(["as given", "as given", "reversed"])
     found.dataset.attrs["properties"] = ["dt", "sign"]
     found.dataset["outcome"] = "run", np.array(["stands", "stands", "fallen"])
-    (table,) = sections._tabulate_single_changes(data_of(case), {"a": found})
+    (table,) = response._tabulate_single_changes(data_of(case), {"a": found})
     assert table.rows == [
         ("motion reversed", "fallen"),
         ("half the time step", "120 mm, 0 mm"),
@@ -1192,14 +1193,14 @@ def test_single_changes_are_tabulated_the_worst_first(case):
     both = {"a": found, "b": range_of(0.03, 0.02, motion="b")}
     both["b"].dataset["sampled"][:] = False
     both["b"].dataset["dt"][1] = "half"
-    (table,) = sections._tabulate_single_changes(data_of(case), both)
+    (table,) = response._tabulate_single_changes(data_of(case), both)
     assert table.head == ("single change", "'a'", "'b'")
     assert table.rows[0] == ("motion reversed", "dislocated, 9000 mm, 60 mm", "-")
     assert table.rows[1] == ("half the time step", "120 mm, 30 mm", "20 mm, 0 mm")
     # a tenth of the column's breadth
     assert "at the end; beyond 50 mm at the end it is dislocated" in table.caption
     varied = range_of(0.1, sampled=True)
-    assert sections._tabulate_single_changes(data_of(case), {"": varied}) == []
+    assert response._tabulate_single_changes(data_of(case), {"": varied}) == []
 
 
 @pytest.mark.parametrize(

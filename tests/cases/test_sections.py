@@ -156,10 +156,10 @@ def test_falls_by_property_are_a_table_whose_cells_wrap(piers, tmp_path):
     case = SimpleNamespace(structure=piers, suite=None, settings=settings)
     data = report_data.ReportData(case, {})
     vars(data).update(files={path.name: path, "verdict_range.nc": path}, verdict_ranges=(found,))
-    text, varied, table = sections._build_range(data)[:3]
+    text, varied, table = response.build_range(data)[:3]
     assert varied.rows == [("k_n", "0.6 to 6 MPa/mm (default)")]  # of 2 MPa/mm
     settings["verdict"] = {"vary": {"k_n": [0.3, 3.0]}}
-    assert sections._build_range(data)[1].rows == [("k_n", "0.6 to 6 MPa/mm (given)")]
+    assert response.build_range(data)[1].rows == [("k_n", "0.6 to 6 MPa/mm (given)")]
     assert found.sentence in f"f{text.text[1:]}"
     assert "explains" not in text.text
     assert table.caption.startswith("Falls by the value of each property")
@@ -195,7 +195,7 @@ def test_properties_that_all_motions_vary_alike_are_one_table(piers, tmp_path, g
     case = SimpleNamespace(structure=piers, suite={"pairs": {"a": {}, "b": {}}}, settings={})
     data = report_data.ReportData(case, {})
     vars(data).update(files=files, verdict_ranges=tuple(made))
-    grids = [x for x in sections._build_range(data) if x.kind == "grid"]
+    grids = [x for x in response.build_range(data) if x.kind == "grid"]
     varied = [x.caption for x in grids if x.caption.startswith("Varied properties")]
     assert len(varied) == 1
     assert varied[0].endswith("each alone, under each of 2 motions" if tables == 1 else "alone")
@@ -205,7 +205,7 @@ def test_properties_that_all_motions_vary_alike_are_one_table(piers, tmp_path, g
     ratio = "other time steps alone may change displacements 1.5 times"
     assert (ratio in single.caption) is not given
     vars(data)["verdict_ranges"] = (made[0],) * 2
-    assert not any(ratio in x.caption for x in sections._build_range(data) if x.kind == "grid")
+    assert not any(ratio in x.caption for x in response.build_range(data) if x.kind == "grid")
 
 
 @pytest.mark.parametrize(

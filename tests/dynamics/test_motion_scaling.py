@@ -579,7 +579,9 @@ def test_scales_are_as_close_from_half_of_the_smallest_fall_on_as_the_pages_say(
 
 @pytest.mark.parametrize("words", [LEAVE_OUT, f"take 1 ms or less{OR_LEAVE_OUT}"])
 def test_a_search_that_chose_its_steps_does_not_advise_to_leave_them_out(words):
-    doubt = motion_scaling._choose_shorter(af.models.model.Doubt("steps are long", words))
+    run = replace(fallen(1.0).runs[0], doubts=(Doubt("steps are long", words),))
+    (doubt,) = motion_scaling._choose_shorter(run, True).doubts
+    assert motion_scaling._choose_shorter(run, False) is run
     assert "dt out" not in doubt.remedy
     assert doubt.remedy in ("give shorter ones by analysis.dt", "take 1 ms or less")
 

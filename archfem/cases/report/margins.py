@@ -174,7 +174,7 @@ def list_margins(
         for push in (x for x in read_numbers(PushFactors, data.statements[name]) if x.site):
             texts = [*describe_push(data, name, push)]
             least = np.inf if NO_MARGIN in texts[0] else push.least
-            # the table has a plain factor, and the head what it has without runs
+            # the table has a plain factor, and the head any without runs
             plain = push.proved is None and push.most == push.least
             in_table = plain and not push.bounded and "pushover" in data.statements
             said = not data.runs or push.least < 1.0 or (in_table and least < np.inf)

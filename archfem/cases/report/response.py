@@ -1,4 +1,4 @@
-"""Sections of a report on ground motions, on the response of each run, and on its checks."""
+"""Sections of a report on ground motions, responses of runs, their ranges, and checks."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -10,18 +10,20 @@ import xarray as xr
 from archfem.cases import result_text
 from archfem.cases.case import Case
 from archfem.cases.motion_keys import find_matched_band
+from archfem.cases.report.doubts import list_ranges, spans_run
 from archfem.cases.report.motion_rules import find_target, tabulate_checks
 from archfem.cases.report.outcomes import describe_lost, find_worst_run, list_lost, sentence
 from archfem.cases.report.report_data import ReportData, build_player
-from archfem.dynamics.collapse_state import FALLEN_STATES
+from archfem.dynamics.collapse_state import DISLOCATION, FALLEN_STATES, shallowest_part
 from archfem.dynamics.history import History
+from archfem.dynamics.verdict_range import COUNTED, VerdictRange, property_text
 from archfem.masonry.joint_closing import describe_closing
 from archfem.masonry.structure import Structure, join_words
 from archfem.models.model import group_doubts, merge_doubts
 from archfem.motion.motion import Motion
 from archfem.motion.suite import Suite
 from archfem.statics.stress import utilisation_text
-from archfem.units import STANDARD_GRAVITY
+from archfem.units import STANDARD_GRAVITY, format_mm
 from archfem.view.collapse import draw_fall
 from archfem.view.histories import draw_envelopes
 from archfem.view.motions import draw_motion, draw_spectra, draw_suite
@@ -87,8 +89,7 @@ def _build_spectra(data: ReportData, motions: list[Motion]) -> list[Any]:
     if target is not None and not find_matched_band(own):
         caption += "; they were not matched to the target"
         caption += ", which is the spectrum of [assessment]" * (data.case.target is None)
-    with limit_width(HALF_WIDTH):
-        return [FigureBlock.of(draw_suite(suite, target), caption)]
+    return [FigureBlock.of(draw_suite(suite, target), caption)]
 
 
 def build_run_sections(data: ReportData) -> list[Section]:
@@ -131,8 +132,7 @@ def _build_envelopes(data: ReportData) -> list[FigureBlock]:
         worst = find_worst_run(data)
         others = [run for name, run in data.runs.items() if name != worst]
         runs = {worst: data.runs[worst], f"{len(others)} other motions": others}
-    with limit_width(HALF_WIDTH):
-        figures = draw_envelopes(runs, data.dead)
+    figures = draw_envelopes(runs, data.dead)
     for figure in figures:
         figure.suptitle("")  # which the head of the report says
     part = f"; part {{}} of {len(figures)} of the motions" if len(figures) > 1 else ""
@@ -244,6 +244,98 @@ def _build_suite_response(data: ReportData) -> list[Any]:
     if doubts:
         tables.append(Grid(("in doubt", "runs"), doubts, "Doubts of the runs", "words"))
     return [*tables, *_build_envelopes(data)]
+
+
+def build_range(data: ReportData) -> list[Any]:
+    """Build a paragraph on each range, tables with a column for each, and the worst's picture."""
+    built, found, ranges = list[Any](), dict[str, VerdictRange](), iter(data.verdict_ranges)
+    for pair, place in data.list_parts("verdict_range.txt").items():
+        # a command without an answer leaves its reason alone
+        if place.replace(".txt", ".nc") not in data.files:
+            built += data.read_result(place.removesuffix(".txt"))
+            continue
+        found[pair] = each = next(ranges)
+        moved = each.displacements * spans_run(data, each)
+        told = filter(None, [each.sentence, moved, *each.what_changes])
+        built.append(TextBlock(sentence("; ".join(told))))
+    if not found:
+        return built
+    # what falls or is dislocated most is the worst
+    order = sorted(found, key=lambda x: (-found[x].falls.sum(), -found[x].dislocated.sum()))
+    found = {pair: found[pair] for pair in order}
+    count = found[order[0]].dataset["sampled"].values.sum()
+    varied = {k: {x: f"{y} ({m})" for x, y, m in list_ranges(data, v)} for k, v in found.items()}
+    built += _set_abreast(varied, "property", f"Varied properties; {count} samples, and each alone")
+    changes = _tabulate_single_changes(data, found)
+    if any(each.decisive.any() for each in found.values()):
+        built += _tabulate_counts(found)
+    elif changes:  # where all stand, these say more than shares
+        return [*built, *changes]
+    under = f" under '{order[0]}'" * bool(order[0])
+    caption = (
+        f"Residual displacement{under} over the properties that explain most of it, at most six; "
+        "falls are above a dashed line, and displacements below the axis at its lower end"
+    )
+    others = join_words([f"'{pair}'" for pair in order[1:]])
+    caption += f". Those of {others} are in the folder of the results" * bool(others)
+    name = data.list_parts("verdict_range.txt")[order[0]].replace(".txt", ".png")
+    return [*built, *changes, *data.read_figure(name, f"{caption}.")]
+
+
+def _set_abreast(cells: Mapping[str, Mapping[str, str]], head: str, caption: str) -> list[Grid]:
+    """Tabulate texts by row, with a column for each motion, or one for all that are alike."""
+    alike = len(cells) > 1 and len({tuple(own.items()) for own in cells.values()}) == 1
+    caption += f", under each of {len(cells)} motions" * alike
+    columns = dict([*cells.items()][:1]) if alike else cells
+    names = dict.fromkeys(name for own in columns.values() for name in own)
+    rows = [(name, *(own.get(name, "-") for own in columns.values())) for name in names]
+    titles = (f"'{pair}'" * (len(columns) > 1) for pair in columns)
+    return [Grid((head, *titles), rows, caption, "words")] if rows else []
+
+
+def _tabulate_counts(found: Mapping[str, VerdictRange]) -> list[Grid]:
+    """Tabulate how many runs fall or are dislocated by the value of each property."""
+    tables = {pair: each.tabulate()[1] for pair, each in found.items()}
+    cells = {k: {x: ": ".join(own) for x, *own in rows} for k, rows in tables.items()}
+    telling = {property_text(x) for each in found.values() for x in each.beyond_chance}
+    counted = dict.fromkeys(COUNTED[each.counted][0] for each in found.values())
+    caption = (
+        f"{join_words([*counted]).capitalize()} by the value of each property: of k_n, k_s and "
+        "damping ratio factors on the values of the case, of friction what is added"
+    )
+    if telling:
+        caption += ". Before it stands the share of the variance of the outcome that it explains"
+        if others := [x for x in next(iter(cells.values())) if x not in telling]:
+            caption += f"; {join_words(others)} explain no more than chance"
+        cells = {k: {x: own[x] for x in own if x in telling} for k, own in cells.items()}
+    return _set_abreast(cells, "property", caption)
+
+
+def _tabulate_single_changes(data: ReportData, found: Mapping[str, VerdictRange]) -> list[Grid]:
+    """Tabulate the runs in which one property differs, the worst of the first motion first."""
+    shown = {pair: each for pair, each in found.items() if each.what_changes}
+    caption = (
+        "Single changes, the worst first: outcome, if it does not stand, largest displacement, and "
+        "that at the end"
+    )
+    if any(each.is_dislocation_worst for each in shown.values()):
+        limit = DISLOCATION * shallowest_part(data.case.structure)[0]
+        caption += f"; beyond {format_mm(limit)} at the end it is dislocated"
+    ratios = [each.step_ratio for each in shown.values() if not each.is_quiet]
+    if ratios:
+        caption += f"; other time steps alone may change displacements {max(ratios):.2g} times"
+    cells = {
+        pair: {
+            # of a fall it is the way to the ground
+            x.name: x.outcome
+            if x.outcome in FALLEN_STATES
+            else f"{x.outcome}, ".removeprefix("stands, ")
+            + f"{format_mm(x.displacement)}, {format_mm(x.residual)}"
+            for x in each.single_changes
+        }
+        for pair, each in shown.items()
+    }
+    return _set_abreast(cells, "single change", caption)
 
 
 def build_check_section(data: ReportData) -> Section:

@@ -29,9 +29,7 @@ from archfem.cases.report.conclusion import (
 from archfem.cases.report.doubts import (
     list_doubts,
     list_elastic_fill,
-    list_ranges,
     list_varied,
-    spans_run,
 )
 from archfem.cases.report.inputs import compare_inputs, describe_value, tabulate_inputs
 from archfem.cases.report.motion_rules import find_rule
@@ -46,11 +44,10 @@ from archfem.cases.report.study_findings import (
 )
 from archfem.cases.result_text import UPPER_BOUNDS
 from archfem.cases.run import DRAWING_FILE
-from archfem.dynamics.collapse_state import DISLOCATION, FALLEN_STATES, shallowest_part
+from archfem.dynamics.collapse_state import DISLOCATION, shallowest_part
 from archfem.dynamics.history import SIGN_CONVENTION
 from archfem.dynamics.motion_scaling import NO_ANSWER
 from archfem.dynamics.recorder import library_versions
-from archfem.dynamics.verdict_range import COUNTED, VerdictRange, property_text
 from archfem.errors import InvalidInput
 from archfem.joints.criteria import assessed_joints
 from archfem.masonry.block import Block
@@ -151,7 +148,7 @@ def build_sections(data: ReportData) -> list[Section]:
         response.build_ground_section(data),
         *response.build_run_sections(data),
         Section("Scale of the motion", _build_scale(data)),
-        Section("Range over uncertain properties", _build_range(data)),
+        Section("Range over uncertain properties", response.build_range(data)),
         Section("Annual rate of collapse", data.read_result("risk", *_RISK_CAPTIONS)),
         Section("Study of many cases", studies),
         response.build_check_section(data),
@@ -504,100 +501,8 @@ def _build_study(data: ReportData, found: StudyFindings) -> list[Any]:
         bounds = np.any(found.table.get(UPPER_BOUNDS, "") != "")
         caption += "; open marks are upper bounds" * bool(bounds)
         blocks.append(FigureBlock.of(figure, sentence(caption)))
-    doubts = (f"{DOUBT_MARK}{replace(doubt, remedy='')}" for doubt in found.doubts)
-    return [*blocks, *(TextBlock(text, "lines") for text in doubts)]
-
-
-def _build_range(data: ReportData) -> list[Any]:
-    """Build a paragraph on each range, tables with a column for each, and the worst's picture."""
-    built, found, ranges = list[Any](), dict[str, VerdictRange](), iter(data.verdict_ranges)
-    for pair, place in data.list_parts("verdict_range.txt").items():
-        # a command without an answer leaves its reason alone
-        if place.replace(".txt", ".nc") not in data.files:
-            built += data.read_result(place.removesuffix(".txt"))
-            continue
-        found[pair] = each = next(ranges)
-        moved = each.displacements * spans_run(data, each)
-        told = filter(None, [each.sentence, moved, *each.what_changes])
-        built.append(TextBlock(sentence("; ".join(told))))
-    if not found:
-        return built
-    # what falls or is dislocated most is the worst
-    order = sorted(found, key=lambda x: (-found[x].falls.sum(), -found[x].dislocated.sum()))
-    found = {pair: found[pair] for pair in order}
-    count = found[order[0]].dataset["sampled"].values.sum()
-    varied = {k: {x: f"{y} ({m})" for x, y, m in list_ranges(data, v)} for k, v in found.items()}
-    built += _set_abreast(varied, "property", f"Varied properties; {count} samples, and each alone")
-    changes = _tabulate_single_changes(data, found)
-    if any(each.decisive.any() for each in found.values()):
-        built += _tabulate_counts(found)
-    elif changes:  # where all stand, these say more than shares
-        return [*built, *changes]
-    under = f" under '{order[0]}'" * bool(order[0])
-    caption = (
-        f"Residual displacement{under} over the properties that explain most of it, at most six; "
-        "falls are above a dashed line, and displacements below the axis at its lower end"
-    )
-    others = join_words([f"'{pair}'" for pair in order[1:]])
-    caption += f". Those of {others} are in the folder of the results" * bool(others)
-    name = data.list_parts("verdict_range.txt")[order[0]].replace(".txt", ".png")
-    return [*built, *changes, *data.read_figure(name, f"{caption}.")]
-
-
-def _set_abreast(cells: Mapping[str, Mapping[str, str]], head: str, caption: str) -> list[Grid]:
-    """Tabulate texts by row, with a column for each motion, or one for all that are alike."""
-    alike = len(cells) > 1 and len({tuple(own.items()) for own in cells.values()}) == 1
-    caption += f", under each of {len(cells)} motions" * alike
-    columns = dict([*cells.items()][:1]) if alike else cells
-    names = dict.fromkeys(name for own in columns.values() for name in own)
-    rows = [(name, *(own.get(name, "-") for own in columns.values())) for name in names]
-    titles = (f"'{pair}'" * (len(columns) > 1) for pair in columns)
-    return [Grid((head, *titles), rows, caption, "words")] if rows else []
-
-
-def _tabulate_counts(found: Mapping[str, VerdictRange]) -> list[Grid]:
-    """Tabulate how many runs fall or are dislocated by the value of each property."""
-    tables = {pair: each.tabulate()[1] for pair, each in found.items()}
-    cells = {k: {x: ": ".join(own) for x, *own in rows} for k, rows in tables.items()}
-    telling = {property_text(x) for each in found.values() for x in each.beyond_chance}
-    counted = dict.fromkeys(COUNTED[each.counted][0] for each in found.values())
-    caption = (
-        f"{join_words([*counted]).capitalize()} by the value of each property: of k_n, k_s and "
-        "damping ratio factors on the values of the case, of friction what is added"
-    )
-    if telling:
-        caption += ". Before it stands the share of the variance of the outcome that it explains"
-        if others := [x for x in next(iter(cells.values())) if x not in telling]:
-            caption += f"; {join_words(others)} explain no more than chance"
-        cells = {k: {x: own[x] for x in own if x in telling} for k, own in cells.items()}
-    return _set_abreast(cells, "property", caption)
-
-
-def _tabulate_single_changes(data: ReportData, found: Mapping[str, VerdictRange]) -> list[Grid]:
-    """Tabulate the runs in which one property differs, the worst of the first motion first."""
-    shown = {pair: each for pair, each in found.items() if each.what_changes}
-    caption = (
-        "Single changes, the worst first: outcome, if it does not stand, largest displacement, and "
-        "that at the end"
-    )
-    if any(each.is_dislocation_worst for each in shown.values()):
-        limit = DISLOCATION * shallowest_part(data.case.structure)[0]
-        caption += f"; beyond {format_mm(limit)} at the end it is dislocated"
-    ratios = [each.step_ratio for each in shown.values() if not each.is_quiet]
-    if ratios:
-        caption += f"; other time steps alone may change displacements {max(ratios):.2g} times"
-    cells = {
-        pair: {
-            # of a fall it is the way to the ground
-            x.name: x.outcome
-            if x.outcome in FALLEN_STATES
-            else f"{x.outcome}, ".removeprefix("stands, ")
-            + f"{format_mm(x.displacement)}, {format_mm(x.residual)}"
-            for x in each.single_changes
-        }
-        for pair, each in shown.items()
-    }
-    return _set_abreast(cells, "single change", caption)
+    doubts = [f"{DOUBT_MARK}{replace(doubt, remedy='')}" for doubt in found.doubts]
+    return [*blocks, *[TextBlock("\n".join(doubts), "lines")] * bool(doubts)]
 
 
 def build_method_section(data: ReportData) -> Section:
