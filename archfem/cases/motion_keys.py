@@ -75,7 +75,8 @@ def build_motion(settings: Table, folder: Path = Path(), section: str = "motion"
         if abs(vertical.dt - motion.dt) > 1e-6 * motion.dt:  # equal but for round-off
             raise InvalidInput(
                 f"{section}: the vertical has a step of {vertical.dt:g} s, the horizontal of "
-                f'{motion.dt:g} s: bring both to one with {section}.resample = "{motion.dt:g} s"'
+                f"{motion.dt:g} s: bring both to the shorter with {section}.resample = "
+                f'"{min(vertical.dt, motion.dt):g} s"'
             )
         motion = motion.with_vertical(vertical)
     # Times of the case are those of the resampled motion, before it is reversed.

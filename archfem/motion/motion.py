@@ -317,7 +317,11 @@ class Motion(ResultDisplay):
         return self.cut(*window)
 
     def resampled(self, dt: float) -> "Motion":
-        """Return the motion sampled anew by straight lines, with all its peaks and no filter.
+        """Return the motion sampled anew, with its largest peaks and its ground displacement.
+
+        Of synthetic motions sampled up to four times more coarsely spectra change by 2 % at most
+        from periods of eight new steps on, and by up to 15 % at shorter ones; of white noise,
+        sampled up to 2.7 times, by 8 %. Of two steps take the shorter.
 
         Args:
             dt: the new time between samples [s].
@@ -325,7 +329,7 @@ class Motion(ResultDisplay):
         Raises:
             InvalidInput: dt is not positive and finite.
         """
-        return replace(self._map_components(signal_processing.resample_peaks, self.dt, dt), dt=dt)
+        return replace(self._map_components(signal_processing.resample, self.dt, dt), dt=dt)
 
     def baseline_corrected(self, degree: int = 6) -> "Motion":
         """Return the motion without drift, as by `signal_processing.correct_baseline`.
@@ -392,7 +396,8 @@ class Motion(ResultDisplay):
     def _add_component(self, name: str, other: "Motion") -> "Motion":
         if not np.isclose(other.dt, self.dt, rtol=1e-6, atol=0.0):
             steps = f"a step of {other.dt:g} s ({other.name!r}) and one of {self.dt:g} s"
-            raise InvalidInput(f"{steps}: bring one to the other's with resampled")
+            finer = min(self.dt, other.dt)
+            raise InvalidInput(f"{steps}: bring the coarser to the finer by .resampled({finer:g})")
         row = other.vertical if name == "vertical" else None
         rows = {each: (self.component(each), self.start_time) for each in self.components}
         rows[name] = (other.horizontal if row is None else row), other.start_time

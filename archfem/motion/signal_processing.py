@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-import scipy  # loads scipy.signal, which is slow, when it is first used
+import scipy  # loads its modules, which are slow, when they are first used
 from scipy import integrate
 
 from archfem._typing import Array
@@ -123,22 +123,34 @@ def filter_band(samples: Array, dt: float, low: float, high: float, *, order: in
     return scipy.signal.sosfiltfilt(filter_, np.pad(samples, pad), padlen=0)[pad:-pad]
 
 
-def resample_peaks(samples: Array, dt: float, new_dt: float) -> Array:
-    """Resample by linear interpolation, without loss of peaks."""
-    # Each local extreme and both ends replace the nearest new sample, the largest where several
-    # meet: peaks have their values, and move by half a new step at most.
+def resample(samples: Array, dt: float, new_dt: float) -> Array:
+    """Resample so that the ground has the same displacement at every new sample, and its peaks.
+
+    Straight lines between the new samples are the second derivative of a cubic spline through these
+    displacements: the nearest of such lines by least squares, without the aliases of samples alone.
+    """
     if not 0.0 < new_dt < np.inf:
         raise InvalidInput(f"dt {new_dt!r} s: the time between samples is a positive number")
-    count_pieces((len(samples) - 1) * dt, new_dt, "samples of a motion", MAX_SAMPLES)
-    new_dt = float(new_dt)
-    count = int(np.ceil((len(samples) - 1) * dt / new_dt - 1e-9)) + 1
-    new = np.interp(np.arange(count) * new_dt, np.arange(len(samples)) * dt, samples, right=0.0)
-    rises = np.diff(samples) > 0.0
-    turned = np.concatenate(([True], rises[1:] != rises[:-1], [True]))[: len(samples)]
-    turns = np.flatnonzero(turned & (samples != 0.0))
-    turns = turns[np.argsort(np.abs(samples[turns]), kind="stable")]
-    new[np.minimum(np.rint(turns * dt / new_dt).astype(int), count - 1)] = samples[turns]
-    return new
+    end = (len(samples) - 1) * dt
+    count_pieces(end, new_dt, "samples of a motion", MAX_SAMPLES)
+    if len(samples) == 1:
+        return samples
+    places = np.arange(max(int(np.ceil(end / new_dt - 1e-9)), 1) + 1) * float(new_dt)
+    lines = scipy.interpolate.make_interp_spline(np.arange(len(samples)) * dt, samples, k=1)
+    velocity = lines.antiderivative()
+    # the ground moves on evenly from the last sample to the first new one behind it
+    within, last = np.minimum(places, end), float(velocity(end))
+    moved = velocity.antiderivative()(within) + last * (places - within)
+    new = scipy.interpolate.CubicSpline(places, moved, bc_type=((1, 0.0), (1, last)))(places, 2)
+    # the largest peak both ways, the larger one last, is kept at the nearest new sample, and no
+    # other exceeds it; halves taken from both neighbours keep velocity and displacement behind it
+    peaks = np.array(sorted((samples.argmin(), samples.argmax()), key=lambda k: abs(samples[k])))
+    nearest = np.minimum(np.rint(peaks * dt / new_dt).astype(int), len(new) - 1)
+    for _ in range(30):  # what two neighbours exchange halves in each
+        kept = np.clip(new, min(samples.min(), 0.0), max(samples.max(), 0.0))
+        kept[nearest] = samples[peaks]
+        new += np.convolve(kept - new, [-0.5, 1.0, -0.5])[1:-1]
+    return kept
 
 
 def align_starts(rows: Mapping[str, tuple[Array, float | None]], dt: float) -> dict[str, Any]:

@@ -162,7 +162,7 @@ def test_files_of_a_pair_have_their_own_units_and_steps(tmp_path, at2):
     assert motion.dt == 0.005
     assert motion.vertical == pytest.approx([0.0, 0.4905, 0.0])
     assert motion.pga == pytest.approx(0.980665)
-    with pytest.raises(af.InvalidInput, match=r'suite\.pairs\.one\.resample = "0\.01 s"'):
+    with pytest.raises(af.InvalidInput, match=r'suite\.pairs\.one\.resample = "0\.005 s"'):
         build_suite(parse_suite({"pairs": {"one": given}}), tmp_path)
 
 

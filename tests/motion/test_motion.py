@@ -200,7 +200,7 @@ def test_small_numbers_are_numbers(shaking):
         if same:
             assert shaking.with_vertical(other).dt == shaking.dt
         else:
-            with pytest.raises(af.InvalidInput, match="bring one to the other"):
+            with pytest.raises(af.InvalidInput, match="bring the coarser to the finer by"):
                 shaking.with_vertical(other)
 
 
