@@ -37,7 +37,7 @@ def motion_keys() -> dict[str, Any]:
     """Return the keys of one motion."""
     own = declared_keys(Motion.cut) | declared_keys(Motion.with_rest)
     own |= {"vertical": (str, dict), "held": dict}
-    own |= {"resample": "s", "scale": "1", "reversed": bool}
+    own |= {"resample": "s", "scale": "1", "reversed": bool, "baseline_corrected": bool}
     return source_keys() | own
 
 
@@ -65,7 +65,7 @@ def parse_motion(table: Any, section: str = "motion") -> dict[str, Any]:
 
 
 def build_motion(settings: Table, folder: Path = Path(), section: str = "motion") -> Motion:
-    """Read or synthesise a motion, then resample, cut, extend, reverse and scale it, in turn."""
+    """Read or synthesise a motion, then resample, correct, cut, extend, reverse and scale it."""
     motion = _build_source(settings, folder)
     step = settings.get("resample")
     motion = motion if step is None else motion.resampled(step)
@@ -79,6 +79,8 @@ def build_motion(settings: Table, folder: Path = Path(), section: str = "motion"
                 f'"{min(vertical.dt, motion.dt):g} s"'
             )
         motion = motion.with_vertical(vertical)
+    if settings.get("baseline_corrected", False):
+        motion = motion.baseline_corrected()
     # Times of the case are those of the resampled motion, before it is reversed.
     if "start" in settings or "end" in settings:
         motion = motion.cut(settings.get("start", 0.0), settings.get("end"))

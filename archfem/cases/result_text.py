@@ -44,7 +44,7 @@ from archfem.masonry.structure import (
 )
 from archfem.models.model import Doubt
 from archfem.motion.matching import Match
-from archfem.motion.motion import Motion
+from archfem.motion.motion import Motion, find_drift
 from archfem.motion.response_spectra import measure_intensity
 from archfem.statics.equilibrium import structure_doubts
 from archfem.statics.pushover import Pushover
@@ -95,9 +95,6 @@ CHECKED_ACROSS = "across the plane of the drawing a run checks it as one rigid b
 
 # Begin of notes that are not about the least factor over what is assumed of a fill
 OF_GIVEN_FILL = "with the fill as given, "
-
-# Share of its peak velocity with which a record may end, as ground that comes to rest [-]
-MAX_DRIFT = 0.1
 
 
 class ResultTable(NamedTuple):
@@ -233,8 +230,8 @@ def tabulate_motions(motions: Sequence[Motion]) -> ResultTable:
             row = [motion.name, component if len(motion.components) > 1 else "only one"]
             row += [str(len(motion.component(component))), f"{motion.dt:g} s"]
             row.append(f"{measured.pga / STANDARD_GRAVITY:.4f} g")
-            left = float(abs(motion.velocity(component)[-1]))  # with which ground drifts on
-            drift = f" (drifts: ends at {left:.2g} m/s)" * (left > MAX_DRIFT * measured.pgv)
+            left, _ = find_drift(motion, component)
+            drift = f" (drifts: ends at {left:.2g} m/s)" * (left > 0.0)
             row += [f"{measured.pgv:.4f} m/s", f"{measured.pgd:.4f} m{drift}"]
             row += [f"{value:.3g} m/s" for value in (measured.arias, measured.cav)]
             row.append(f"{measured.housner:.3g} m")

@@ -28,9 +28,11 @@ from archfem.cases.structure_keys import find_drawing, list_unused_tables, read_
 from archfem.cases.toml_file import format_key, parse_tables
 from archfem.commands.cli import ExitCode
 from archfem.dynamics.history import History
+from archfem.dynamics.recorder import doubt_drift
 from archfem.errors import ArchfemError, InvalidInput, NotInstalled
 from archfem.limit.collapse import Collapse, Outcome
 from archfem.models.model import Doubt
+from archfem.motion.motion import Motion
 from archfem.motion.suite import Suite
 
 PIP_INSTALL = f"{sys.executable} -m pip install"
@@ -92,12 +94,17 @@ def _check_case(options: argparse.Namespace) -> int:
     print(result_text.describe_dead_load(at_rest, explain=True))
     if case.pushover is not None:
         print(case.pushover)
+    motions: Sequence[Motion] = ()
     if case.suite is not None:
-        print_motions(case.ground_suite())
+        print_motions(suite := case.ground_suite())
+        motions = suite.motions
     elif case.motion is not None:
         motion = case.ground_motion()
+        motions = [motion]
         print(f"motion: {motion.name}, {motion.duration:.2f} s, PGA {motion.pga:.3f} m/s²")
-    doubts += at_rest.doubts
+    drifts = [doubt for motion in motions for doubt in doubt_drift(motion)]
+    print(*result_text.mark_remarks(drifts), sep="\n", end="\n" * bool(drifts))
+    doubts += [*drifts, *at_rest.doubts]
     ready = f"in doubt, {len(doubts)} times, as above" if doubts else "ready"
     print(f"{options.case}: {ready}; dead load in {at_rest.dead.iterations} iterations")
     return doubt_code(doubts)

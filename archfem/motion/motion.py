@@ -26,6 +26,9 @@ from archfem.units import STANDARD_GRAVITY, in_degrees, warn_if_in_g
 
 COMPONENTS = "horizontal", "vertical", "transverse"
 
+# Share of its peak velocity with which a record may end, as ground that comes to rest [-]
+MAX_DRIFT = 0.1
+
 
 @validate_methods
 @dataclass(frozen=True, eq=False, repr=False)
@@ -45,6 +48,7 @@ class Motion(ResultDisplay):
         transverse: the other horizontal (k,) [m/s²], or None; only `rotated` makes use of it.
         start_time: time of the first sample on the clock of its file [s], since 1970 where that has
             a date; None where nothing states it, and components added begin with this motion.
+        recorded: whether it is a record of a file, whose runs are doubted if it drifts.
 
     Raises:
         InvalidInput: a component is no row of finite numbers up to 5 g; or dt is no positive
@@ -57,6 +61,7 @@ class Motion(ResultDisplay):
     name: str = ""
     transverse: Array | None = field(default=None, kw_only=True)
     start_time: float | None = field(default=None, kw_only=True)
+    recorded: bool = field(default=False, kw_only=True)
 
     def __post_init__(self) -> None:
         if not (is_number(self.dt) and self.dt >= 1e-6):
@@ -111,7 +116,7 @@ class Motion(ResultDisplay):
         """
         channels = read_components(path, column=column, units=units, dt=dt, response=response)
         try:
-            motion = cls(**join_channels(channels), name=Path(path).stem)
+            motion = cls(**join_channels(channels), name=Path(path).stem, recorded=True)
         except InvalidInput as error:
             raise InvalidInput(f"{path}: {error}") from error
         if vertical is not None:
@@ -401,13 +406,28 @@ class Motion(ResultDisplay):
         row = other.vertical if name == "vertical" else None
         rows = {each: (self.component(each), self.start_time) for each in self.components}
         rows[name] = (other.horizontal if row is None else row), other.start_time
-        return replace(self, **signal_processing.align_starts(rows, self.dt))
+        aligned = signal_processing.align_starts(rows, self.dt)
+        return replace(self, **aligned, recorded=self.recorded or other.recorded)
 
     def _map_components(self, change: Callable[..., Array], *args: Any, **options: Any) -> "Motion":
         rows: dict[str, Any] = {
             name: change(self.component(name), *args, **options) for name in self.components
         }
         return replace(self, **rows)
+
+
+def find_drift(motion: Motion, component: str) -> tuple[float, float]:
+    """Return the velocity with which the ground drifts on [m/s], and its share of the peak [-].
+
+    The second is the mean acceleration to that velocity over the peak acceleration. Both are zero
+    of ground that comes to rest.
+    """
+    velocity = np.abs(motion.velocity(component))
+    if velocity[-1] <= MAX_DRIFT * velocity.max():
+        return 0.0, 0.0
+    samples = np.trim_zeros(motion.component(component), "b")  # without rest behind the record
+    left = float(velocity[-1])
+    return left, left / (motion.dt * len(samples) * float(np.abs(samples).max()))
 
 
 def admissible_range(between: Sequence[float], motion: Motion) -> tuple[float, float]:

@@ -166,6 +166,16 @@ def test_files_of_a_pair_have_their_own_units_and_steps(tmp_path, at2):
         build_suite(parse_suite({"pairs": {"one": given}}), tmp_path)
 
 
+def test_a_baseline_is_corrected_before_the_record_is_cut(tmp_path, at2):
+    at2(tmp_path / "drifts.AT2", (0.1 + np.sin(np.arange(400) * 0.1)).tolist(), 0.01)
+    given = {"file": "drifts.AT2", "end": "2 s", "baseline_corrected": True}
+    motion = build_motion(parse_motion(given), tmp_path)
+    whole = af.Motion.read(tmp_path / "drifts.AT2").baseline_corrected()
+    assert whole.velocity()[-1] == pytest.approx(0.0, abs=1e-9)
+    assert motion.horizontal == pytest.approx(whole.horizontal[:201])
+    assert motion.recorded
+
+
 def test_a_synthetic_vertical_has_the_given_peak():
     """It used to be the vertical of a motion whose horizontal had that peak: two thirds of it."""
     level = {"seed": 1, "pga": 1.0, "duration": 2.0}

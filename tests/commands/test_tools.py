@@ -281,3 +281,21 @@ def test_a_strength_in_another_unit_is_refused_by_a_check(tmp_path, capsys):
         said = capsys.readouterr()
         assert words in said.out + said.err
         assert (_TWO_STRENGTHS in said.out) == (words == _TWO_STRENGTHS)
+
+
+def test_a_check_doubts_a_record_that_drifts(tmp_path, capsys):
+    """With the correction that it advises the case is ready."""
+    times = np.arange(1001) * 0.01
+    rows = np.column_stack([times, np.sin(2.0 * np.pi * times) + 0.2])
+    np.savetxt(tmp_path / "drifts.csv", rows, delimiter=",", header="Time (s),Acc (m/s2)")
+    (tmp_path / "case.toml").write_text(
+        '[structure]\nshape = "column"\nbreadth = 0.6\nheights = [1.2]\n'
+        '[contacts."stone to stone"]\nnormal_stiffness = "10 MPa/mm"\n'
+        'shear_stiffness = "4 MPa/mm"\n[model]\nfidelity = "rigid"\n'
+        '[motion]\nfile = "drifts.csv"\n'
+    )
+    command = ["check", str(tmp_path / "case.toml")]
+    assert af.commands.main(command) == 3  # doubtful
+    said = capsys.readouterr().out
+    assert "in doubt: the horizontal motion drifts: it ends with the velocity of 17% of" in said
+    assert af.commands.main([*command, "--set", "motion.baseline_corrected=true"]) == 0

@@ -9,7 +9,7 @@ import pytest
 import archfem as af
 from archfem.cases.result_text import tabulate_runs
 from archfem.dynamics.monitor import RunMonitor
-from archfem.dynamics.recorder import GrowingArray, Recorder
+from archfem.dynamics.recorder import GrowingArray, Recorder, doubt_drift
 
 DAMPING = af.Rayleigh(0.05, (8.0, 16.0))
 MOTION = af.Motion.synthetic(duration=4.0, pga=2.0, seed=3)
@@ -70,6 +70,50 @@ def test_peaks_of_the_ground_between_the_steps_are_recorded(steps, peaks):
     (row, _) = tabulate_runs({"spikes": run}).rows
     until = f" until {run.time[-1]:.2f} s"
     assert row[3:5] == [f"{peaks[0]:.2f} m/s²{until}", f"{peaks[1]:.2f} m/s²"]
+
+
+def test_a_record_that_drifts_is_doubted_and_its_remedy_helps(tmp_path):
+    """An offset of 0.5 m/s² pushes a column; by hand it is the mean acceleration of the record.
+
+    Corrected, the largest displacement is that without offset, as the synthetic record itself has
+    no part of the polynomial; the file's 18 digits leave far less than 1e-6.
+    """
+    column = af.column(breadth=0.6, heights=[1.2, 1.2])
+    model, damping = af.build(column, fidelity="rigid"), af.StiffnessDamping(0.05, 10.0)
+    ground, moved = af.Motion.synthetic(duration=6.0, pga=1.5, seed=1, vertical_ratio=0.0), {}
+    for name, offset in (("clean", 0.0), ("drifts", -0.5)):
+        rows = np.column_stack([ground.times(), ground.horizontal + offset])
+        np.savetxt(tmp_path / f"{name}.csv", rows, delimiter=",", header="Time (s),Acc (m/s2)")
+        motion = af.Motion.read(tmp_path / f"{name}.csv")
+        for key, each in ((name, motion), ("corrected", motion.baseline_corrected())):
+            moved[key] = af.time_history(model, each, dt=0.005, damping=damping)
+        (*doubts,) = doubt_drift(motion.with_rest(5.0).scaled(1.7))  # both leave the share
+        assert doubts == [x for x in moved[name].doubts if "drifts" in x.words]
+        assert len(doubts) == (name == "drifts")
+    share = 0.5 / abs(ground.horizontal - 0.5).max()
+    assert doubts[0].values == ("horizontal", pytest.approx(share, rel=0.01))
+    sizes = {key: run.verdict.displacement for key, run in moved.items()}
+    assert sizes["corrected"] == pytest.approx(sizes["clean"], rel=1e-6)
+    assert sizes["drifts"] > 1.5 * sizes["clean"]
+    assert not any("drifts" in each.words for each in moved["corrected"].doubts)
+
+
+@pytest.mark.parametrize("component", ["horizontal", "vertical"])
+def test_only_drift_of_records_that_pushes_is_doubted(component):
+    """Whole sines in 10 s with an offset: by hand the offset over the peak, from 1 % on."""
+    wave = np.sin(2.0 * np.pi * np.arange(2001) * 0.005)
+
+    def record(offset, **options):
+        rows = {"horizontal": wave, "vertical": wave} | {component: wave + offset}
+        return af.Motion(dt=0.005, **rows, **options)
+
+    (doubt,) = doubt_drift(record(0.02, recorded=True))
+    assert doubt.values == (component, pytest.approx(0.02 / 1.02, rel=0.01))
+    assert not list(doubt_drift(record(0.009, recorded=True)))
+    assert not list(doubt_drift(record(0.02)))
+    assert not list(doubt_drift(af.Motion.held(push=2.0)))
+    synthetic = af.Motion(wave, 0.005).with_vertical(record(0.02, recorded=True))
+    assert bool(list(doubt_drift(synthetic))) == (component == "vertical")
 
 
 def test_recorded_quantities_have_their_dimensions_and_values(run, model, motion):
