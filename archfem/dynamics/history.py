@@ -325,7 +325,8 @@ class History(ResultDisplay):
         if self.structure is not None and self.fall is not None and self.fall.time is None:
             remarks.append(describe_dislocation(self.structure))
         farthest, standing = find_farthest(self.dataset, self.structure)
-        remarks += [*(words for _, words in standing), *extremes_remark(self.dataset)]
+        remarks += [words for _, words in standing]
+        remarks += extremes_remark(self.dataset, self.structure)
         if (tension := attrs.get("fill_tension")) is not None:
             when = f"at {attrs['fill_tension_time']:.3f} s"
             remarks.append(

@@ -193,26 +193,40 @@ def test_a_calm_run_is_reported_as_calm(model, motion):
 
 
 @pytest.mark.parametrize(
-    ("end", "slides", "says"),
+    ("end", "elastic", "friction", "slides", "says"),
     [
-        (0.0, False, ", elastic: |V| stays below its limit there"),
+        (0.0, 0.0, 0.6, False, ", elastic: |V| stays below its limit there"),
+        (4e-4, 1.0, 0.6, False, ", elastic: |V| stays below its limit there"),
+        (4e-4, 0.0, None, False, ", elastic: |V| stays below its limit there"),
         (
             4e-4,
+            0.25,
+            0.6,
             False,
-            ", of which 0.4 mm remain, as part of the face slid: |V| stays below its limit",
+            ", of which 0.3 mm remain, as part of the face slid: |V| stays below its limit",
         ),
-        (4e-4, True, ""),
+        (4e-4, 0.0, 0.6, True, ""),
     ],
 )
-def test_the_largest_slip_says_what_of_it_is_left(run, end, slides, says):
-    """A slip within a face leaves a residual, which an elastic one does not."""
-    joints = run.joints.copy(deep=True)
-    for name in ("slip", "rotation", "slide"):
+def test_the_largest_slip_says_what_of_it_is_left(run, end, elastic, friction, slides, says):
+    """A slip within a face leaves a residual, which an elastic one, V / (k_s A), does not.
+
+    By hand: at |e| = 5/12 a quarter of the depth is closed.
+    """
+    joints, joint = run.joints.copy(deep=True), run.structure.joints[3]
+    for name in ("slip", "rotation", "slide", "V", "eccentricity"):
         joints[name] = xr.zeros_like(joints[name])
-    joints["slip"].loc[{"joint": joints["joint"][3]}] = np.linspace(0.0, end, len(run.time))
+    joints["slip"].loc[{"joint": joints["joint"][3]}] = end
+    joints["slip"][{"joint": 3, "time": 0}] = 0.0
     joints["slip"][{"joint": 3, "time": len(run.time) // 2}] = 6e-4
     joints["slide"][{"joint": 3, "time": 1}] = slides
-    (text,) = verdict.extremes_remark(joints)
+    joints["eccentricity"][{"joint": 3, "time": -1}] = -5.0 / 12.0
+    area = 0.25 * joint.depth * run.structure.width
+    joints["V"][{"joint": 3, "time": -1}] = joint.contact.shear_stiffness * area * elastic * end
+    contact = replace(joint.contact, friction=friction)
+    changed = [replace(each, contact=contact) for each in run.structure.joints]
+    structure = replace(run.structure, joints=tuple(changed))
+    (text,) = verdict.extremes_remark(joints, structure)
     assert text.endswith(f" s){says}")
     assert "largest slip 0.6 mm (" in text
 
