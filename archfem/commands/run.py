@@ -182,7 +182,7 @@ def modes(options: argparse.Namespace) -> int:
             from archfem.view.films.film import film_modes
 
             write({"modes.gif": lambda path: film_modes(computed, path, first)}, draft)
-    return doubt_code(at_rest.doubts)
+    return doubt_code([*at_rest.doubts, *computed.doubts])
 
 
 @keep_attempt("limit")

@@ -8,6 +8,9 @@ import numpy as np
 from archfem._typing import Flags
 from archfem.masonry.structure import Joint, Structure
 
+# Stiffness of a block over that of its joints from which joints deform instead [-]
+SOFT_JOINTS = 10.0
+
 
 @dataclass(frozen=True)
 class BlockStiffness:
@@ -69,6 +72,22 @@ def estimate_bending(structure: Structure, number: int) -> float:
         return inf
     wave = sqrt(block.material.young / structure.density(block))
     return (0.1615 if len(depths) == 1 else 1.028) * block.area / length**3 * wave
+
+
+def estimate_lowest_inner(structure: Structure) -> float:
+    """Return the lowest frequency of stones that are held by joints, infinite if these are soft."""
+    # held at one end alone a wave crosses the block four times instead of twice
+    single = np.bincount(structure.pairs.ravel(), minlength=len(structure.blocks)) == 1
+    stones = list_stones(structure)
+    found = {number: estimate_block_stiffness(structure, number) for number in stones}
+    return min(
+        (
+            min(each.inner / (1.0 + single[number]), estimate_bending(structure, number))
+            for number, each in found.items()
+            if each.ratio < SOFT_JOINTS
+        ),
+        default=inf,
+    )
 
 
 def find_yielding_blocks(structure: Structure) -> tuple[int, ...]:

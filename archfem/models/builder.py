@@ -6,6 +6,7 @@ from dataclasses import replace
 from archfem._threads import single_threaded
 from archfem.errors import InvalidInput, logger
 from archfem.masonry.stiffness_ratio import (
+    SOFT_JOINTS,
     estimate_bending,
     estimate_block_stiffness,
     find_soft_blocks,
@@ -111,13 +112,13 @@ def _doubt_soft_blocks(structure: Structure, fidelities: Sequence[str]) -> Itera
                 f"{join_names([structure.blocks[number].name for number in numbers])}",
                 f"'{fidelity}' is wrong for them, use 'full'",
             )
-    # energy of earthquakes ends near 25 Hz; joints far softer than their blocks deform instead
+    # energy of earthquakes ends near 25 Hz
     slender = {
         number: frequency
         for number in structure.free
         if number not in soft and fidelities[number] in ("rigid", "faces", "condensed")
         if (frequency := estimate_bending(structure, number)) < 25.0
-        and estimate_block_stiffness(structure, number).ratio < 10.0
+        and estimate_block_stiffness(structure, number).ratio < SOFT_JOINTS
     }
     if slender:
         yield Doubt(

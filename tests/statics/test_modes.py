@@ -191,6 +191,31 @@ def test_table():
     assert re.split(r"\s{2,}", second) == cells
 
 
+def test_frequencies_of_blocks_on_stiff_joints_are_upper_bounds():
+    """A bar on a stiff joint, without ν, vibrates along its length at √(E/ρ) / 4 L, by hand."""
+    material, found = af.Material(5e9, 0.0, DENSITY * GRAVITY), {}
+    bar = np.sqrt(5e9 / DENSITY) / 8.0
+    for stiffness in (5e8, 1e12):
+        contact = af.Contact(stiffness, 0.4 * stiffness, friction=None)
+        shape = af.column(breadth=1.0, heights=[2.0], material=material, contact=contact)
+        for fidelity in ("full", "faces", "condensed"):
+            found[stiffness, fidelity] = modes(af.build(shape, fidelity=fidelity), 3, "closed")
+    # a mesh of 0.4 % for the bar; both others have a massless spring in its place
+    assert found[1e12, "full"].frequencies[1] == pytest.approx(bar, rel=0.005)
+    for fidelity in ("faces", "condensed"):
+        stiff, soft = found[1e12, fidelity], found[5e8, fidelity]
+        assert stiff.frequencies[1] > 5.0 * bar
+        (doubt,) = stiff.doubts
+        assert stiff.table().endswith(f"in doubt: {doubt}")
+        assert stiff.table().count("≤") == 3
+        # on the softer joint the first mode is that of "full" within 5 %, and not in doubt
+        exact = found[5e8, "full"].frequencies[0]
+        assert soft.frequencies[0] == pytest.approx(exact, rel=0.05)
+        assert ["≤" in line for line in soft.table().splitlines()[1:4]] == [False, True, True]
+    assert not found[1e12, "full"].doubts
+    assert not modes(block(), 3).doubts  # of a block that is 25 times as stiff as its joint
+
+
 def test_modes_in_a_line():
     """Sway of the block has no mass along y, and the two lowest modes have all of it."""
     found = modes(block(), 2)
