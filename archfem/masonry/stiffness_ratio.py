@@ -74,6 +74,20 @@ def estimate_bending(structure: Structure, number: int) -> float:
     return (0.1615 if len(depths) == 1 else 1.028) * block.area / length**3 * wave
 
 
+def estimate_locking(structure: Structure, number: int, along: int) -> float:
+    """Return by how much cells of degree 1 along a block raise its frequency of bending [-]."""
+    # straight edges of length a add shear of (a / d)² / 2 (1 + ν) to the bending stiffness at depth
+    # d; meshes have cells up to twice as long as a block is thick
+    block = structure.blocks[number]
+    held = estimate_bending(structure, number) < inf
+    if not held or estimate_block_stiffness(structure, number).ratio >= SOFT_JOINTS:
+        return 0.0  # joints deform instead
+    away = np.array(block.points) - block.centroid
+    length = 2.0 * float(np.linalg.norm(away, axis=1).max())
+    cell = min(length**2 / block.area / along, 2.0)
+    return sqrt(1.0 + 0.5 * cell**2 / (1.0 + block.material.poisson)) - 1.0
+
+
 def estimate_lowest_inner(structure: Structure) -> float:
     """Return the lowest frequency of stones that are held by joints, infinite if these are soft."""
     # held at one end alone a wave crosses the block four times instead of twice

@@ -9,7 +9,9 @@ from archfem.masonry.stiffness_ratio import (
     SOFT_JOINTS,
     estimate_bending,
     estimate_block_stiffness,
+    estimate_locking,
     find_soft_blocks,
+    list_stones,
 )
 from archfem.masonry.structure import Structure, join_names
 from archfem.models.condensed import condense_blocks
@@ -28,7 +30,10 @@ def build(structure: Structure, settings: Discretisation) -> Model:
 
         model = LargeDisplacementModel(model)
     fidelities = list_fidelities(structure, settings.fidelity)
-    model.doubts = tuple(_doubt_soft_blocks(structure, fidelities))
+    elastic = [number for number in list_stones(structure) if fidelities[number] != "rigid"]
+    long_cells = settings.degree == 1 and settings.mesh_file is None
+    locks = _doubt_long_cells(structure, elastic, settings.along) if long_cells else ()
+    model.doubts = *_doubt_soft_blocks(structure, fidelities), *locks
     for doubt in model.doubts:
         logger.warning("%s", doubt)
     return model
@@ -125,5 +130,16 @@ def _doubt_soft_blocks(structure: Structure, fidelities: Sequence[str]) -> Itera
             f"slender blocks bend at {min(slender.values()):.2g} Hz or more, in the seismic band, "
             f"which their fidelity leaves out: "
             f"{join_names([structure.blocks[number].name for number in slender])}",
-            "use 'full' for them, or cut them into courses",
+            "use 'full' with degree = 2 for them, or cut them into courses",
+        )
+
+
+def _doubt_long_cells(structure: Structure, stones: Sequence[int], along: int) -> Iterator[Doubt]:
+    """Yield a doubt about slender blocks whose cells of degree 1 are long."""
+    errors = {number: estimate_locking(structure, number, along) for number in stones}
+    if names := [structure.blocks[number].name for number, x in errors.items() if x > 0.05]:
+        yield Doubt(
+            f"cells of degree 1 raise frequencies of bending of slender blocks by "
+            f"about {max(errors.values()):.0%}: {join_names(names)}",
+            "take degree = 2, or more cells along them",
         )
