@@ -6,6 +6,7 @@ from math import inf, sqrt
 import numpy as np
 
 from archfem._typing import Flags
+from archfem.masonry.block import Block
 from archfem.masonry.structure import Joint, Structure
 
 # Stiffness of a block over that of its joints from which joints deform instead [-]
@@ -65,8 +66,7 @@ def estimate_bending(structure: Structure, number: int) -> float:
     """Return the first frequency of a block as a beam held at its joints, or infinity [Hz]."""
     # held at one end, 0.1615 d / L² √(E/ρ), or at both, 1.028 d / L² √(E/ρ) (Euler and Bernoulli)
     block = structure.blocks[number]
-    away = np.array(block.points) - block.centroid
-    length = 2.0 * float(np.linalg.norm(away, axis=1).max())
+    length = _measure_length(block)
     depths = [joint.depth for joint in structure.joints if number in joint.blocks]
     if max(depths) > 0.5 * length:  # held along its length, as a course by another
         return inf
@@ -74,17 +74,20 @@ def estimate_bending(structure: Structure, number: int) -> float:
     return (0.1615 if len(depths) == 1 else 1.028) * block.area / length**3 * wave
 
 
+def _measure_length(block: Block) -> float:
+    """Return twice the distance of the farthest corner from the centroid [m]."""
+    return 2.0 * float(np.linalg.norm(np.array(block.points) - block.centroid, axis=1).max())
+
+
 def estimate_locking(structure: Structure, number: int, along: int) -> float:
     """Return by how much cells of degree 1 along a block raise its frequency of bending [-]."""
     # straight edges of length a add shear of (a / d)² / 2 (1 + ν) to the bending stiffness at depth
     # d; meshes have cells up to twice as long as a block is thick
     block = structure.blocks[number]
-    held = estimate_bending(structure, number) < inf
-    if not held or estimate_block_stiffness(structure, number).ratio >= SOFT_JOINTS:
+    bends = estimate_bending(structure, number) < inf
+    if not bends or estimate_block_stiffness(structure, number).ratio >= SOFT_JOINTS:
         return 0.0  # joints deform instead
-    away = np.array(block.points) - block.centroid
-    length = 2.0 * float(np.linalg.norm(away, axis=1).max())
-    cell = min(length**2 / block.area / along, 2.0)
+    cell = min(_measure_length(block) ** 2 / block.area / along, 2.0)
     return sqrt(1.0 + 0.5 * cell**2 / (1.0 + block.material.poisson)) - 1.0
 
 
@@ -92,16 +95,13 @@ def estimate_lowest_inner(structure: Structure) -> float:
     """Return the lowest frequency of stones that are held by joints, infinite if these are soft."""
     # held at one end alone a wave crosses the block four times instead of twice
     single = np.bincount(structure.pairs.ravel(), minlength=len(structure.blocks)) == 1
-    stones = list_stones(structure)
-    found = {number: estimate_block_stiffness(structure, number) for number in stones}
-    return min(
-        (
-            min(each.inner / (1.0 + single[number]), estimate_bending(structure, number))
-            for number, each in found.items()
-            if each.ratio < SOFT_JOINTS
-        ),
-        default=inf,
-    )
+    lowest = inf
+    for number in list_stones(structure):
+        found = estimate_block_stiffness(structure, number)
+        if found.ratio < SOFT_JOINTS:
+            inner = found.inner / (1.0 + single[number])
+            lowest = min(lowest, inner, estimate_bending(structure, number))
+    return lowest
 
 
 def find_yielding_blocks(structure: Structure) -> tuple[int, ...]:

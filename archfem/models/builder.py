@@ -30,10 +30,10 @@ def build(structure: Structure, settings: Discretisation) -> Model:
 
         model = LargeDisplacementModel(model)
     fidelities = list_fidelities(structure, settings.fidelity)
-    elastic = [number for number in list_stones(structure) if fidelities[number] != "rigid"]
-    long_cells = settings.degree == 1 and settings.mesh_file is None
-    locks = _doubt_long_cells(structure, elastic, settings.along) if long_cells else ()
-    model.doubts = *_doubt_soft_blocks(structure, fidelities), *locks
+    doubts = [*_doubt_soft_blocks(structure, fidelities)]
+    if settings.degree == 1 and settings.mesh_file is None:
+        doubts += _doubt_long_cells(structure, fidelities, settings.along)
+    model.doubts = tuple(doubts)
     for doubt in model.doubts:
         logger.warning("%s", doubt)
     return model
@@ -134,12 +134,13 @@ def _doubt_soft_blocks(structure: Structure, fidelities: Sequence[str]) -> Itera
         )
 
 
-def _doubt_long_cells(structure: Structure, stones: Sequence[int], along: int) -> Iterator[Doubt]:
+def _doubt_long_cells(
+    structure: Structure, fidelities: Sequence[str], along: int
+) -> Iterator[Doubt]:
     """Yield a doubt about slender blocks whose cells of degree 1 are long."""
+    stones = [number for number in list_stones(structure) if fidelities[number] != "rigid"]
     errors = {number: estimate_locking(structure, number, along) for number in stones}
     if names := [structure.blocks[number].name for number, x in errors.items() if x > 0.05]:
-        yield Doubt(
-            f"cells of degree 1 raise frequencies of bending of slender blocks by "
-            f"about {max(errors.values()):.0%}: {join_names(names)}",
-            "take degree = 2, or more cells along them",
-        )
+        words = "cells of degree 1 raise frequencies of bending of slender blocks by about "
+        words += f"{max(errors.values()):.0%}: {join_names(names)}"
+        yield Doubt(words, "take degree = 2, or more cells along them")

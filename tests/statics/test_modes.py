@@ -240,3 +240,15 @@ def test_shapes_have_the_sense_in_which_they_follow_the_ground(along, sense):
     shape = np.array([[0.49], [-0.51], [1.0]])
     assert _shape_signs(shape, np.array([along]), np.ones(2)).tolist() == [sense]
     assert _shape_signs(-shape, np.array([[0.0, 0.0]]), np.ones(2)).tolist() == [1.0]
+
+
+def test_the_command_ends_in_doubt_where_blocks_vibrate_by_themselves(tmp_path, monkeypatch):
+    monkeypatch.setattr("archfem.commands.run.can_film", lambda: False)
+    for stiffness, code in (("1 MPa/mm", 0), ("1000 MPa/mm", 3)):
+        (tmp_path / "case.toml").write_text(
+            '[structure]\nshape = "column"\nbreadth = 0.6\nheights = [1.2]\n'
+            f'[contacts."stone to stone"]\nnormal_stiffness = "{stiffness}"\n'
+            f'shear_stiffness = "{stiffness}"\n[model]\nfidelity = "rigid"\n'
+        )
+        given = ["modes", str(tmp_path / "case.toml"), "--out", str(tmp_path / stiffness[:4])]
+        assert af.commands.main([*given, "--count", "2"]) == code
