@@ -2,7 +2,8 @@
 
 Vertices nearer to one another than the tolerance `snap` are merged. A vertex within `snap` of an
 edge of another outline is moved onto it. A joint between two blocks that deviates from a line by
-at most `snap` is made straight. Remaining overlaps and narrow gaps are ambiguous, hence errors.
+at most `snap` is made straight. Remaining overlaps and narrow gaps are ambiguous, hence errors,
+but for chipped corners beside faces that touch over most of their length.
 """
 
 import json
@@ -55,6 +56,13 @@ from archfem.masonry.survey.drawings import (
     read_polylines,
 )
 from archfem.masonry.survey.dxf import POLYLINES, load_dxf
+from archfem.masonry.survey.joint_faces import (
+    LEAST_OPENING,
+    Chip,
+    find_chips,
+    measure_openings,
+    say_faces,
+)
 from archfem.masonry.survey.layers import Layer, group_by_place
 from archfem.units import G, in_unit
 
@@ -89,6 +97,10 @@ class Survey:
         held: other things on ignored layers of a DXF file, in words.
         lost: ignored outlines that lie between stones as one does: layer, place and the share of
             the circumference that touches them [-].
+        chips: chipped corners beside joints: both stones, the chip along and across the joint, and
+            the length along which it touches [m].
+        closed: joints drawn open by more than a millimetre, which were closed, the widest first:
+            both stones and the gap in the mean of its length [m].
     """
 
     blocks: tuple[Block, ...]
@@ -98,6 +110,8 @@ class Survey:
     ignored: Mapping[str, int]
     held: Mapping[str, str]
     lost: tuple[tuple[str, str, float], ...] = ()
+    chips: tuple[tuple[str, str, float, float, float], ...] = ()
+    closed: tuple[tuple[str, str, float], ...] = ()
 
     def __str__(self) -> str:
         counts = [
@@ -105,9 +119,10 @@ class Survey:
             for layer, count in self.ignored.items()
         ]
         moved = self.frame.length(round(self.moved, 9))  # less than a nanometre is round-off
+        faces = say_faces(self.chips, self.closed, self.frame.length)
         return (
             f"drawing: {_say_size(self.size)}, read in {self.frame.unit}, corners moved by up to "
-            f"{moved}; ignored layers: {', '.join(counts) or 'none'}"
+            f"{moved}; ignored layers: {', '.join(counts) or 'none'}{faces}"
         )
 
 
@@ -162,7 +177,7 @@ def read_outlines(
     if ground is not None:
         outlines.append(_draw_ground(outlines, ground))
     try:
-        points, moved, _ = _close_or_advise(outlines, snap, size)
+        points, moved, touches = _close_or_advise(outlines, snap, size)
         blocks = [
             _make_block(outline, polygon, known.get(outline.layer, Layer()), material, materials)
             for outline, polygon in zip(outlines, points, strict=True)
@@ -174,7 +189,16 @@ def read_outlines(
         raise type(error)(f"{path}: {error}") from error
     lost = tuple(_find_lost(Path(path), unit, ignored, outlines, snap))
     held = _describe_ignored(Path(path), ignored, outlines)
-    return Survey(made, size, moved, outlines[0].frame, ignored, held, lost)
+    names = [block.name for block in made]
+    chips = tuple(
+        (names[each.stone], names[each.other], each.along, each.across, each.contact)
+        for each in find_chips(points, touches, snap)
+    )
+    gaps = measure_openings([each.points for each in outlines], touches, 4.0 * snap)
+    apart = [(names[a], names[b], gap) for (a, b, _), gap in zip(touches, gaps, strict=True)]
+    closed = sorted((x for x in apart if x[2] > LEAST_OPENING), key=lambda x: -x[2])
+    of_file = made, size, moved, outlines[0].frame, ignored, held, lost
+    return Survey(*of_file, chips, tuple(closed))
 
 
 def _draw_ground(outlines: Sequence[Outline], level: float) -> Outline:
@@ -460,7 +484,7 @@ def close_gaps(outlines: list[Outline], snap: float) -> Closed:
     touches, least = touching(blocks), AMBIGUOUS_GAP_RATIO * snap
     _run_checks(
         partial(check_overlaps, found, names, place=place),
-        partial(_check_gaps, placed, boundaries, outlines, least),
+        partial(_check_gaps, placed, boundaries, outlines, least, find_chips(found, touches, snap)),
         partial(_check_contacts, touches, names, frame, least),
     )
     return found, float(moved[worst]), touches
@@ -601,15 +625,20 @@ def _place_tied(places: Array, ties: dict[int, Edge]) -> Array:
 
 
 def _check_gaps(
-    places: Array, boundaries: Boundaries, outlines: list[Outline], widest: float
+    places: Array,
+    boundaries: Boundaries,
+    outlines: list[Outline],
+    widest: float,
+    chips: list[Chip],
 ) -> None:
-    """Refuse blocks with a gap between their faces that is no wider than a length."""
+    """Refuse blocks with a gap between their faces that is no wider than a length, but chips."""
     near = CONTACT_TOLERANCE * float(np.linalg.norm(np.ptp(places, axis=0)))
     polygons = [shapely.Polygon(places[boundary]) for boundary in boundaries]
     tree = shapely.STRtree(polygons)
-    first: dict[int, int] = {}
+    owners: dict[int, list[int]] = {}
     for number, boundary in enumerate(boundaries):
-        first = dict.fromkeys(boundary, number) | first
+        for place in boundary:
+            owners.setdefault(place, []).append(number)
     found: dict[frozenset[int], tuple[float, int]] = {}  # the widest gap of each pair
     for number, a, b in _edges(boundaries):
         along, off, length = _project(places, a, b)
@@ -618,9 +647,14 @@ def _check_gaps(
         for place in set(np.flatnonzero(beside).tolist()) - set(boundaries[number]):
             foot = places[a] + along[place] / length * (places[b] - places[a])
             middle = shapely.Point(0.5 * (foot + places[place]))
+            pairs = [{number, owner} for owner in owners[place]]
+            is_chip = any(
+                {each.stone, each.other} in pairs and each.holds(foot, places[place])
+                for each in chips
+            )
             # a gap filled by a third block is none
-            if not len(tree.query(middle, predicate="within")):
-                pair, gap = frozenset((number, first[place])), (float(-off[place]), place)
+            if not is_chip and not len(tree.query(middle, predicate="within")):
+                pair, gap = frozenset((number, owners[place][0])), (float(-off[place]), place)
                 found[pair] = max(found.get(pair, gap), gap)
     if not found:
         return
