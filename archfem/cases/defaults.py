@@ -157,7 +157,8 @@ def _list_settings(case: Case) -> Iterator[Default]:
     analysis, criteria = case.analysis, case.analysis.failure_criteria
     if case.has_motion:
         if _has_default_vertical(case):
-            words = "vertical motion 2/3 of the horizontal"
+            matched = ", before matching" if (case.suite or {}).get("matched") else ""
+            words = f"vertical motion 2/3 of the horizontal{matched}"
             key, reason = "motion.synthetic.vertical_ratio", "the classical ratio of the peaks"
             yield Default("", words, key, reason)
         if analysis.damping is None:

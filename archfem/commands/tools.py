@@ -46,21 +46,28 @@ def doubt_code(remarks: Iterable[result_text.Remark]) -> int:
 def check(options: argparse.Namespace) -> int:
     """Check a case; where that fails, draw the drawing that it may have."""
     try:
-        return _check_case(options)
+        code = _check_case(options)
+        # an earlier picture shows faults that are mended
+        if (picture := Path(f"{Path(options.case).stem}_drawing.png")).exists():
+            with suppress(ArchfemError, OSError):
+                if _draw_as_read(options) is not None:
+                    print(f"wrote {picture} anew: the drawing as it was read")
+        return code
     except ArchfemError as error:
         # without drawing, file or place for the picture the error is all
         with suppress(ArchfemError, OSError):
-            if (picture := _draw_as_read(options, str(error))) is not None:
-                print(f"wrote {picture}: the drawing as it was read", file=sys.stderr)
+            if (drawn := _draw_as_read(options, str(error))) is not None:
+                print(f"wrote {drawn}: the drawing as it was read", file=sys.stderr)
         raise
 
 
-def _draw_as_read(options: argparse.Namespace, error: str) -> Path | None:
-    """Draw the drawing of a case in the current folder; None where it has none."""
+def _draw_as_read(options: argparse.Namespace, error: str = "") -> Path | None:
+    """Draw the drawing of a case in the current folder; None where it has none in error."""
     path = Path(options.case)
     given = find_drawing(read_settings(path, options.changes), path.parent)
     # errors of the drawing name it, or a structure that does not stand
-    if given is None or not (given["path"].name in error or "does not stand" in error):
+    names = given and (given["path"].name in error or "does not stand" in error)
+    if given is None or (error and not names):
         return None
     from archfem.view.sketch import draw_outlines
     from archfem.view.style import save

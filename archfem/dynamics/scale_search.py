@@ -304,7 +304,7 @@ def search_scales(
                 count += 1
                 if left := _count_left(scales, precision, between, begin):
                     last = spent / count * left
-                    made += f"; about {left} runs, {last:.2g} s, are left by this time step"
+                    made += f"; about {left} runs, {last:.2g} s, are left by this time step alone"
                 progress.show(made, 1)
                 if len(scales.runs) == 2 and all(find_tension([x]) < inf for x in scales.runs):
                     write_progress_line("scale", _MAY_BE_VAIN)

@@ -152,6 +152,15 @@ def test_python_and_files_have_the_same_defaults():
     }
 
 
+def test_the_ratio_of_a_matched_suite_is_that_before_matching():
+    """Matching gives each component its own target, whatever the ratio was."""
+    pairs = {"one": {"synthetic": {"seed": 1, "duration": 10.0}}}
+    suite = {"pairs": pairs, "target": {"code": "EC8", "type": 1, "ag": 0.25, "ground": "A"}}
+    for matched, words in ((True, "horizontal, before matching;"), (False, "horizontal;")):
+        case = af.Case.of({"structure": COLUMN, "suite": {**suite, "matched": matched}})
+        assert f"vertical motion 2/3 of the {words}" in describe_defaults(case)
+
+
 def test_results_name_them():
     case = af.Case.of({**BARE, "model": {"fidelity": "rigid"}})
     assert describe_defaults(case) in describe_dead_load(af.cases.DeadLoadResult.of(case))

@@ -647,6 +647,33 @@ def test_openings_of_a_wall_given_by_its_blocks_are_measured():
     assert ("opening", words, "inferred") in [*inputs._measure_rows(wall)]
 
 
+def test_the_rise_of_a_ring_is_that_of_its_whole_corners():
+    """The keystone's neighbour has lost 60 × 60 mm at the intrados, near the crown."""
+    ring = af.circular_arch(radius=2.0, embrace=140.0, thickness=0.3, voussoirs=11)
+    stones = [
+        af.Block(tuple(map(tuple, x.points)), x.material, x.name, x.fixed, part=x.part, role=x.role)
+        for x in ring.blocks
+    ]
+    key = max(range(len(stones)), key=lambda n: stones[n].points[:, 1].mean())
+    low = stones[key].points[stones[key].points[:, 1].argsort()[:2]]  # ends of its intrados
+    right = low[low[:, 0].argmax()]
+    others = [n for n in range(len(stones)) if n != key]
+    chipped = min(others, key=lambda n: np.linalg.norm(stones[n].points - right, axis=1).min())
+    points = stones[chipped].points
+    corner = int(np.linalg.norm(points - right, axis=1).argmin())
+    ends = points[corner - 1], points[(corner + 1) % len(points)]
+    away = [end - points[corner] for end in ends]
+    cut = [points[corner] + 0.06 * step / np.linalg.norm(step) for step in away]
+    outline = tuple(map(tuple, [*points[:corner], *cut, *points[corner + 1 :]]))
+    whole, stones[chipped] = [*stones], replace(stones[chipped], outline=outline)
+    rises = []
+    for blocks in (whole, stones):
+        structure = af.masonry.assembled(blocks, ring.joints[0].contact)
+        ((_, words, _), *_) = inputs._measure_rows(structure)
+        rises.append(re.search(r"rise (\S+) m", words)[1])
+    assert rises[0] == rises[1]
+
+
 @pytest.mark.parametrize("norm", ["EN 1998-1", "NTC 2018"])
 def test_a_norm_without_an_assessment_is_named_as_such(piers, norm, tmp_path):
     data = report_data.ReportData(made_case(piers, settings={}), {})

@@ -145,7 +145,9 @@ def test_lines_of_a_search_estimate_how_many_runs_are_left(threshold, monkeypatc
     assert len(done) == len(made)
     known = next(k for k in range(99) if min(made[: k + 1]) < threshold <= max(made[: k + 1]))
     for k, line in enumerate(done[:-1]):
-        left, seconds = re.search(r"; about (\d+) runs, (\S+) s, are left by this", line).groups()
+        left, seconds = re.search(
+            r"; about (\d+) runs, (\S+) s, are left by this time step alone", line
+        ).groups()
         assert float(seconds) == pytest.approx(1.5 * int(left), rel=0.05)  # two digits
         assert k < known or abs(int(left) - (len(made) - 1 - k)) <= 2
     assert "left" not in done[-1]

@@ -533,7 +533,8 @@ fidelity = "rigid"
     )
     line = (
         "drawing: 1 × 2 m, read in mm, corners moved by up to 1.5 mm; ignored layers: "
-        "'NOTE' with 1 outlines;\n  closed by snap: 1 joint, drawn open by more than 1 mm, 3 mm between "
+        "'NOTE' with 1 outlines;\n  closed by snap: 1 joint, drawn open by more than 1 mm, 3 mm "
+        "between "
     )
     assert af.commands.main(["run", str(tmp_path / "a.toml"), "--out", str(tmp_path / "out")]) == 0
     assert line in capsys.readouterr().out

@@ -239,6 +239,11 @@ def test_check_command(capsys, tmp_path, monkeypatch):
     assert "51 blocks, 89 joints" in capsys.readouterr().out
     assert main(["check", str(SHIPPED), *changes, "--set", "structure.snap=1 mm"]) == 1
     assert "or raise snap from 0.001 to 0.002 m" in capsys.readouterr().err
+    (picture,) = tmp_path.glob("*_drawing.png")
+    faulty = picture.read_bytes()
+    assert main(["check", str(SHIPPED), *changes]) == 3
+    assert f"wrote {picture.name} anew" in capsys.readouterr().out
+    assert picture.read_bytes() != faulty
 
 
 @pytest.mark.parametrize(

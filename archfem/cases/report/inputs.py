@@ -22,6 +22,7 @@ from archfem.masonry.materials import Contact, Material
 from archfem.masonry.out_of_plane import describe_lengths, find_openings
 from archfem.masonry.shapes.bridge_parts import Backfill
 from archfem.masonry.structure import Structure, describe_piers, find_clear_spans, join_words
+from archfem.masonry.survey.joint_faces import LEAST_OPENING, Chip, find_chips
 from archfem.motion.design_spectra import CodeSpectrum
 from archfem.statics.mechanism_assessment import kinematic_assessment
 from archfem.statics.pushover import pushover
@@ -224,10 +225,12 @@ def _structure_rows(data: ReportData) -> Iterator[Row]:
 
 def _measure_rows(structure: Structure) -> Iterator[Row]:
     """Yield lengths of rings and piers that are given block by block, and sizes of stones."""
+    touches = [(*joint.blocks, joint.ends) for joint in structure.joints]
+    chips = find_chips([block.points for block in structure.blocks], touches, LEAST_OPENING)
     for part, (low, high) in find_clear_spans(structure).items():
         own = [each for each in structure.joints if each.role == "ring" and each.part == part]
         stones = [block.points for block in structure.blocks if block.part == part]
-        rise = _find_crown(stones, low, high) - min(joint.intrados[1] for joint in own)
+        rise = _find_crown(stones, low, high, chips) - min(joint.intrados[1] for joint in own)
         depths = Ends.of(joint.depth for joint in own)
         depth = f", rise {rise:.3g} m, thickness" if rise > 1e-6 else ", bearings"
         text = f"clear span {high - low:.3g} m{depth} {depths:.3g} m"
@@ -241,8 +244,10 @@ def _measure_rows(structure: Structure) -> Iterator[Row]:
     yield "stones", f"{len(structure.free)} that can move, of {areas:.2g} m²", "inferred"
 
 
-def _find_crown(stones: Sequence[Array], low: float, high: float) -> float:
-    """Return the highest level of the underside between the ends of a clear span [m]."""
+def _find_crown(
+    stones: Sequence[Array], low: float, high: float, chips: Sequence[Chip] = ()
+) -> float:
+    """Return the highest level of the underside in a clear span, but that of chips [m]."""
     edges = np.concatenate([np.stack([x, np.roll(x, -1, axis=0)], axis=1) for x in stones])
     a, b = np.moveaxis(edges[edges[:, 0, 0] != edges[:, 1, 0]], 1, 0)
     # the apex of a pointed arch may be within the face of a stone
@@ -250,7 +255,9 @@ def _find_crown(stones: Sequence[Array], low: float, high: float) -> float:
     share = (at[:, None] - a[:, 0]) / (b - a)[:, 0]
     levels = np.where(np.abs(share - 0.5) <= 0.5 + 1e-9, a[:, 1] + share * (b - a)[:, 1], np.inf)
     underside = levels.min(axis=1)
-    return float(underside[np.isfinite(underside)].max())
+    places = np.column_stack([at, underside])[np.isfinite(underside)]
+    whole = [place[1] for place in places if not any(chip.holds(place) for chip in chips)]
+    return float(max(whole or places[:, 1]))
 
 
 def _list_left_out(declaration: Callable[..., Any], given: set[str]) -> str:
