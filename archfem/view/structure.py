@@ -555,8 +555,12 @@ def _draw_peak(axes: Axes, structure: Structure, run: History, joints: xr.Datase
     displaced = np.split(places + by * moved, np.flatnonzero(np.diff(block)) + 1)
     style.add_polygons(axes, outlines, "none", edge=Colour.UNDEFORMED, width=0.6, zorder=0)
     style.add_polygons(axes, displaced, block_colours(structure), gid="blocks")
-    for name in dict.fromkeys(find_farthest(run.dataset, structure)[0]):
-        style.write_name(axes, name, displaced[structure.block_number(name)].mean(axis=0))
+    farthest = dict.fromkeys(find_farthest(run.dataset, structure)[0])
+    middles = {name: displaced[structure.block_number(name)].mean(axis=0) for name in farthest}
+    # the lower name is below its point and the other above, so that neighbours stay apart
+    named = sorted(middles.items(), key=lambda item: float(item[1][1]))
+    for (name, middle), side in zip(named, ("top", "bottom"), strict=False):
+        style.write_name(axes, name, middle).set_va(side)
     shift = by * positions.peak_joint_ends(structure, run)
     draw_marks(axes, joint_marks(structure, joints, shift=shift))
     scale = "" if by == 1.0 else f", displacements × {by:g}"

@@ -68,7 +68,12 @@ def _draw_property(axes: Axes, verdicts: VerdictRange, values: Array, heights: A
     """Draw a dot for each answered run over a property, labels side by side."""
     if values.dtype.kind == "f":
         places = values
-        axes.set_xscale("log" if values.max() > 10.0 * values.min() > 0.0 else "linear")
+        if values.max() > 10.0 * values.min() > 0.0:
+            axes.set_xscale("log")
+            axes.xaxis.set_minor_formatter(NullFormatter())
+            if values.max() < 50.0 * values.min():  # few powers of ten
+                axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+                axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
     else:
         labels, number = np.unique(values, return_inverse=True)
         # runs of one label are spread out, so that equal results remain visible

@@ -1,6 +1,7 @@
 """Statistics of a range of verdicts against closed forms and made-up runs."""
 
 import json
+from itertools import pairwise
 from math import comb
 
 import numpy as np
@@ -562,3 +563,17 @@ def test_factors_over_more_than_a_decade_have_a_logarithmic_axis():
     scales = {axes.get_xlabel().split(",")[0]: axes.get_xscale() for axes in figure.axes}
     expected = {"shear stiffness": "log", "normal stiffness": "linear", "friction": "linear"}
     assert scales == expected
+
+
+@pytest.mark.parametrize("low", [0.26, 0.0035])
+def test_labels_of_a_logarithmic_axis_stay_apart(low):
+    values = np.geomspace(low, 4.0, 4)
+    figure = made_up([True, False, False, True], k_n=values, friction=[0.0, 0.1, 0.2, 0.3]).plot()
+    (axes,) = (each for each in figure.axes if "stiffness" in each.get_xlabel())
+    figure.draw_without_rendering()
+    ticks = [*axes.xaxis.get_major_ticks(), *axes.xaxis.get_minor_ticks()]
+    left, right = axes.get_xlim()
+    labels = [x.label1 for x in ticks if left <= x.get_loc() <= right and x.label1.get_text()]
+    assert len(labels) > 1
+    boxes = sorted((x.get_window_extent() for x in labels), key=lambda box: box.x0)
+    assert all(one.x1 < other.x0 for one, other in pairwise(boxes))

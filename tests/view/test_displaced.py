@@ -102,6 +102,9 @@ def test_a_run_without_fields_is_drawn_at_its_largest_displacement():
     )
     names = {text.get_text() for text in figure.axes[1].texts}
     assert names == {f"block {most:.0f}", f"block {left:.0f}"}
+    # the lower name below its point, so that those of neighbours stay apart
+    sides = [(text.xy[1], text.get_va()) for text in figure.axes[1].texts]
+    assert [side for _, side in sorted(sides)] == ["top", "bottom"][: len(names)]
     scene = Scene(stones, run)
     assert scene.initial_time == peak_instant(run) == scene.data["peak"]
     assert [len(part) for part in scene.moved] == [1, 1, 1]
