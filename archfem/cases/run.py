@@ -31,6 +31,7 @@ from archfem.dynamics.analysis import Analysis
 from archfem.dynamics.damping import resolve_effective_damping
 from archfem.dynamics.fall import mark_interrupted
 from archfem.dynamics.history import FILE_KIND, Ending, History, partial_history
+from archfem.dynamics.recorder import Record
 from archfem.dynamics.schemes import Viscous
 from archfem.dynamics.slip_error import least_compression
 from archfem.dynamics.time_history import time_history
@@ -493,7 +494,8 @@ def _compare_start(
     try:
         cut = motion.cut(0.0, 0.5)
         with keep_warnings():  # which are of this model, and not of the run
-            run = time_history(analysis, cut, start=dead, damping=at_rest.damping[0])
+            settings: Any = {"start": dead, "damping": at_rest.damping[0]}
+            run = time_history(analysis, cut, record=Record(repeat=False), **settings)
         if run.ending is Ending.INTERRUPTED:
             raise KeyboardInterrupt
     except ArchfemError:  # it has no equilibrium at some step: no comparison

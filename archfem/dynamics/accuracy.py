@@ -16,6 +16,7 @@ from archfem.dynamics.damping import resolve_effective_damping
 from archfem.dynamics.error_estimation import largest_difference, severe_motion
 from archfem.dynamics.history import Ending, History
 from archfem.dynamics.model_selection import Setting, exact_discretisation, stone_fidelity
+from archfem.dynamics.recorder import Record
 from archfem.dynamics.schemes import EffectiveDamping, Viscous
 from archfem.dynamics.time_history import time_history
 from archfem.errors import DidNotConverge
@@ -191,7 +192,7 @@ def time_run(model: Model, motion: Motion, dt: float, **options: Any) -> TimedRu
     time_history(model, motion.cut(0.0, max(2.0 * dt, motion.dt)), dt=dt, **options)
     begin = process_time()
     try:
-        run = time_history(model, motion, dt=dt, **options)
+        run = time_history(model, motion, dt=dt, record=Record(repeat=False), **options)
     except DidNotConverge:
         return TimedRun(model.size, process_time() - begin, None)
     if run.ending is Ending.INTERRUPTED:

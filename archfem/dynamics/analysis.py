@@ -59,8 +59,8 @@ class Analysis:
         quadrature_points: as for `archfem.build`.
         displacements: "small", or "large" for finite rotations, sliding and falls.
         mesh_file: as for `archfem.build`.
-        tolerance: admissible error of |e|: of the selection with fidelity "auto", and without `dt`
-            of steps of varying length [-].
+        tolerance: admissible error of |e| [-]: of the selection with fidelity "auto", and without
+            `dt` of each step, which bounds no error of the result.
         dt: time step [s]; None for steps of varying length.
         damping: `StiffnessDamping`, `Rayleigh`, or `EffectiveDamping`, whose frequencies are those
             of modes about the dead load; "effective" is the last with its defaults; None is

@@ -25,8 +25,10 @@ from archfem._threads import single_threaded
 from archfem._typing import Array
 from archfem.dynamics.monitor import RunMonitor
 from archfem.dynamics.recorder import start_batch
-from archfem.dynamics.schemes import StiffnessDamping, Viscous
+from archfem.dynamics.schemes import HHT, StiffnessDamping, Viscous
+from archfem.dynamics.separation import LooseningMonitor
 from archfem.dynamics.solvers.equation import Equation
+from archfem.dynamics.solvers.integrator import Stepper
 from archfem.dynamics.solvers.selection import stepper_for
 from archfem.dynamics.state import State
 from archfem.errors import DidNotConverge
@@ -95,6 +97,7 @@ class RunPeaks:
     times: Array = field(default_factory=lambda: np.zeros(0))  # of the peaks (n,) [s]
     states: tuple[State, ...] = ()  # at the start of the run, and at intervals of some steps
     slip: float = 0.0  # largest slip of an assessed joint from the start, over its depth [-]
+    displacement: float = 0.0  # largest displacement of a stone's corner from the start [m]
 
 
 # Parts of a run: the state at the start of each, and the time of its end [s]
@@ -103,25 +106,38 @@ Parts = Sequence[tuple[State, float]]
 
 @single_threaded
 def run_peaks(
-    model: Model, motion: Motion, damping: Viscous | None, dt: float, parts: Parts | None = None
+    model: Model,
+    motion: Motion,
+    damping: Viscous | None,
+    dt: float,
+    parts: Parts | None = None,
+    stepper: Stepper | None = None,
 ) -> RunPeaks:
-    """Run a model of small displacements, from dead load by default, and return its peaks."""
-    structure, equation = model.structure, Equation(model, motion, damping)
+    """Run a model, from dead load by default, and return its peaks; none where blocks come loose.
+
+    The rotation is that of small displacements. A stepper is of the same model, motion and damping.
+    """
+    structure = model.structure
+    stepper = stepper or stepper_for("auto", Equation(model, motion, damping))
     if parts is None:
         rest = dead_load(model)
-        parts = [(equation.at_rest(rest.q, memory=rest.model.memory), motion.duration)]
-    stepper, depths = stepper_for("auto", equation), structure.depths[structure.judged]
+        parts = [(stepper.equation.at_rest(rest.q, memory=rest.model.memory), motion.duration)]
+    depths = structure.depths[structure.judged]
     peaks, times, rotation, states = np.zeros(len(depths)), np.zeros(len(depths)), 0.0, []
-    observer, slip = model.observer(), 0.0
+    observer, slip, displacement = model.observer(), 0.0, 0.0
     try:
         for start, end in parts:
             first = start_batch(stepper, start, dt)
             at_rest = observer.faces(first.read(observer))[0, 2, structure.judged] / depths
-            monitor = RunMonitor(model, first)
+            monitor = RunMonitor(model, first, damps=isinstance(stepper.equation.scheme, HHT))
+            large = model.large_displacements
+            loosening = LooseningMonitor.of(model, start) if large else None
             for batch in chain([first], stepper.batches(start, dt, min(end, motion.duration))):
                 readings = batch.read(observer)
                 monitor.add(batch, readings)
                 monitor.check_run()
+                if loosening and loosening.find_end(batch)[1]:
+                    return RunPeaks(None)
                 slips = observer.faces(readings)[:, 2, structure.judged] / depths
                 slip = max(slip, float(np.abs(slips - at_rest).max()))
                 resultants = batch.resultants[:, structure.judged]
@@ -133,9 +149,11 @@ def run_peaks(
                 peaks = np.maximum(peaks, largest)
                 states += [batch.state(k) for k in range(0, len(batch.times), 32)]
             rotation = max(rotation, monitor.largest_turn)
+            moved = monitor.displacements
+            displacement = max(displacement, float(moved.largest[moved.stones].max()))
     except DidNotConverge:
         return RunPeaks(None)
-    return RunPeaks(peaks, rotation, times, tuple(states), slip)
+    return RunPeaks(peaks, rotation, times, tuple(states), slip, displacement)
 
 
 def parts_about_peaks(run: RunPeaks, before: float = 1.0, after: float = 0.25) -> Parts:

@@ -213,12 +213,12 @@ class History(ResultDisplay):
 
         They concern energy drift above 5 % at any step; rotations and displacements too large for a
         model of small displacements; damping that drags loose blocks; a record that drifts; a
-        missed tolerance of the steps; constant steps that are long for sliding; a fidelity that
-        does not suit a block; a predicted error above its tolerance; a run that was broken off;
-        blocks that were loose before strong motion was over, and did not fall; soft blocks that
-        fall in one piece; a stack that as one rigid body falls, stands or moves otherwise; joints
-        between stones that fail and are not assessed; and soft joints that let blocks rock before
-        they hinge. The last two need the structure.
+        missed tolerance of the steps; steps that are long for sliding, or with a fifth of which the
+        displacement differs; a fidelity that does not suit a block; a predicted error above its
+        tolerance; a run that was broken off; blocks that were loose before strong motion was over,
+        and did not fall; soft blocks that fall in one piece; a stack that as one rigid body falls,
+        stands or moves otherwise; joints between stones that fail and are not assessed; and soft
+        joints that let blocks rock before they hinge. The last two need the structure.
         """
         stored = read_doubts(str(self.dataset.attrs.get("doubts", "[]")))
         return (*stored, *self._doubts_of_run)

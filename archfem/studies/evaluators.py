@@ -77,8 +77,10 @@ class PreparedRuns:
     damping: Viscous | EffectiveDamping | str | None
 
     def run(self, motion: Motion) -> History:
-        """Return the history under a motion; Ctrl-C ends all runs."""
-        run = time_history(self.analysis, motion, start=self.rest, damping=self.damping)
+        """Return the history under a motion, by default not repeated; Ctrl-C ends all runs."""
+        record = replace(self.analysis.record, repeat=self.analysis.record.repeat or False)
+        given: Any = {"start": self.rest, "damping": self.damping, "record": record}
+        run = time_history(self.analysis, motion, **given)
         if run.ending is Ending.INTERRUPTED:
             raise KeyboardInterrupt
         return run

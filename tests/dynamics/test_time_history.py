@@ -7,11 +7,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from glued import glued
+from scipy.integrate import solve_ivp
 
 import archfem as af
 from archfem.dynamics import Ending, Record, last_state
+from archfem.dynamics.error_estimation import RunPeaks
 from archfem.dynamics.separation import LooseningMonitor
 from archfem.dynamics.time_history import _doubt_shortest_steps, _find_end, _resolve_steps
+from archfem.studies.evaluators import PreparedRuns
 
 DAMPING = af.Rayleigh(0.05, (8.0, 16.0))
 GIVEN = {"damping": DAMPING, "dt": 0.005}
@@ -237,3 +240,111 @@ def test_the_pace_of_a_run_is_that_of_a_hundredth_of_it(stack, monkeypatch, capl
     assert advice == ""  # a dt is given
     assert duration == 2000.0
     assert 20.0 < done < 40.0
+
+
+BREADTH, HEIGHT, NORMAL, SHEAR = 0.6, 2.4, 1.48e9, 3e8
+LAG = af.StiffnessDamping(0.05, 10.0)
+
+
+def rocking(seed, pga, begin):
+    """Return a block on an elastic joint that cannot slide, and 2.5 s of a motion."""
+    contact = af.Contact(NORMAL, SHEAR, friction=None)
+    block = af.column(breadth=BREADTH, heights=[HEIGHT], contact=contact)
+    motion = af.Motion.synthetic(duration=10.0, pga=pga, seed=seed)
+    return af.build(block, fidelity="rigid"), motion.cut(begin, begin + 2.5)
+
+
+def integrate_rocking(motion, density):
+    """Return the largest displacement of a corner by an own integration [m].
+
+    The joint is a bed of springs without tension, whose gaps take their rates times the lag.
+    """
+    mass, lag, arm = density * BREADTH * HEIGHT, LAG.stiffness, 0.5 * HEIGHT
+    inertia = mass * (BREADTH**2 + HEIGHT**2) / 12.0
+    ends = -0.5 * BREADTH, 0.5 * BREADTH
+    times = [motion.times(), motion.times("vertical")]
+    down = -mass * af.units.G / (NORMAL * BREADTH)
+
+    def rates(time, state):
+        x, y, turn = (state[:3] + lag * state[3:]).tolist()
+        first, last = ends
+        if turn and first < -y / turn < last:  # closed from one end to where the gap is zero
+            first, last = (first, -y / turn) if turn > 0.0 else (-y / turn, last)
+        elif y > 0.0:
+            first = last = 0.0
+        area, static, second = last - first, (last**2 - first**2) / 2, (last**3 - first**3) / 3
+        normal = -NORMAL * (y * area + turn * static)
+        moment = -NORMAL * (y * static + turn * second)
+        shear = -SHEAR * BREADTH * (x + arm * turn)
+        ground = np.interp(time, times[0], motion.horizontal)
+        upward = np.interp(time, times[1], motion.vertical)
+        forces = shear / mass - ground, normal / mass - af.units.G - upward
+        return *state[3:], *forces, (moment + arm * shear) / inertia
+
+    given = {"method": "LSODA", "rtol": 1e-6, "atol": 1e-9, "max_step": 5e-3}
+    done = solve_ivp(rates, (0.0, motion.duration), [0.0, down, 0.0, 0.0, 0.0, 0.0], **given)
+    x, y, turn = done.y[:3]
+    return max(np.hypot(x - arm * turn, y - down + a * turn).max() for a in ends)
+
+
+@pytest.mark.parametrize(
+    ("chosen", "off"),
+    [
+        ((1, 2.5, 2.0), (True, True)),
+        pytest.param((5, 2.5, 1.0), (True, False), marks=pytest.mark.slow),
+    ],
+    ids=["all steps", "constant steps"],
+)
+def test_what_rocking_multiplies_is_doubted(chosen, off, verified):
+    """By constant and by default steps a displacement errs by a factor of 2.5, or two fifths."""
+    model, motion = rocking(*chosen)
+    density = model.structure.density(model.structure.blocks[1])
+    expected = integrate_rocking(motion, density)
+    fine = af.time_history(model, motion, dt=2e-4, damping=LAG)
+    size = fine.verdict.displacement
+    assert size == pytest.approx(expected, rel=0.01)
+    verified(
+        f"block rocks, motion {chosen[0]}, displacement [m]", expected, "own integration", size
+    )
+    assert not fine.doubts
+    for dt, wrong in zip((0.005, None), off, strict=True):
+        run = af.time_history(model, motion, dt=dt, damping=LAG)
+        size = run.verdict.displacement
+        assert (abs(size / expected - 1.0) > 0.1) == wrong == bool(run.doubts)
+        if wrong:
+            (doubt,) = run.doubts
+            assert f"change the largest displacement from {1e3 * size:.3g} mm to" in doubt.cause
+            assert doubt.values[3] == pytest.approx(expected, rel=0.1)
+            assert doubt.remedy.startswith(
+                f"take shorter steps, `--set analysis.dt={doubt.values[0] / 1e3:g}`"
+            )
+            alone = af.time_history(model, motion, dt=dt, damping=LAG, record=Record(repeat=False))
+            assert not alone.doubts
+            assert alone.verdict.displacement == size
+
+
+def test_a_repetition_that_is_stopped_or_fails_is_stated(monkeypatch):
+    """Ctrl-C keeps the run; blocks that come loose by shorter steps alone are a doubt."""
+    model, motion = rocking(1, 2.5, 2.0)
+    monkeypatch.setattr("archfem.dynamics.time_history.run_peaks", lambda *_: RunPeaks(None))
+    (doubt,) = af.time_history(model, motion, dt=0.005, damping=LAG).doubts
+    assert "with steps of 1 ms in place of 5 ms the run fails" in doubt.cause
+
+    def stop(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("archfem.dynamics.time_history.run_peaks", stop)
+    run = af.time_history(model, motion, dt=0.005, damping=LAG)
+    assert run.ending is Ending.INTERRUPTED
+    assert run.time[-1] == pytest.approx(2.5)
+    monkeypatch.setattr("archfem.dynamics.time_history.MAX_REPEATED_SIZE", 2)
+    assert not af.time_history(model, motion, dt=0.005, damping=LAG).doubts
+
+
+def test_runs_of_studies_are_repeated_where_the_record_says_so():
+    """Of hundreds the time would triple; `record.repeat` decides where it is given."""
+    model, motion = rocking(1, 2.5, 2.0)
+    for record, count in ((Record(), 0), (Record(repeat=True), 1)):
+        analysis = af.Analysis(model.structure, fidelity="rigid", dt=0.005, record=record)
+        runs = PreparedRuns(analysis, None, LAG)
+        assert len(runs.run(motion).doubts) == count
