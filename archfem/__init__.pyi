@@ -33,9 +33,9 @@ from .errors import InvalidInput as InvalidInput
 from .errors import InvalidStructure as InvalidStructure
 from .joints.criteria import Criteria as Criteria
 from .limit.collapse import collapse_factor as collapse_factor
-from .limit.collapse import stands as stands
 from .limit.mechanism_kinematics import verified_mechanism as verified_mechanism
 from .limit.rating import rate as rate
+from .limit.self_weight import stands as stands
 from .limit.thickness import minimum_thickness as minimum_thickness
 from .limit.vehicles import moving_load as moving_load
 from .masonry import shapes as shapes

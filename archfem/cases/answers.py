@@ -18,6 +18,7 @@ from archfem.cases.result_text import Remark, ResultTable
 from archfem.dynamics.motion_scaling import CollapseScale
 from archfem.dynamics.scale_search import MechanismScales
 from archfem.errors import DidNotConverge, InvalidInput
+from archfem.limit.collapse import Collapse
 from archfem.limit.fill_range import FillRange
 from archfem.limit.finite_mechanism import PathEnd
 from archfem.masonry.loads import AttachedLoad, name_side
@@ -360,8 +361,11 @@ def describe_margin(found: Iterable[KinematicAssessment]) -> str:
     return f"least margin {ratios}, by {check.name}{side}: {outcome}{other}"
 
 
-def doubt_fill(site: PushFactors | None) -> list[Doubt]:
-    """Return the doubt of a push that exceeds the site's acceleration on some fills alone."""
+def doubt_fill(site: PushFactors | None, found: Collapse) -> list[Doubt]:
+    """Return the doubt of a push of the site, or a load, that is borne on some fills alone."""
+    if found.over_fill and not found.push:
+        needed = found.over_fill.needed
+        return doubt_assumed(f"the load is borne: only with {needed}", decide=bool(needed))
     decide = site is not None and site.least < 1.0 <= site.most
     return doubt_assumed("the ground sets it in motion", decide=decide)
 

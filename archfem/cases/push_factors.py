@@ -72,7 +72,9 @@ def compare_with_site(case: Case, *senses: Collapse | None) -> PushFactors | Non
     if factors and searched:  # the search may have missed a weaker solution
         proved = min(each.bracket[0] for each in searched) * factors.least / low
         factors = factors._replace(proved=max(proved, 0.0))
-    return factors and factors._replace(bounded=any(x.bounded for x in ends))
+    # the least of the fills for which a state was found
+    bounded = any(x.bounded or (x.over_fill and x.over_fill.unknown) for x in pushed)
+    return factors and factors._replace(bounded=bounded)
 
 
 def compare_with_motion(case: Case, found: Collapse) -> str:

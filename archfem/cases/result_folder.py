@@ -197,8 +197,10 @@ def limit_files(
     # without a site the factor of a push would be read as one on a demand
     demand = "; ".join(filter(None, [NO_DEMAND, compare_with_motion(case, collapse)]))
     demand = demand if collapse.push else "the given load"
-    if not collapse.push and collapse.outcome is Outcome.COLLAPSES:
-        site = PushFactors(*collapse.range, bounded=collapse.bounded)
+    over = collapse.over_fill
+    if not collapse.push and (collapse.outcome is Outcome.COLLAPSES or over):
+        bounded = collapse.bounded or bool(over and over.unknown)
+        site = PushFactors(*collapse.range, bounded=bounded)
     remarks: list[Remark] = list(doubts)
     remarks += note_collapse(case.structure, collapse, case.limit, case.parapets)
     given = collapse.sentence, remarks, demand, site

@@ -44,8 +44,9 @@ from archfem.errors import (
     logger,
 )
 from archfem.joints.criteria import assessed_joints
-from archfem.limit.collapse import Collapse, stands
+from archfem.limit.collapse import Collapse
 from archfem.limit.fill_strength import Fill
+from archfem.limit.self_weight import stands
 from archfem.masonry.loads import describe_forces
 from archfem.masonry.stiffness_ratio import soften_joints
 from archfem.masonry.structure import list_first
@@ -163,10 +164,12 @@ class DeadLoadResult:
             remedy = "if it is a stone, draw it on the layer of its part"
             lost = [Doubt(words, remedy, each) for each in survey.lost] if survey else []
         limit = self.case.limit
-        with suppress(ArchfemError):  # bonds, which limit analysis of dead load does not take
+        # bonds, which limit analysis of dead load does not take
+        with keep_warnings() as said, suppress(ArchfemError):
             if isinstance(limit.fill, Fill) and not stands(self.case.structure, **limit.resistance):
                 words = "limit analysis with the fill of [limit] finds no equilibrium at rest"
                 lost.append(Doubt(words, "check the thickness of rings and piers, and the fill"))
+        lost += [Doubt("{}", "measure the fill, and look for backing", (each,)) for each in said]
         loads = (*limit.dead, *self.case.assessment.options.get("loads", ()))
         ties = [f"the tie at {load.block}" for load in loads if getattr(load, "passive", False)]
         left = ", ".join([each for each in (describe_forces(loads), list_first(ties, 3)) if each])

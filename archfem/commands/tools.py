@@ -225,7 +225,7 @@ def show_both_senses(
         slides = [doubt for doubt in once if doubt.cause.startswith("joints slide (")]
         if len(slides) > 1 and opposite is not None:  # that of the sense which is shown is enough
             once.remove(slides[0 if found is opposite else 1])
-        once += doubt_fill(site)
+        once += doubt_fill(site, found)
         show(found, "\n".join([f"{text}{left}", *result_text.mark_remarks(once)]), site, once)
     return once
 

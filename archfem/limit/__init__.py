@@ -1,7 +1,7 @@
 """Limit analysis of rigid blocks: collapse factor, least thickness, mechanisms.
 
     backfill              earth pressure, load spreading
-    collapse              collapse_factor, stands
+    collapse              collapse_factor
     collapse_warnings     why a factor may be an upper estimate
     cone_programme        second-order cone programmes
     displaced_blocks      limit analysis of blocks at displaced places
@@ -18,7 +18,7 @@
     mechanism_names       plain names of mechanisms
     nonassociated         sliding without dilatancy
     rating                rating for vehicles of codes
-    self_weight           linear programme of self-weight
+    self_weight           linear programme of self-weight, stands
     support_movement      finite movement of a support
     thickness             least thickness
     vehicles              vehicles over a bridge

@@ -2,7 +2,6 @@ from .collapse import Collapse as Collapse
 from .collapse import Outcome as Outcome
 from .collapse import closed_cohesion as closed_cohesion
 from .collapse import collapse_factor as collapse_factor
-from .collapse import stands as stands
 from .fill_range import FillRange as FillRange
 from .fill_strength import Fill as Fill
 from .fill_strength import PlasticFill as PlasticFill
@@ -21,6 +20,7 @@ from .mechanism_kinematics import verified_mechanism as verified_mechanism
 from .nonassociated import NonassociatedBounds as NonassociatedBounds
 from .rating import Rating as Rating
 from .rating import rate as rate
+from .self_weight import stands as stands
 from .support_movement import End as End
 from .support_movement import Movement as Movement
 from .support_movement import Stage as Stage

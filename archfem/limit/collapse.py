@@ -106,7 +106,7 @@ class Collapse(ResultDisplay):
             else None.
         upper: bound that no state of equilibrium exceeds: the factor itself, with a `PlasticFill`
             the bound from above. `factor` is the bound from below then, as `lower` is.
-        over_fill: factors over all assumptions on a `Fill` that is pushed sideways; else None.
+        over_fill: factors over all assumptions on a `Fill`; None without one, and of a settlement.
         least: the result under the assumption with the least factor, the fall at rest where nothing
             stands under it; None where it is this one.
         notes: what is in doubt about this factor, and not about the least.
@@ -362,7 +362,9 @@ def collapse_factor(
         warn_lift(loads)
     stays = tuple(list_loads(dead)) if dead else ()
     given = structure, loads, stays, friction, strength
-    return _solve_range(given, fill) if isinstance(fill, Fill) else _solve_loads(*given, fill)
+    if isinstance(fill, Fill) and not isinstance(loads, Settlement):
+        return _solve_range(given, fill)
+    return solve_as_given(*given, fill)
 
 
 def _solve_range(given: tuple[Any, Any, Any, Any, Any], fill: Fill) -> Collapse:
@@ -370,13 +372,13 @@ def _solve_range(given: tuple[Any, Any, Any, Any, Any], fill: Fill) -> Collapse:
     said = list[str]()
     try:
         with keep_warnings() as said:
-            result = _solve_loads(*given, fill)
-        others = {} if np.isnan(result.factor) else _vary_assumptions(given, fill, result, said)
-        if not others:
+            result = solve_as_given(*given, fill)
+        if np.isnan(result.factor):
             return result
-        falls = Outcome.INFEASIBLE
+        every, falls = _vary_assumptions(given, fill, result, said), Outcome.INFEASIBLE
+        others = {k: each for k, each in every.items() if each[0].outcome is not Outcome.BRACKETED}
         values = {k: 0.0 if x.outcome is falls else x.factor for k, (x, _) in others.items()}
-        over = FillRange(values)
+        over = FillRange(values, tuple(k for k in every if k not in others))
         result = replace(result, over_fill=over)
         if over.ends[0] == result.factor:
             return result
@@ -393,59 +395,58 @@ def _solve_range(given: tuple[Any, Any, Any, Any, Any], fill: Fill) -> Collapse:
 def _vary_assumptions(
     given: tuple[Any, Any, Any, Any, Any], fill: Fill, found: Collapse, said: list[str]
 ) -> dict[FillAssumption, tuple[Collapse, list[str]]]:
-    """Return results and warnings under all assumptions on a fill that is pushed, one known."""
+    """Return results and warnings under all assumptions on a fill, one known."""
     results = dict[FillAssumption, tuple[Collapse, list[str]]]()
-    pushed = sum_body_forces([*found._loads, *found.dead])[0]
-    for assumption, (_, assumed) in vary_fill(fill).items() if pushed else ():
+    pushed = bool(sum_body_forces([*found._loads, *found.dead])[0])
+    for assumption, (_, assumed) in vary_fill(fill, pushed=pushed).items():
         each, own = found, said
         if assumed != fill:
             try:
                 with keep_warnings() as own:
-                    each = _solve_loads(*given, assumed)
+                    each = solve_as_given(*given, assumed)
             except Interrupted as error:
                 raise Interrupted(found) from error
         if each.outcome is Outcome.BRACKETED:
             words = "the range over the fill leaves out %s, with which %s"
             logger.warning(words, assumption, each.outcome.sentence)
-        else:
-            results[assumption] = each, own
+        results[assumption] = each, own
     return results
 
 
-def _solve_loads(
+def solve_as_given(
     structure: Structure,
-    loads: Settlement | list[Action],
-    stays: tuple[Action, ...],
+    live: Settlement | list[Action],
+    dead: Sequence[Action],
     friction: str | None,
     strength: float | None,
     fill: Fill | PlasticFill | None,
 ) -> Collapse:
     """Return the result of `collapse_factor` without its range over a fill."""
     if isinstance(fill, PlasticFill):
-        if isinstance(loads, Settlement):
+        if isinstance(live, Settlement):
             raise InvalidInput(
                 "a settlement and a plastic fill: the bounds are of loads that grow; give the fill "
                 "as af.limit.Fill, or a load"
             )
-        search = refine_bounds(structure, loads, friction, strength, fill, stays)
+        search = refine_bounds(structure, live, friction, strength, fill, dead)
         result = read_bounds(structure, bound_least_factor({"load": search})["load"], friction)
     else:
-        stones, programme = self_weight_programme(structure, friction, strength, fill, stays)
-        if not (isinstance(loads, Settlement) or stones.load(loads).any()):
+        stones, programme = self_weight_programme(structure, friction, strength, fill, dead)
+        if not (isinstance(live, Settlement) or stones.load(live).any()):
             raise InvalidInput(
                 "the load is zero on all that can move: give it a force or a multiple of g, or "
                 "another place"
             )
-        result = _solve_collapse(stones, programme, loads, friction)
-        if result.outcome is Outcome.COLLAPSES and not isinstance(loads, Settlement):
-            stones.warn_of_lost_loads(loads, stays, result.factor)
+        result = _solve_collapse(stones, programme, live, friction)
+        if result.outcome is Outcome.COLLAPSES and not isinstance(live, Settlement):
+            stones.warn_of_lost_loads(live, dead, result.factor)
     if np.isinf(result.factor):
         warn_locking(structure, friction, fill)
     if friction is None:
         warn_idle_joints(result)
-    actions = (loads,) if isinstance(loads, Settlement) else tuple(loads)
+    actions = (live,) if isinstance(live, Settlement) else tuple(live)
     crushes = check_options(structure, friction, strength)
-    result = replace(result, strength=crushes, live=actions, dead=stays, structure=structure)
+    result = replace(result, strength=crushes, live=actions, dead=tuple(dead), structure=structure)
     result = replace(result, bounded=warn_bonds(structure, result) or result.bounded)
     if result.outcome is Outcome.BRACKETED:
         logger.warning(
@@ -456,48 +457,6 @@ def _solve_loads(
     if result.solutions is not None and result.solutions.interrupted:
         raise Interrupted(result)
     return result
-
-
-def stands(
-    structure: Structure | HasStructure,
-    *,
-    friction: str | None = "coulomb",
-    strength: float | None = None,
-    fill: Fill | None = None,
-) -> bool:
-    """Check whether rigid blocks can be in equilibrium under their own weight (the safe theorem).
-
-    The programme finds the least forces that would have to be added to the blocks' weights:
-
-        min Σ |r|   subject to   -G_oᵀ F + G_sᵀ V + r = f_dead,   F >= 0,   |V| <= c A + μ N.
-
-    The structure stands where they vanish.
-
-    Args:
-        structure: supports are its fixed blocks; or an `archfem.Analysis` of it.
-        friction: "coulomb" or "nonassociated", here the same, holds |V| <= c A + μ N; None
-            forbids sliding.
-        strength: as for `collapse_factor` [Pa].
-        fill: strength of the fill, as for `collapse_factor`; None where there is none.
-
-    Returns:
-        Whether it stands.
-
-    Raises:
-        InvalidInput: an option is unknown, joints have tensile strength, or bodies too soft to be
-            rigid are without the strength of a fill.
-
-    References:
-        Heyman, Int. J. Solids Struct. 2 (1966) 249-279.
-
-    Example:
-        >>> af.stands(af.circular_arch(radius=1.0, thickness=0.05, embrace=180.0, voussoirs=11))
-        False
-    """
-    structure = structure_of(structure)
-    refuse_bonds(structure)
-    _, dead = self_weight_programme(structure, friction, strength, fill)
-    return is_balanced(dead.minimise_residual(), dead)
 
 
 @validate_arguments

@@ -38,7 +38,7 @@ _FALLS = "; it does not stand"
 class FillAssumption(NamedTuple):
     """Words of one assumption on a fill: on its inertia, pressure and backing."""
 
-    inertia: str
+    inertia: str  # empty where nothing pushes the fill
     pressure: str  # empty without a strength
     backing: str = ""  # empty where none is given
 
@@ -47,20 +47,23 @@ class FillAssumption(NamedTuple):
         return ", ".join(filter(None, self))
 
 
-def vary_fill(fill: Fill | None) -> dict[FillAssumption, tuple[float, Fill | None]]:
+def vary_fill(
+    fill: Fill | None, *, pushed: bool = True
+) -> dict[FillAssumption, tuple[float, Fill | None]]:
     """Return lever and strength of a fill by each assumption; that of the fill itself is first.
 
-    Without a strength, where the fill is weight and mass alone, its inertia varies.
+    Its inertia varies where it is pushed; without a strength, as weight and mass, that alone.
     """
     own, states, backed = 0.0, list[Fill | None]([fill]), has_backing(fill)
     if fill is not None:
         changes = product(({}, _BARE)[: 1 + backed], ({}, _ACTIVE, _NO_PRESSURE))
         own, states = fill.lever, [change_fill(fill, **x, **y) for x, y in changes]
     assumed = dict[FillAssumption, tuple[float, Fill | None]]()
-    for state, lever in [(fill, own), *product(states, (1.0, 0.0))]:
+    for state, lever in [(fill, own), *product(states, (1.0, 0.0) if pushed else (own,))]:
         place = {0.0: "columns' feet", 1.0: "columns' centroids"}.get(lever, f"lever of {lever:g}")
+        place = f"the fill's inertia at its {place}" * pushed
         backing = (BACKED if has_backing(state) else "no backing") * backed
-        key = FillAssumption(f"the fill's inertia at its {place}", _say_pressure(state), backing)
+        key = FillAssumption(place, _say_pressure(state), backing)
         assumed.setdefault(key, (lever, state and change_fill(state, lever=lever)))
     return assumed
 
@@ -96,9 +99,11 @@ class FillRange:
     Attributes:
         values: by assumption, a pair of words, a factor on a load or a demand [-]; 0 where the
             structure does not stand, infinite where nothing limits it.
+        unknown: assumptions under which no result was found: the least may be less.
     """
 
     values: Mapping[FillAssumption, float]
+    unknown: Sequence[FillAssumption] = ()
 
     @classmethod
     def least_of(cls, ranges: Iterable["FillRange"]) -> "FillRange":
@@ -107,10 +112,11 @@ class FillRange:
         Args:
             ranges: of the results, one at least.
         """
-        values = dict[FillAssumption, float]()
+        values, unknown = dict[FillAssumption, float](), list[FillAssumption]()
         for each in ranges:
             values |= {key: min(x, values.get(key, x)) for key, x in each.values.items()}
-        return cls(values)
+            unknown += each.unknown
+        return cls(values, tuple(dict.fromkeys(unknown)))
 
     @property
     def ends(self) -> tuple[float, float]:
@@ -162,14 +168,17 @@ class FillRange:
             f"{own.format_ends(unit, digits)}{name} ({state}{_FALLS * (own.ends[0] == 0.0)})"
             for state, own in sorted(states.items(), key=lambda each: each[1].ends)
         ]
-        return f"{begin}, by the place of its inertia, feet or centroids: {'; '.join(texts)}"
+        pushed = any(key.inertia for key in self.values)
+        by = ", by the place of its inertia, feet or centroids" * pushed
+        return f"{begin}{by}: {'; '.join(texts)}"
 
     @property
     def outcome(self) -> str:
         """Return "passes", "fails", or "passes only with" the assumptions under which it does."""
         if self.needed:
             return f"passes only with {self.needed}"
-        return "passes" if self.ends[0] >= 1.0 else "fails"
+        known = ", as far as results were found" * bool(self.unknown)
+        return f"passes{known}" if self.ends[0] >= 1.0 else "fails"
 
     @property
     def needed(self) -> str:

@@ -141,8 +141,9 @@ def geometric_factor(
         fill: as for `collapse_factor`. It weighs, and presses on the faces as built.
 
     Returns:
-        Depth of the joints over the least one [-], 20 where it is that or more, or 100 with a fill;
-        None where the structure does not stand, or joints with bonds have no such factor.
+        Depth of the joints over the least one [-], at most 1e-3 of it too small; 20 where it is
+        that or more, or 100 with a fill; None where the structure does not stand, or joints with
+        bonds have no such factor.
 
     Raises:
         InvalidInput: bodies too soft to be rigid are without the strength of a fill.

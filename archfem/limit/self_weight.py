@@ -7,13 +7,14 @@ from scipy import sparse
 
 from archfem._typing import Array
 from archfem._validation import check_between, check_choice, check_type
-from archfem.errors import InvalidInput
+from archfem.errors import InvalidInput, logger
 from archfem.limit.backfill import SELF_WEIGHT, BlocksWithFill, attach_fill
+from archfem.limit.fill_range import FillRange, vary_fill
 from archfem.limit.fill_strength import Fill
 from archfem.limit.linear_programme import Optimum, Programme, RigidBlocks
 from archfem.masonry.loads import Action
 from archfem.masonry.materials import STONE, check_strength
-from archfem.masonry.structure import Structure
+from archfem.masonry.structure import HasStructure, Structure, structure_of
 from archfem.units import MPa
 
 
@@ -88,3 +89,59 @@ def self_weight_programme(
 def is_balanced(fall: Optimum, dead: Programme, tolerance: float = 1e-8) -> bool:
     """Return whether the forces missing for equilibrium are below a share of the weights."""
     return fall.value <= tolerance * len(dead.blocks.structure.free)
+
+
+def stands(
+    structure: Structure | HasStructure,
+    *,
+    friction: str | None = "coulomb",
+    strength: float | None = None,
+    fill: Fill | None = None,
+) -> bool:
+    """Check whether rigid blocks can be in equilibrium under their own weight (the safe theorem).
+
+    A warning says where other assumptions on the fill decide that: pressure and backing.
+
+    The programme finds the least forces that would have to be added to the blocks' weights:
+
+        min Σ |r|   subject to   -G_oᵀ F + G_sᵀ V + r = f_dead,   F >= 0,   |V| <= c A + μ N.
+
+    The structure stands where they vanish.
+
+    Args:
+        structure: supports are its fixed blocks; or an `archfem.Analysis` of it.
+        friction: "coulomb" or "nonassociated", here the same, holds |V| <= c A + μ N; None
+            forbids sliding.
+        strength: as for `collapse_factor` [Pa].
+        fill: strength of the fill, as for `collapse_factor`; None where there is none.
+
+    Returns:
+        Whether it stands.
+
+    Raises:
+        InvalidInput: an option is unknown, joints have tensile strength, or bodies too soft to be
+            rigid are without the strength of a fill.
+
+    References:
+        Heyman, Int. J. Solids Struct. 2 (1966) 249-279.
+
+    Example:
+        >>> af.stands(af.circular_arch(radius=1.0, thickness=0.05, embrace=180.0, voussoirs=11))
+        False
+    """
+    structure, options = structure_of(structure), (friction, strength)
+    found = stands_as_given(structure, *options, fill)
+    varied = vary_fill(fill, pushed=False) if isinstance(fill, Fill) else {}
+    each = {k: stands_as_given(structure, *options, x) for k, (_, x) in varied.items() if x != fill}
+    if only := FillRange({k: float(each.get(k, found)) for k in varied}).needed:
+        logger.warning("what is assumed of the fill decides whether it stands: only with %s", only)
+    return found
+
+
+def stands_as_given(
+    structure: Structure, friction: str | None, strength: float | None, fill: Fill | None
+) -> bool:
+    """Return the answer of `stands`, without its range over a fill."""
+    refuse_bonds(structure)
+    _, dead = self_weight_programme(structure, friction, strength, fill)
+    return is_balanced(dead.minimise_residual(), dead)

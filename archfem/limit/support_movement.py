@@ -29,10 +29,10 @@ from archfem._typing import Array
 from archfem._validation import check_between, validate_arguments
 from archfem.errors import DidNotConverge, InvalidInput, logger
 from archfem.limit.backfill import SELF_WEIGHT
-from archfem.limit.collapse import stands
 from archfem.limit.displaced_blocks import PlacedBlocks
 from archfem.limit.linear_programme import NoEquilibrium, Optimum, Programme, RigidBlocks
 from archfem.limit.nonassociated import RESISTANCE_MARGIN, normal_forces, shear_resistance
+from archfem.limit.self_weight import stands
 from archfem.masonry.block import rotate
 from archfem.masonry.loads import Settlement
 from archfem.masonry.structure import Structure, join_joint_names, join_names

@@ -1,20 +1,24 @@
 """Least thickness of structures, and least depth of joints that carries axles, by bisection."""
 
 from collections.abc import Callable
-from functools import partial
 from typing import Any
 
 import numpy as np
 
 from archfem._validation import check_between, check_type, validate_arguments
-from archfem.errors import InvalidInput, InvalidStructure
-from archfem.limit.collapse import stands
+from archfem.errors import InvalidInput, InvalidStructure, logger
+from archfem.limit.fill_range import FillAssumption, FillRange, vary_fill
 from archfem.limit.fill_strength import Fill
 from archfem.limit.instability import deepen
-from archfem.limit.self_weight import is_balanced, self_weight_programme
+from archfem.limit.self_weight import (
+    check_options,
+    is_balanced,
+    self_weight_programme,
+    stands_as_given,
+)
 from archfem.limit.vehicles import MovingLoad
 from archfem.masonry.loads import PointLoad
-from archfem.masonry.structure import CONTACT_TOLERANCE, Structure
+from archfem.masonry.structure import CONTACT_TOLERANCE, Structure, structure_of
 
 
 @validate_arguments
@@ -30,7 +34,7 @@ def minimum_thickness(
 
     The search doubles a thickness of 1e-5 of the size of a thin structure until one stands, and
     then halves the bracket. A structure so thin that it cannot be built does not stand, such as
-    unequal stones that no longer touch.
+    unequal stones that no longer touch. A warning has the range over what is assumed of a fill.
 
     Args:
         build: function from a thickness [m] to the structure.
@@ -57,14 +61,26 @@ def minimum_thickness(
     """
     check_between(tolerance, "tolerance", 1e-9, 1.0, ends="[)")
 
-    is_stable = partial(stands, friction=friction, strength=strength, fill=fill)
+    def find(fill: Fill | None) -> float:
+        def is_stable(built: Structure) -> bool:
+            return stands_as_given(structure_of(built), friction, strength, fill)
 
-    def is_enough(thickness: float) -> bool:
-        built = _attempt(build, thickness)
-        # what cannot be built is thinner than one that can, which stands
-        return not isinstance(built, InvalidStructure) and is_stable(built)
+        def is_enough(thickness: float) -> bool:
+            built = _attempt(build, thickness)
+            # what cannot be built is thinner than one that can, which stands
+            return not isinstance(built, InvalidStructure) and is_stable(built)
 
-    return _halve(*_find_bracket(build, is_stable), is_enough, tolerance)[1]
+        return _halve(*_find_bracket(build, is_stable), is_enough, tolerance)[1]
+
+    least, values = find(fill), dict[FillAssumption, float]()
+    for assumption, (_, other) in vary_fill(fill, pushed=False).items() if fill else ():
+        try:
+            values[assumption] = least if other == fill else find(other)
+        except InvalidInput as error:
+            logger.warning("the least thickness with %s is not known: %s", assumption, error)
+    if len({f"{x:.4g}" for x in values.values()}) > 1:
+        logger.warning("the least thickness is %s", FillRange(values).describe(name=" m"))
+    return least
 
 
 def _attempt(build: Callable[[float], Structure], thickness: float) -> Structure | InvalidStructure:
@@ -183,6 +199,8 @@ def find_geometric_factors(
     structure: Structure, moving: MovingLoad, options: dict[str, Any]
 ) -> dict[str, float]:
     """Return both of `find_geometric_factor`, and the first without crushing, as of a rating."""
-    each = (options, options | {"strength": np.inf})
-    (own, deepest), (hard, _) = (find_geometric_factor(structure, moving, x) for x in each)
+    own, deepest = find_geometric_factor(structure, moving, options)
+    hard, crushes = own, check_options(structure, options["friction"], options["strength"]) < np.inf
+    if crushes:
+        hard, _ = find_geometric_factor(structure, moving, options | {"strength": np.inf})
     return {"geometric": own, "deepest": deepest, "geometric_hard": hard}

@@ -15,7 +15,7 @@ from archfem._typing import Array, Flags, Metres, Newtons, Numbers, Pascals
 from archfem._validation import check_choice, check_number, check_numbers
 from archfem.errors import InvalidInput, logger
 from archfem.limit.backfill import BlocksWithFill
-from archfem.limit.collapse import Collapse, collapse_factor, read_bounds
+from archfem.limit.collapse import Collapse, read_bounds, solve_as_given
 from archfem.limit.collapse_warnings import warn_locking
 from archfem.limit.fill_bounds import FillBounds, bound_least_factor, refine_bounds
 from archfem.limit.fill_strength import Fill, PlasticFill, as_pressure
@@ -334,9 +334,9 @@ def moving_load(  # noqa: PLR0913  (loads, their places, and the strength of the
             plastic fill that is found with the fill as `Fill`, and a warning says so.
         friction: as for `collapse_factor`.
         strength: as for `collapse_factor` [Pa].
-        fill: as for `collapse_factor`. With a plastic fill factors are lower bounds, the least
-            one on meshes as fine as its `gap` requires, others on coarser ones; Ctrl-C ends that
-            refinement.
+        fill: as for `collapse_factor`, and as given alone: `rate` has the range over it. With a
+            plastic fill factors are lower bounds, the least one on meshes as fine as its `gap`
+            requires, others on coarser ones; Ctrl-C ends that refinement.
         dead: loads beside self-weight that do not grow, as for `collapse_factor`.
 
     Returns:
@@ -376,7 +376,7 @@ def moving_load(  # noqa: PLR0913  (loads, their places, and the strength of the
         worst = read_bounds(structure, bounds[row], friction)
         worst = replace(worst, live=laid[row], structure=structure)
     else:
-        worst = collapse_factor(structure, live=list(laid[row]), **options)
+        worst = solve_as_given(structure, live=list(laid[row]), **options)
         worst = replace(worst, factor=worst.lower)  # where none was found, the bound
     if friction == "nonassociated":
         factors[direction, place] = worst.factor  # by the whole search: may be a weaker state
@@ -630,7 +630,12 @@ def find_worst_rows(
         k = int(np.argmax(above <= (1.0 + 1e-5) * above.min()))
         factor, sets[k] = known.lay(loads[k], factors[k], sets[k] if solved[k] else None)
         factors[k], solved[k] = min(factor, above[k]), True  # the bound ends it in any case
-    order = (k for k in factors.argsort(kind="stable") if solved[k])
+    # those of places that mirror each other are alike, in the order of the rows
+    alike, level = factors.copy(), 0.0
+    for k in factors.argsort(kind="stable"):
+        level = level if factors[k] <= (1.0 + 1e-6) * level else factors[k]
+        alike[k] = level
+    order = (k for k in alike.argsort(kind="stable") if solved[k])
     worst = dict(known.join(rows[k], loads[k], sets[k]) for k in order)
     return worst, np.where(solved, np.minimum(factors, above), share * guide)
 
@@ -654,7 +659,7 @@ def collapse_factors(
         if state is not None:
             factors[row] = -state.value
         elif associated[row] is not None:  # the whole search, or a bound
-            factors[row] = collapse_factor(stones.whole, live=list(row), **options).lower
+            factors[row] = solve_as_given(stones.whole, live=list(row), **options).lower
     if np.inf in factors.values():
         warn_locking(stones.whole, options["friction"], options["fill"])
     return factors

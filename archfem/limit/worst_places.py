@@ -102,10 +102,9 @@ def _search_between(
             at = {axles_on_structure(structure, vehicles[x[0]], *x[1:]): x for x in sorted(tried)}
             loads = {row: stones.load(row) for row in at if row}
             guide = np.array([0.0 if tried[at[row]] else np.inf for row in loads])
-            found, factors = find_worst_rows(dead, loads, strips, guide)
-            # of places that mirror each other the first one, whatever the rounding
-            first = int(np.argmax(factors <= (1.0 + 1e-6) * factors.min()))
-            beside = [at[[*loads][first]]]
+            found, _ = find_worst_rows(dead, loads, strips, guide)
+            first = next(iter(found))  # with strips behind its axles
+            beside = [next(at[row] for row in loads if first[: len(row)] == row)]
         rows |= found
         worst |= zip(islice(found, 1), beside, strict=False)
     return rows, worst

@@ -6,10 +6,9 @@ from math import sqrt
 import numpy as np
 
 from archfem.errors import DidNotConverge, InvalidInput
-from archfem.limit.collapse import stands
 from archfem.limit.fill_strength import Fill
 from archfem.limit.linear_programme import NoEquilibrium
-from archfem.limit.self_weight import self_weight_programme
+from archfem.limit.self_weight import self_weight_programme, stands
 from archfem.masonry.backfill import TILE_AREA, jointed_fill
 from archfem.masonry.loads import PointLoad
 from archfem.masonry.stiffness_ratio import find_yielding_blocks

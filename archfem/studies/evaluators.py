@@ -202,22 +202,27 @@ def evaluate_limit(case: Case) -> Findings:
     """Return the collapse factor of a case by limit analysis, and the size of its mechanism.
 
     `least_push` is over both senses and the states of the fill, `least_push_on_backing` over those
-    with a backing that is given. An infinite factor never makes a mechanism; NaN is that of a case
-    which does not stand, or of one without a state without dilatancy, which `factor_at_most`
-    bounds. `upper_bounds` names findings not proved least.
+    with a backing that is given, `least_factor` that of another load over the states. An infinite
+    factor never makes a mechanism; NaN is that of a case which does not stand, or of one without a
+    state without dilatancy, which `factor_at_most` bounds. `upper_bounds` names findings not proved
+    least.
     """
     with result_text.record_doubts(case.structure) as doubts:
         collapse = case.limit.solve(case.structure)
         other = case.limit.opposite if collapse.outcome is not Outcome.INFEASIBLE else None
         senses = [collapse] if other is None else [collapse, other.solve(case.structure)]
-    doubts += doubt_fill(compare_with_site(case, *senses))
+    doubts += doubt_fill(compare_with_site(case, *senses), collapse)
     findings: Findings = {"factor": float(collapse.factor)}
     findings |= {"hinges": len(collapse.hinges), "slides": len(collapse.sliding)}
     if collapse.outcome is Outcome.BRACKETED:
         findings["factor_at_most"] = float(collapse.upper)
     searched = [x.bounded or (x.solutions and x.solutions.may_be_less) for x in senses]
     bounds = ["factor"] * bool(searched[0])
+    if collapse.over_fill and not collapse.push:
+        findings["least_factor"] = float(collapse.range[0])
+        bounds += ["least_factor"] * bool(searched[0] or collapse.over_fill.unknown)
     if push := abs(collapse.push):
+        unknown = [x.over_fill.unknown for x in senses if x.over_fill]
         factors = [x.factor if x.over_fill is None else x.range[0] for x in senses]
         least, site = push * float(np.min(factors)), site_acceleration(case)
         leasts = {"least_push": least}
@@ -225,7 +230,7 @@ def evaluate_limit(case: Case) -> Findings:
         over = FillRange.least_of([x.over_fill for x in senses if x.over_fill]).values
         backed = [push * value for key, value in over.items() if key.backing == BACKED]
         leasts |= {"least_push_on_backing": min(backed)} if backed else {}
-        bounds += ["push"] * len(bounds) + [*leasts] * any(searched)
+        bounds += ["push"] * len(bounds) + [*leasts] * any([*searched, *unknown])
         findings = leasts | findings | {"push": push * float(collapse.factor)}
     return findings | _name_bounds(bounds) | _state_doubts(doubts)
 

@@ -13,7 +13,8 @@ from shapely import LineString, Polygon, box
 
 import archfem as af
 from archfem.cases.analysis_keys import LimitAnalysis
-from archfem.cases.answers import list_ratios
+from archfem.cases.answers import doubt_fill, list_ratios
+from archfem.cases.push_factors import compare_with_site
 from archfem.cases.result_folder import limit_files
 from archfem.cases.result_text import describe_collapse
 from archfem.commands.tools import doubt_code
@@ -75,6 +76,19 @@ def test_an_assumption_without_a_state_is_left_out_of_the_range(monkeypatch, cap
     found = af.collapse_factor(buried_stone(), live=live, friction="nonassociated", fill=fill)
     assert len(calls) == 6
     assert [*found.over_fill.values.values()] == [found.factor]
+    assert len(found.over_fill.unknown) == 5
+    # the least is that of the states that were found: no yes without a condition
+    site = {"demand": 0.5 * found.factor * 9.80665, "dead": ()}
+    case = SimpleNamespace(limit=SimpleNamespace(**site), motion=None, suite=None, target=None)
+    case.assessment = SimpleNamespace(spectrum=None)
+    withstood = "is withstood by an upper estimate alone"
+    assert compare_with_site(case, found).outcome == withstood
+    whole = replace(found, over_fill=replace(found.over_fill, unknown=()))
+    assert compare_with_site(case, whole).outcome == "is withstood"
+    both = FillRange.least_of([whole.over_fill, found.over_fill])
+    assert both.unknown == found.over_fill.unknown
+    passing = FillRange(dict.fromkeys(both.values, 2.0), both.unknown)
+    assert passing.outcome == "passes, as far as results were found"
     assert caplog.text.count("the range over the fill leaves out the fill's inertia at") == 5
     assert "with which no state without dilatancy was found" in caplog.text
 
@@ -111,8 +125,16 @@ def test_a_stone_turns_into_a_fill_at_a_factor_by_each_assumption(verified):
     assert f" (of the least), at {low:.4g} to {high:.4g} g" in least.sentence
     assert (least.factor, *least.range) == pytest.approx((low, low, high))
     assert least.least is None
-    down = af.collapse_factor(buried_stone(), live=af.BodyForce(0.0, 1.0), fill=fill)
-    assert down.over_fill is None
+    # lifted, it turns under the active pressure; no place of inertia plays a part
+    lifted = af.collapse_factor(buried_stone(), live=af.BodyForce(0.0, 1.0), fill=fill)
+    top = HEIGHT + DEPTH
+    active = SOIL.unit_weight / 3.0 * (top * HEIGHT**2 / 2.0 - HEIGHT**3 / 3.0)
+    weight = (HEIGHT * af.STONE.unit_weight + DEPTH * SOIL.unit_weight) * BREADTH
+    turns = 1.0 - active / (weight * BREADTH / 2.0)
+    expected = {THIRD: turns, ACTIVE: turns, NONE: 1.0}
+    expected = {FillAssumption("", key): factor for key, factor in expected.items()}
+    assert lifted.over_fill.values == pytest.approx(expected, rel=1e-9)
+    assert "over what is assumed of the fill: " in lifted.over_fill.describe_states()
 
 
 @pytest.mark.slow
@@ -172,8 +194,8 @@ def weigh_columns(structure):
                 yield stone, (x, foot), (x, y), unit * column.area * structure.width
 
 
-def push_stones(structure, lever):
-    """Largest push in equilibrium of stones that bear the weight of a fill alone, by linprog."""
+def push_stones(structure, lever, point=None):
+    """Largest push, or load at a point, of stones that bear the weight of a fill, by linprog."""
     free = [k for k in structure.free if structure.blocks[k].role != "other"]
     row, columns = {k: 3 * n for n, k in enumerate(free)}, []
     dead, live = np.zeros(3 * len(free)), np.zeros(3 * len(free))
@@ -195,6 +217,12 @@ def push_stones(structure, lever):
     for stone, foot, centroid, weight in weigh_columns(structure):
         dead += spread((0.0, -weight), foot, stone)
         live += spread((weight, 0.0), centroid if lever else foot, stone)
+    if point is not None:  # straight down on the highest stone below
+        line = LineString([(point.x, -99.0), (point.x, 99.0)])
+        tops = {k: Polygon(structure.blocks[k].drawn()).intersection(line) for k in free}
+        tops = {k: cut.bounds[3] for k, cut in tops.items() if not cut.is_empty}
+        stone = max(tops, key=tops.get)
+        live = spread(point.force, (point.x, tops[stone]), stone)
     bounds = []
     for joint in structure.joints:
         if any(structure.blocks[k].role == "other" and k in structure.free for k in joint.blocks):
@@ -242,6 +270,76 @@ def test_a_bridge_without_pressure_is_pushed_as_by_a_programme_of_its_own(verifi
                 # round-off of both programmes, and of the polygons
                 assert values[FillAssumption(place, NONE)] == pytest.approx(least, rel=1e-6)
             verified("bridge of unequal arches: least push", least, "own programme", found.range[0])
+
+
+@pytest.mark.slow
+def test_a_load_has_a_range_with_the_least_of_a_programme_of_its_own(verified):
+    """In a fan of 0.1° it acts straight down, so that the drawing gives all forces."""
+    structure, load = unequal_bridge(), af.PointLoad(2.0, (0.0, -1e5))
+    fill = af.limit.Fill(friction_angle=35.0, dispersal="uniform", spread="0.1 degree")
+    options = {"live": load, "friction": None}
+    found = af.collapse_factor(structure, fill=fill, **options)
+    states = {THIRD: {}, ACTIVE: {"mobilisation": 0.0}, NONE: {"mobilisation": 0.0, "active": 0.0}}
+    expected = {}
+    for words, changes in states.items():
+        alone = collapse.solve_as_given(
+            structure, [load], (), None, None, af.limit.fill_strength.change_fill(fill, **changes)
+        )
+        expected[FillAssumption("", words)] = alone.factor
+    assert found.over_fill.values == pytest.approx(expected, rel=1e-9)
+    least = push_stones(structure, 0.0, load)
+    # as a fan of 0.1° is 2 mm wide on stones that slope, 4e-6
+    assert found.range[0] == pytest.approx(least, rel=1e-5)
+    assert found.least.factor == found.range[0] < 0.9 * found.factor
+    verified("bridge of unequal arches: least load", least, "own programme", found.range[0])
+    # it is borne, or is not, by what is assumed of the fill
+    for times, doubted in ((0.5 * (least + found.factor), True), (0.9 * least, False)):
+        force = (0.0, -1e5 * times)
+        heavier = af.collapse_factor(
+            structure, fill=fill, live=af.PointLoad(2.0, force), friction=None
+        )
+        doubts = [x.cause for x in doubt_fill(None, heavier)]
+        words = "what is assumed of the fill decides whether the load is borne: only with "
+        assert doubts == [f"{words}{heavier.over_fill.needed}"] * doubted
+        settings = LimitAnalysis([af.PointLoad(2.0, force)], None, fill=fill)
+        case = SimpleNamespace(structure=structure, limit=settings, parapets=0.0, motion=None)
+        case.assessment, case.target = SimpleNamespace(spectrum=None), None
+        studied = evaluate_limit(case)
+        assert studied["least_factor"] == pytest.approx(least / times, rel=1e-5)
+        assert any(words in str(x) for x in studied.values()) == doubted
+        files = limit_files(case, heavier.least, "", None, [])
+        (row,) = json.loads(files["limit.json"])["rows"]
+        ends = row[-1]["least"], row[-1]["most"]
+        assert ends == pytest.approx(heavier.range)
+        assert " times " in heavier.least.sentence
+
+
+@pytest.mark.parametrize("part", [1.0, 0.5])
+def test_whether_a_wall_stands_has_a_range_over_its_fill(part, caplog, verified):
+    """It is as thick as its weight needs against the active pressure, by moments."""
+    fill = af.limit.Fill(friction_angle=30.0, active=part)
+    active = SOIL.unit_weight / 3.0 * ((HEIGHT + DEPTH) * HEIGHT**2 / 2.0 - HEIGHT**3 / 3.0)
+    unit = HEIGHT * af.STONE.unit_weight + DEPTH * SOIL.unit_weight
+    most = (2.0 * active / unit) ** 0.5
+    least = af.minimum_thickness(buried_stone, friction=None, fill=fill)
+    assert least == pytest.approx(most * part**0.5, rel=1e-5)
+    said = [record.getMessage() for record in caplog.records]
+    assert said[0].startswith("the least thickness with no pressure is not known: it stands at ")
+    ends = f"is {least:.4g} m ({THIRD}) to {most:.4g} m ({ACTIVE})"
+    assert said[1:] == [f"the least thickness {ends}"] * (part < 1.0)
+    verified(f"wall under {part:g} of the active pressure", most * part**0.5, "moments", least)
+    caplog.clear()
+    between = 0.5 * (least + most)
+    for breadth, words in ((1.01 * most, ""), (between, THIRD), (0.99 * least, NONE)):
+        if breadth == between and part == 1.0:
+            continue
+        stands = af.stands(buried_stone(breadth), friction=None, fill=fill)
+        assert stands == (breadth >= least)
+        needed = {THIRD: f"only with {THIRD} or {NONE}", NONE: f"only with {NONE}"}.get(words)
+        assert [x.getMessage() for x in caplog.records] == [
+            f"what is assumed of the fill decides whether it stands: {needed}"
+        ] * bool(words)
+        caplog.clear()
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import brentq
 
 import archfem as af
-from archfem.limit import minimum_thickness
+from archfem.limit import minimum_thickness, thickness
 
 
 def ring(**changes):
@@ -120,3 +120,18 @@ def test_the_least_thickness_of_a_catenary_is_found(voussoirs, expected):
     least = minimum_thickness(build, friction=None, tolerance=1e-4)
     assert least == pytest.approx(expected, rel=2e-3)  # by a linear programme of its own
     assert not af.stands(build(0.99 * least), friction=None)
+
+
+@pytest.mark.parametrize(("strength", "searches"), [(None, 1), (np.inf, 1), (5e6, 2)])
+def test_a_factor_without_crushing_is_not_searched_again(monkeypatch, strength, searches):
+    calls, bridge = [], ring(embrace=180.0)
+    moving = af.limit.moving_load(bridge, 1e4, positions=[1.0])
+    monkeypatch.setattr(
+        thickness,
+        "find_geometric_factor",
+        lambda *given: (float(len(calls.append(given) or calls)), 0),
+    )
+    options = {"friction": "coulomb", "strength": strength, "fill": None, "dead": ()}
+    found = thickness.find_geometric_factors(bridge, moving, options)
+    assert [given[2]["strength"] for given in calls] == [strength, np.inf][:searches]
+    assert (found["geometric"], found["geometric_hard"]) == (1.0, searches)

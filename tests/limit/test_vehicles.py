@@ -250,6 +250,11 @@ def test_a_search_for_the_worst_place_solves_each_once(strength, rounds, monkeyp
     _, factors = find_worst_rows(dead, small, {}, np.zeros(2))
     assert factors[0] == pytest.approx(1e9 * expected[row], rel=1e-5)
     assert factors[1] > 1e12 * factors[0]
+    # of places that differ by round-off the first one
+    for rounding in (1e-8, -1e-8):
+        alike = {rows[0]: axles[row], rows[1]: (1.0 + rounding) * axles[row]}
+        worst, _ = find_worst_rows(dead, alike, {}, np.zeros(2))
+        assert [*worst] == rows[:2]
 
 
 @pytest.mark.slow
