@@ -21,6 +21,8 @@ WEAKER_FILLS: Mapping[str, Sequence[str]] = {
     "without_either": (),
     "without_backing": (),
     "without_pressure": ("without_either",),
+    "active_without_backing": (),
+    "active_alone": ("active_without_backing",),
     "by_pressure": ("without_backing",),
     "factor": ("without_backing",),
     "full_pressure": ("by_pressure", "factor", "without_backing"),
@@ -79,10 +81,12 @@ def _say_pressure(fill: Fill | None) -> str:
 
 
 def vary_pressure(fill: Fill) -> dict[str, Fill]:
-    """Return a fill with none and with all of its passive pressure, and without its backing."""
+    """Return a fill without pressure, with the active and all passive one, and without backing."""
     changes = {"without_pressure": _NO_PRESSURE, "full_pressure": {"mobilisation": 1.0}}
+    changes |= {"active_alone": _ACTIVE}
     if has_backing(fill):
         changes |= {"without_backing": _BARE, "without_either": {**_BARE, **_NO_PRESSURE}}
+        changes |= {"active_without_backing": {**_BARE, **_ACTIVE}}
     return {name: change_fill(fill, **values) for name, values in changes.items()}
 
 

@@ -113,6 +113,8 @@ _FILL_STATES = {
     "full_pressure": "with all of its passive pressure",
     "without_backing": "without the backing",
     "without_either": "without backing and pressure",
+    "active_alone": "with its active pressure alone",
+    "active_without_backing": "with that alone and without backing",
 }
 
 

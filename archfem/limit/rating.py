@@ -36,6 +36,7 @@ from archfem.limit.worst_places import (
     find_least_factors,
     further_searches,
     refine_worst_places,
+    scale_weights,
     spread_over_bridge,
 )
 from archfem.masonry.loads import PointLoad
@@ -52,11 +53,14 @@ from archfem.masonry.structure import (
 from archfem.units import Ends, MPa, kN
 
 # Factors of a rating that its outcome is made of, in other states of fill and stones
-_PRESSURES = ("without_pressure", "full_pressure", "without_backing", "without_either")
-_STATES = (*_PRESSURES, "by_pressure")
+_BARE = ("without_backing", "without_either", "active_without_backing")
+_STATES = ("without_pressure", "full_pressure", *_BARE, "active_alone", "by_pressure")
+# States without pressure, which may bear more than those with the active one alone
+_ACTIVE = {"without_pressure": "active_alone", "without_either": "active_without_backing"}
 
 # What a rating assumes of fill and stones
 _PRESSURE, _BACKING = "the pressure of the fill", "the backing"
+_PASSIVE = "the passive pressure of the fill"
 _HARD_STONES = "stones that do not crush"
 
 
@@ -91,6 +95,8 @@ class Rating(ResultDisplay):
         without_backing: least factor without the backing of a `Fill`; NaN without one, and where
             the bridge then does not stand.
         without_either: least factor without backing and without pressure; NaN likewise.
+        active_alone: least factor with the active pressure of a `Fill` alone; NaN likewise.
+        active_without_backing: the same without its backing; NaN likewise.
         crushing: least factors with stones of `ASSUMED_STRENGTH`, where no strength was given:
             "factor", of a plastic fill as weight and pressure, and those of other states by their
             names above; else none.
@@ -134,6 +140,8 @@ class Rating(ResultDisplay):
     friction: str | None = "coulomb"
     geometric_hard: float = np.nan
     places: Mapping[str, tuple[str, float]] = field(default_factory=dict)
+    active_alone: float = np.nan
+    active_without_backing: float = np.nan
 
     @property
     def factor(self) -> float:
@@ -143,8 +151,8 @@ class Rating(ResultDisplay):
     @property
     def factors(self) -> dict[str, float]:
         """Least factors by state of the fill, and the geometric one, by the names above [-]."""
-        names = ["factor", *["by_pressure"] * isinstance(self.fill, PlasticFill), *_PRESSURES]
-        names = names if has_backing(self.fill) else names[:-2]
+        names = ["factor", *["by_pressure"] * isinstance(self.fill, PlasticFill)]
+        names += [*_STATES[:2], *(_BARE if has_backing(self.fill) else ()), "active_alone"]
         return {name: float(getattr(self, name)) for name in [*names, "geometric"]}
 
     @property
@@ -170,7 +178,8 @@ class Rating(ResultDisplay):
             return [words]
         if self.missing:
             most = f" if {codes} is at most {self.factor:.4g}"
-            most += "".join(f", {of} {x:.4g}" for x, of in self.list_losses() if _PRESSURE in of)
+            parts = (each for each in self.list_losses() if "pressure of the fill" in each[1])
+            most += "".join(f", {of} {x:.4g}" for x, of in parts)
             words += most if self.passes else f" even without {codes}"
         left = f"left out: {self.vehicle.left_out}" if self.vehicle.left_out else ""
         return [*filter(None, [words, self.say_range(), left, self._rule_text()])]
@@ -221,6 +230,11 @@ class Rating(ResultDisplay):
         own = "by_pressure" if isinstance(self.fill, PlasticFill) else "factor"
         return {**names, (): own, **(hard if self.crushing else {})}
 
+    def _list_alike(self, state: str) -> list[str]:
+        """Return a state, and if it is without pressure that with the active one alone."""
+        name = state.removeprefix(CRUSHING_PREFIX)
+        return [state, *(f"{state.removesuffix(x)}{_ACTIVE[x]}" for x in {name} & {*_ACTIVE})]
+
     def _factor_in(self, state: str) -> float:
         """Return the least factor in a state; NaN where the bridge then does not stand [-]."""
         crushing = self.crushing.get(state.removeprefix(CRUSHING_PREFIX), np.nan)
@@ -242,13 +256,15 @@ class Rating(ResultDisplay):
         """Parts of fill and stones without which alone what passes would fail, in words, or ""."""
         if isinstance(self.fill, PlasticFill) and not self.by_pressure >= 1.0:
             return "the fill as a plastic body"
-        cuts, states = list[tuple[str, ...]](), self._list_states()
+        cuts, states = dict[tuple[str, ...], bool](), self._list_states()
         for parts in sorted(states, key=len):
-            fails = not self._factor_in(states[parts]) >= 1.0
-            if fails and not any({*cut} <= {*parts} for cut in cuts):
-                cuts.append(parts)
-        single = [cut[0] for cut in cuts if len(cut) == 1]
-        several = [" or ".join(cut) for cut in cuts if len(cut) > 1]
+            fails = [not self._factor_in(x) >= 1.0 for x in self._list_alike(states[parts])]
+            if any(fails) and not any({*cut} <= {*parts} for cut in cuts):
+                cuts[parts] = fails[0]
+        # what passes without any pressure needs more than the active one
+        named = [[x if bare or x != _PRESSURE else _PASSIVE for x in c] for c, bare in cuts.items()]
+        single = [cut[0] for cut in named if len(cut) == 1]
+        several = [" or ".join(cut) for cut in named if len(cut) > 1]
         return ", and ".join(filter(None, [" and ".join(single), *several]))
 
     @property
@@ -256,7 +272,11 @@ class Rating(ResultDisplay):
         """Factors over all that is assumed of fill and stones, or this one [-]."""
         full = [] if np.isnan(self.full_pressure) else [self.full_pressure]
         states = self._list_states().values() if full or self.crushing else ()
-        return [self.factor, *map(self._factor_in, states), *full]
+        return [
+            self.factor,
+            *(self._factor_in(x) for s in states for x in self._list_alike(s)),
+            *full,
+        ]
 
     @property
     def least(self) -> float:
@@ -277,7 +297,7 @@ class Rating(ResultDisplay):
 
     def _list_cut_states(self) -> Iterator[tuple[str, str]]:
         """Yield the states in which what is assumed falls away, part by part, and the parts."""
-        states, parts = self._list_states(), tuple[str, ...]()
+        states, parts, before = self._list_states(), tuple[str, ...](), ""
         if isinstance(self.fill, PlasticFill):
             yield "by_pressure", "with the fill as weight and pressure"
         also = "also " * (self.fill is not None)
@@ -288,7 +308,16 @@ class Rating(ResultDisplay):
         ):
             if (*parts, part) in states:
                 parts = *parts, part
-                yield states[parts], words
+                alike = self._list_alike(states[parts])
+                state = min(alike, key=lambda x: np.nan_to_num(self._factor_in(x), posinf=np.inf))
+                # of the pressure it is said where it is another one than before
+                of = f"with the active {_PRESSURE[4:]} alone" if state in alike[1:] else ""
+                if part == _PRESSURE:
+                    words = of or words
+                elif of != before:
+                    words += f" and {of or 'without the pressure of the fill'}"
+                before = of
+                yield state, words
 
     def say_range(self) -> str:
         """Return the least and the greatest factor over all that is assumed, in words."""
@@ -419,17 +448,18 @@ class Rating(ResultDisplay):
         most = f"{self._say_factor('full_pressure')} with all of it"
         return [
             f"{begin} of the fill, each at its worst place: {least} with neither active nor "
-            f"passive, {self._say_factor(own)} with {part} the passive one, {most}"
+            f"passive, {self._say_factor('active_alone')} with the active one alone, "
+            f"{self._say_factor(own)} with {part} the passive one, {most}"
         ]
 
     def describe_backing(self) -> list[str]:
         """Return the line on what the backing adds, if there is some."""
         if not has_backing(self.fill):
             return []
-        with_pressure, neither = map(self._say_factor, ("without_backing", "without_either"))
+        with_pressure, neither, active = map(self._say_factor, _BARE)
         return [
             f"without the backing but with the pressure, each at its worst place: {with_pressure}; "
-            f"without either: {neither}"
+            f"with the active one alone: {active}; without either: {neither}"
         ]
 
     def _describe_crushing(self) -> str:
@@ -626,7 +656,7 @@ def rate(  # noqa: PLR0913  (factors of the check, and the strength of the bridg
     width = rule if width is None else width
     area_load = driven.area_load if area_load is None else check_area_load(area_load)
     _check_width(width, structure)
-    weighted, rows = _scale_weights(structure, dead), driven.factored(live, impact)
+    weighted, rows = scale_weights(structure, dead), driven.factored(live, impact)
     strength, fill = check_options(structure, friction, strength), place_backing(fill, structure)
     laid = lay_parapets(structure, dead * parapets)
     options = dict[str, Any](friction=friction, strength=strength, fill=fill, dead=laid)
@@ -673,7 +703,7 @@ def rate_again(found: Rating, structure: Structure, width: float | None, **optio
     options["fill"] = place_backing(options["fill"], structure)
     options["dead"] = lay_parapets(structure, found.dead * found.parapets)
     usual = vehicle.spread_over(structure) if found.is_width_by_rule else found.width
-    weighted = _scale_weights(structure, found.dead)
+    weighted = scale_weights(structure, found.dead)
     axles = parse_axles(vehicle.axles, vehicle.spacings)
     rows = vehicle.factored(found.live, found.impact)
     loads = spread_over_bridge(structure, rows, usual if width is None else width, axles)
@@ -689,16 +719,6 @@ def _check_width(width: float, structure: Structure) -> None:
             f"width {width:.4g} m is not above 0 and up to that of the bridge, "
             f"{structure.width:.4g} m: give the part over which one vehicle spreads"
         )
-
-
-def _scale_weights(structure: Structure, factor: float) -> Structure:
-    """Return a structure whose blocks weigh a multiple."""
-    if factor == 1.0:
-        return structure
-    known = {block.material for block in structure.blocks}
-    scaled = {each: replace(each, unit_weight=factor * each.unit_weight) for each in known}
-    blocks = (replace(block, material=scaled[block.material]) for block in structure.blocks)
-    return replace(structure, blocks=tuple(blocks))
 
 
 def _places_along(structure: Structure, vehicle: Array, steps: int = 100) -> Sequence[float]:

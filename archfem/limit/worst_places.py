@@ -1,6 +1,7 @@
 """Worst places of a vehicle on a bridge, and its least factors in states of fill and stones."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from itertools import islice, product
 from typing import Any
 
@@ -44,6 +45,16 @@ CRUSHING_PREFIX = "crushing "
 # Each state with those whose factors guide its search, in the order of their searches
 _GUIDES: dict[str, Sequence[str]] = {"": (), **WEAKER_FILLS}
 _GUIDES |= {f"{CRUSHING_PREFIX}{state}": (state, "by_pressure") for state in WEAKER_FILLS}
+
+
+def scale_weights(structure: Structure, factor: float) -> Structure:
+    """Return a structure whose blocks weigh a multiple."""
+    if factor == 1.0:
+        return structure
+    known = {block.material for block in structure.blocks}
+    scaled = {each: replace(each, unit_weight=factor * each.unit_weight) for each in known}
+    blocks = (replace(block, material=scaled[block.material]) for block in structure.blocks)
+    return replace(structure, blocks=tuple(blocks))
 
 
 def spread_over_bridge(

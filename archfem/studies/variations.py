@@ -456,9 +456,12 @@ def vary_rating(
     known = {"the values of the case": found.factor}
     if found.fill is not None:
         known |= {"no pressure of the fill": np.nan_to_num(found.without_pressure)}
+        known |= {"its active pressure alone": np.nan_to_num(found.active_alone)}
         known |= {"all of its passive pressure": found.full_pressure}
         none = {"limit.fill.mobilisation": 0.0, "limit.fill.active": 0.0}
         listed.append(("pressure", "no pressure of the fill", none))
+        alone = {"limit.fill.mobilisation": 0.0, "limit.fill.active": 1.0}
+        listed.append(("pressure", "its active pressure alone", alone))
         listed.append(("pressure", "all of its passive pressure", {"limit.fill.mobilisation": 1.0}))
     if has_backing(found.fill):
         known |= {"no backing": np.nan_to_num(found.without_backing)}

@@ -225,18 +225,24 @@ def test_a_bridge_with_fill_has_the_least_depth_of_all_joints(tmp_path, capsys):
     assert af.commands.main(["thickness", str(path), *strength, "--out", str(out)]) == 0
     fills = [
         af.limit.Fill(friction_angle=35.0, **given)
-        for given in ({}, {"mobilisation": 0.0, "active": 0.0}, {"mobilisation": 1.0})
+        for given in (
+            {},
+            {"mobilisation": 0.0, "active": 0.0},
+            {"mobilisation": 1.0},
+            {"mobilisation": 0.0},
+        )
     ]
-    own, none, full = (af.limit.geometric_factor(bridge, fill=fill) for fill in fills)
+    own, none, full, active = (af.limit.geometric_factor(bridge, fill=fill) for fill in fills)
     words = "geometric factor of safety at rest with the fill, without crushing: "
     words += f"{own:.3g}, as it stands with all"
     said = capsys.readouterr().out
     assert words in said
     assert f"; {none:.3g} without its pressure, {full:.3g} with all of its passive pressure" in said
+    assert f" pressure, {active:.3g} with its active pressure alone" in said
     assert "of a ring without fill, which is another structure" in said
     (row,) = json.loads((out / "thickness.json").read_text())["rows"]
     assert row[0] == "least depth of all joints with the fill"
-    ends = min(own, none, full), max(own, none, full)
+    ends = min(own, none, full, active), max(own, none, full, active)
     assert [float(x) for x in row[3].split(" to ")] == pytest.approx(ends, rel=5e-3)  # 3 digits
     push = [*strength, "--set", "limit.horizontal=1.0"]
     assert af.commands.main(["limit", str(path), *push]) in (0, 3)

@@ -13,10 +13,16 @@ import archfem as af
 from archfem.cases.analysis_keys import LimitAnalysis, parse_limit
 from archfem.cases.rating_text import doubt_rating, state_ratings, tabulate_ratings
 from archfem.cases.result_text import ResultTable
-from archfem.limit import VEHICLES, Vehicle, rating, worst_places
+from archfem.limit import VEHICLES, Vehicle, rating, vehicles, worst_places
 from archfem.limit.rating import _places_along as places_along
 from archfem.models.model import Doubt
 from archfem.view.collapse import draw_ratings
+
+# Of a fill with backing, beside the one given
+STATES = (
+    *("without_pressure", "full_pressure", "active_alone"),
+    *("without_backing", "without_either", "active_without_backing"),
+)
 
 EXACT = 1e-6
 """Relative: the programme is solved to 1e-9 block weights, corners count as one within 1e-6."""
@@ -204,8 +210,7 @@ def test_doubts_about_fill_and_stones_are_combined(monkeypatch):
     found, soft = (
         af.rate(bridge, axle, live=1.0, fill=fill, strength=strength) for strength in (None, 5e6)
     )
-    states = ("without_pressure", "full_pressure", "without_backing", "without_either")
-    expected = {state: getattr(soft, state) for state in ("factor", *states)}
+    expected = {state: getattr(soft, state) for state in ("factor", *STATES)}
     assert found.crushing == pytest.approx(expected, rel=1e-4)
     # an axle that either of the two carries, of a bridge without backing
     low, high = soft.without_either, min(found.without_either, soft.without_backing)
@@ -225,6 +230,11 @@ def test_doubts_about_fill_and_stones_are_combined(monkeypatch):
         ({"stones": 0.9}, "passes only with stones that do not crush"),
         ({"stones": np.nan}, "passes only with stones that do not crush"),
         ({"pressure": 0.9}, "passes only with the pressure of the fill"),
+        ({"passive": 0.9}, "passes only with the passive pressure of the fill"),
+        (
+            {"passive, backing": 0.9},
+            "passes only with the passive pressure of the fill or the backing",
+        ),
         (
             {"pressure": 0.9, "stones": 0.9},
             "passes only with the pressure of the fill and stones that do not crush",
@@ -244,6 +254,7 @@ def test_a_verdict_names_the_least_that_it_needs(lorry_rating, low, words):
     """Without more parts a bridge carries no more: factors by the set of parts left out."""
     names = {"": "factor", "pressure": "without_pressure"}
     names |= {"backing": "without_backing", "pressure, backing": "without_either"}
+    names |= {"passive": "active_alone", "passive, backing": "active_without_backing"}
 
     def least(parts):
         return min((x for key, x in low.items() if {*key.split(", ")} <= {*parts}), default=1.5)
@@ -259,7 +270,7 @@ def test_a_verdict_names_the_least_that_it_needs(lorry_rating, low, words):
 @pytest.mark.parametrize(("without", "doubted"), [(0.9, True), (1.1, False)])
 def test_what_passes_with_pressure_of_the_fill_alone_is_in_doubt(lorry_rating, without, doubted):
     moving = _scaled(lorry_rating.moving, 1.5 / lorry_rating.factor)
-    found = replace(lorry_rating, moving=moving, crushing={}, fill=GRAVEL, without_pressure=without)
+    found = replace(lorry_rating, moving=moving, crushing={}, by_cs454={}, without_pressure=without)
     remarks = doubt_rating(found, LimitAnalysis([], "coulomb", 1e7))
     causes = [remark.cause for remark in remarks if isinstance(remark, Doubt)]
     # a pass by a code is in doubt as that of a vehicle with its factors given
@@ -479,18 +490,18 @@ def test_less_than_the_rule_is_stated_beside_the_verdict(monkeypatch):
         by_rule = f"over 2.1 m of width and 3 kN/m² beside the axles, by rule, {rule.factor:.4g}"
         assert f"; {by_rule} at this place, with the fill as given" in repr(found)
     assert np.isnan(rule.by_rule)
-    ends = f"{rule.crushing['without_pressure']:.4g} to {rule.full_pressure:.4g}"
+    ends = f"{min(rule.crushing.values()):.4g} to {rule.full_pressure:.4g}"
     over = "over what is assumed of the fill and the stones"
     assert repr(rule).endswith(f"passes; the factor is {ends} {over}")
     train = replace(VEHICLES["LM71"], axles=(1e3,), spacings=())
     found = af.rate(bridge, train, fill=GRAVEL)
-    least = found.crushing["without_pressure"]
+    least = min(found.crushing.values())
     ends = f"the factor is {least:.4g} to {found.full_pressure:.4g} {over}"
     left = "left out: the 80 kN/m beside the axles (LM71-train)"
     most = f"passes if the code's impact is at most {found.factor:.4g}"
-    # that of a rating of its own, without any fill to press
-    most += f", without the pressure of the fill {found.without_pressure:.4g}"
-    assert found.without_pressure < found.factor
+    # the active pressure pushes stones over
+    most += f", with the active pressure of the fill alone {found.active_alone:.4g}"
+    assert found.active_alone < found.without_pressure < found.factor
     assert repr(found).endswith(f"{most}; {ends}; {left}")
     assert found.short_outcome == "passes, without impact"
 
@@ -596,7 +607,7 @@ def test_the_range_over_the_pressure_of_the_fill_is_that_of_all_places(lorry_rat
     loads = [load.force[1] for load in worst.live]
     axles = np.array(vehicle.axles) * min(loads) / -max(vehicle.axles)
     places = {"positions": lorry_rating.moving.factors["position"].values.tolist()}
-    none, whole = (
+    none, active, whole = (
         af.limit.moving_load(
             worst.structure,
             axles.tolist(),
@@ -604,13 +615,24 @@ def test_the_range_over_the_pressure_of_the_fill_is_that_of_all_places(lorry_rat
             fill=replace(GRAVEL, **pressure),
             **places,
         ).worst.factor
-        for pressure in ({"mobilisation": 0.0, "active": 0.0}, {"mobilisation": 1.0})
+        for pressure in (
+            {"mobilisation": 0.0, "active": 0.0},
+            {"mobilisation": 0.0},
+            {"mobilisation": 1.0},
+        )
     )
+    assert lorry_rating.active_alone == pytest.approx(active, rel=EXACT)
+    assert lorry_rating.least == min(lorry_rating.crushing.values())
+    # by that state alone it fails: the active pressure pushes stones over
+    by_code = lorry_rating.by_codes[vehicles.BY_CS454]
+    assert by_code.crushing["active_alone"] < 1.0 < by_code.crushing["without_pressure"]
+    needed = "passes only with the passive pressure of the fill or stones that do not crush"
+    assert by_code.short_outcome == needed
     assert lorry_rating.without_pressure == pytest.approx(none, rel=EXACT)
     assert lorry_rating.full_pressure == pytest.approx(whole, rel=EXACT)
     assert none < 0.9 * lorry_rating.factor < 0.8 * whole
     begin = f"over the pressure of the fill, each at its worst place: {none:.4g} with "
-    begin += "neither active nor passive"
+    begin += f"neither active nor passive, {active:.4g} with the active one alone"
     share = "all of the active and up to a third of the passive one"
     end = f", {whole:.4g} with all of it"
     said = without_places(str(lorry_rating))
@@ -647,6 +669,8 @@ def test_other_states_of_the_fill_have_worst_places_of_their_own(area_load, monk
         "full_pressure": {"mobilisation": 1.0},
         "without_backing": {"backing": None},
         "without_either": {"mobilisation": 0.0, "active": 0.0, "backing": None},
+        "active_alone": {"mobilisation": 0.0},
+        "active_without_backing": {"mobilisation": 0.0, "backing": None},
     }
     for name, changes in states.items():
         given = {"area_load": area_load, "fill": replace(fill, **changes)}
@@ -746,7 +770,7 @@ def test_a_plastic_fill_has_the_factors_of_its_pressure_beside_its_own(monkeypat
     found = af.rate(bridge, vehicle, fill=plastic)
     pressed = af.rate(bridge, vehicle, fill=af.limit.Fill(backing_height=0.6, **strength))
     assert found.by_pressure == pytest.approx(pressed.factor, rel=EXACT)
-    for state in ("without_pressure", "full_pressure", "without_backing", "without_either"):
+    for state in STATES:
         assert getattr(found, state) == pytest.approx(getattr(pressed, state), rel=EXACT)
     assert np.isnan(pressed.by_pressure)
     begin = "\nnot as a plastic body, but by the pressure of the fill, each at its worst place: "
@@ -808,14 +832,19 @@ def test_a_verdict_says_which_parts_of_the_fill_it_rests_on(lorry_rating):
     assert lorry_rating.outcome.startswith("passes if")
     soft = replace(lorry_rating, without_pressure=0.99)
     assert soft.outcome.startswith("passes only with the pressure of the fill if")
-    backed = replace(soft, fill=replace(GRAVEL, backing=0.5), without_backing=np.nan)
+    passive = replace(lorry_rating, active_alone=0.99)
+    assert passive.outcome.startswith("passes only with the passive pressure of the fill if")
+    assert passive.list_losses()[0] == (0.99, "with the active pressure of the fill alone")
+    fill = {"fill": replace(GRAVEL, backing=0.5), "active_without_backing": 1.02}
+    backed = replace(soft, **fill, without_backing=np.nan)
     words = "passes only with the pressure of the fill and the backing"
     assert backed.outcome.startswith(words)
     without = "\nwithout the backing but with the pressure, each at its worst place: "
-    assert f"{without}the bridge does not stand; without either: " in str(backed)
-    either = replace(lorry_rating, fill=backed.fill, without_backing=1.01, without_either=0.8)
+    alone = "with the active one alone: 1.02; without either: "
+    assert f"{without}the bridge does not stand; {alone}" in str(backed)
+    either = replace(lorry_rating, **fill, without_backing=1.01, without_either=0.8)
     assert either.outcome.startswith("passes only with the pressure of the fill or the backing if")
-    assert f"{without}1.01; without either: 0.8\n" in str(either)
+    assert f"{without}1.01; {alone}0.8\n" in str(either)
     # with neither it is the least, and may be far below that without one of them
     least = replace(either, without_either=1.005, full_pressure=np.inf)
     assert least.outcome.startswith("passes if")
@@ -841,7 +870,8 @@ def test_a_verdict_says_which_parts_of_the_fill_it_rests_on(lorry_rating):
 def test_a_mobilisation_below_the_active_pressure_is_noted(lorry_rating, given, noted):
     """Of 27° the active pressure is 1 / K_p² = 0.141 of the passive one."""
     other = af.limit.Fill(friction_angle=27.0, **given)
-    notes = doubt_rating(replace(lorry_rating, fill=other), LimitAnalysis([], "coulomb", 1e7))
+    given_fill = replace(lorry_rating, fill=other, by_cs454={})
+    notes = doubt_rating(given_fill, LimitAnalysis([], "coulomb", 1e7))
     words = f"note: mobilisation {given['mobilisation']:.2g} counts as 0.14, the active pressure"
     assert any(note.startswith(words) for note in notes) == noted
     assert notes[-1].startswith("note: left out: a second lorry that meets the vehicle")
