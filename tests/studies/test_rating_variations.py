@@ -79,6 +79,7 @@ def test_each_row_is_the_rating_of_a_changed_case(tmp_path):
         width = f"a vehicle on {share * 1.8:.3g} m"
         assert factors[width] == pytest.approx(share * found.factor, rel=PRINTED)
     assert factors["no pressure of the fill"] == pytest.approx(found.without_pressure, rel=1e-3)
+    assert factors["its active pressure alone"] == pytest.approx(found.active_alone, rel=1e-3)
     least_of_all, least, *_, most = sorted(factors, key=factors.get)
     ends = f"to {factors[least]:.4g} ({least}) at least and {factors[most]:.4g} ({most}) at most"
     at_once = f"all unfavourable at once {factors[least_of_all]:.4g}"
@@ -366,7 +367,13 @@ def test_free_abutments_that_change_nothing_say_by_which_size(tmp_path, monkeypa
     text = CASE.replace("PIER", 'breadth = "0.9 m"').replace("[structure.backfill]", walls)
     (tmp_path / "case.toml").write_text(text)
     case = af.Case.read(tmp_path / "case.toml")
-    given = {"factor": 4.0, "without_pressure": 3.0, "full_pressure": 5.0, "strength": np.inf}
+    given = {
+        "factor": 4.0,
+        "without_pressure": 3.0,
+        "active_alone": 3.0,
+        "full_pressure": 5.0,
+        "strength": np.inf,
+    }
     words = {"vehicle": SimpleNamespace(name="cart"), "label": "cart", "crushing": {}}
     words |= {"by_cs454": {}, "is_width_by_rule": False}
     found = SimpleNamespace(
