@@ -963,7 +963,14 @@ def test_factors_of_codes_are_stated_with_outcome_and_range(monkeypatch):
     least = f"{alone.crushing['without_either']:.4g} to {alone.full_pressure:.4g} over what is"
     assert least in bare.by_codes[names[2]].outcome
     # in each state of fill and stones, by the nearest bounds alone
-    for state in ("factor", "crushing", *rating._PRESSURES):
+    states = (
+        "without_pressure",
+        "active_alone",
+        "full_pressure",
+        "without_backing",
+        "without_either",
+    )
+    for state in ("factor", "crushing", *states):
         assert given.by_cs454[state] == pytest.approx(getattr(by_cs454, state), rel=1e-3), state
     of_code = given.by_codes[code]
     assert of_code.factor == given.by_cs454["factor"]
