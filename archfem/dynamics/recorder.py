@@ -263,8 +263,8 @@ def doubt_drift(motion: Motion) -> Iterator[Doubt]:
         # their significant duration have 0.8 % at most
         if component in motion.components and (share := find_drift(motion, component)[1]) > 0.01:
             yield Doubt(
-                "the {} motion drifts: it ends with the velocity of {:.0%} of its peak "
-                "acceleration throughout, which pushes the structure",
+                "the {} motion drifts: it ends with a velocity as of {:.0%} of its peak "
+                "acceleration held throughout, which pushes the structure",
                 "correct it by `baseline_corrected = true` under [motion], in Python by "
                 ".baseline_corrected(), unless the ground is to move on",
                 (component, float(f"{share:.3g}")),  # the same of every scale

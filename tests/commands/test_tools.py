@@ -303,5 +303,5 @@ def test_a_check_doubts_a_record_that_drifts(tmp_path, capsys):
     command = ["check", str(tmp_path / "case.toml")]
     assert af.commands.main(command) == 3  # doubtful
     said = capsys.readouterr().out
-    assert "in doubt: the horizontal motion drifts: it ends with the velocity of 17% of" in said
+    assert "in doubt: the horizontal motion drifts: it ends with a velocity as of 17% of" in said
     assert af.commands.main([*command, "--set", "motion.baseline_corrected=true"]) == 0
