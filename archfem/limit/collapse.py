@@ -88,7 +88,8 @@ class Collapse(ResultDisplay):
         factor: multiple of the live load at collapse [-]; infinite where it never collapses,
             undefined (NaN) where it does not stand, or where no state was found. For a settlement,
             work of the weights on it [N m]: for a translation by 1 m, the thrust on the support
-            along it, in N.
+            along it, in N. With a `Fill` it is that of the fill as given, and may be the largest
+            over what is assumed of it: the least is `range[0]`, with hinges and picture in `least`.
         outcome: how the analysis ended; `outcome.sentence` gives its meaning.
         hinges: joints that turn, with the face where the blocks stay in contact.
         sliding: numbers of the joints that slide.
@@ -144,7 +145,10 @@ class Collapse(ResultDisplay):
 
     @property
     def lower(self) -> float:
-        """The factor, or a proved bound where none was found: none is below it [-]."""
+        """The factor, or a proved bound where none was found: none is below it [-].
+
+        It is of the fill as given; the least over what is assumed of a `Fill` is `range[0]`.
+        """
         if self.outcome is Outcome.BRACKETED and self.solutions:
             return self.solutions.bracket[0]
         return self.factor
@@ -262,6 +266,8 @@ class Collapse(ResultDisplay):
         hinges = list_or_count(sides, CLEAR_TURNS) or "none"
         sliding = list_or_count(self.sliding_names) or "none"
         bound = "" if self.upper == self.lower or np.isnan(self.lower) else f" to {self.upper:.4g}"
+        if self.range[0] < (1.0 - 1e-4) * self.lower:
+            bound += f" with the fill as given (least {self.range[0]:.4g}, see .least)"
         text = f"{self._headline}: factor {self.lower:.4g}{bound}; hinges: {hinges}; "
         solutions = "" if self.solutions is None else f"; {self.solutions}"
         over = f"; {self.describe_range()}" if self.over_fill else ""

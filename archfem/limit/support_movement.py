@@ -35,6 +35,7 @@ from archfem.limit.nonassociated import RESISTANCE_MARGIN, normal_forces, shear_
 from archfem.limit.self_weight import stands
 from archfem.masonry.block import rotate
 from archfem.masonry.loads import Settlement
+from archfem.masonry.stiffness_ratio import find_yielding_blocks
 from archfem.masonry.structure import Structure, join_joint_names, join_names
 
 # First and longest step, as a share of the full movement [-]
@@ -182,6 +183,14 @@ def largest_movement(
     support = settlement.added(structure, np.zeros((len(structure.blocks), 3)))
     if not support.any():
         raise InvalidInput(f"settlement {settlement.motion} moves nothing: give a direction")
+    blocks = structure.blocks
+    soil = [number for number in find_yielding_blocks(structure) if not blocks[number].grain]
+    if soil:
+        raise InvalidInput(
+            f"blocks {[blocks[number].name for number in soil]} are fill, of which this analysis "
+            "takes no strength: leave the fill out, or give the settlement to af.pushover with a "
+            "finite-element model"
+        )
     if not stands(structure, friction=friction):
         raise InvalidInput("it does not stand under its own weight before any support moves")
     return _MovementPath(structure, settlement, support, friction is not None).follow(tolerance)

@@ -243,6 +243,9 @@ class MovingLoad(ResultDisplay):
         worst: collapse with the least factor.
         direction: driving direction of the vehicle there.
         position: x of its middle there [m].
+
+    The least factor of each direction is `factors.factor.min("position")`, and its place
+    `factors.factor.idxmin("position")`.
     """
 
     factors: xr.Dataset
@@ -327,9 +330,9 @@ def moving_load(  # noqa: PLR0913  (loads, their places, and the strength of the
         axles: weight of each axle over the bridge's whole width, from the front [N].
         spacings: distances between the axles, one fewer [m].
         positions: x of the vehicle's middle, halfway between first and last axle (n,) [m]; by
-            default those of a rating (`rate`), from where it drives onto the structure to where it
-            is off it again. Steps are 1/100 of the structure's length, or 1/20 with a plastic fill.
-            Without fill there are also those with an axle at an end of a stone.
+            default from where it drives onto the structure to where it is off it again. Steps are
+            1/100 of the structure's length, or 1/20 with a plastic fill. `rate` also searches
+            places between these, so that its factor may be less.
         area_load: distributed load beside and below the axles, where it is adverse [Pa]. With a
             plastic fill that is found with the fill as `Fill`, and a warning says so.
         friction: as for `collapse_factor`.

@@ -55,7 +55,8 @@ class Stop:
     Attributes:
         slope: tangent of the curve relative to its initial tangent [-]; with large displacements
             control by "path" continues past the peak, and the slope does not end it.
-        displacement: displacement of the loaded point, relative to the structure's size [-].
+        displacement: displacement of the loaded point over the structure's size, `Structure.size`
+            [-]: 0.1 is a tenth of it.
         hinges: number of hinged joints, or None not to count them.
         steps: number of steps.
     """

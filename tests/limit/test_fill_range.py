@@ -106,6 +106,11 @@ def test_a_stone_turns_into_a_fill_at_a_factor_by_each_assumption(verified):
     low, high = min(expected.values()), max(expected.values())
     verified("stone in a fill: least factor over its assumptions", low, "moments", found.range[0])
     assert found.factor == pytest.approx(high)
+    # a factor that is not the least says so where it stands first
+    said = f"factor {high:.4g} with the fill as given (least {low:.4g}, see .least); hinges"
+    assert said in str(found)
+    assert found.least.factor == pytest.approx(low)
+    assert "with the fill as given" not in str(found.least)
     assert found.sentence.endswith(f", at {low:.4g} to {high:.4g} g, pushed to the right")
     over = f"; at {low:.4g} g ({CENTROIDS}, {NONE}) to {high:.4g} g ({FEET}, {THIRD}); joints "
     assert over in str(found)

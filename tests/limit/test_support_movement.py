@@ -402,3 +402,16 @@ def test_a_cube_on_ground_that_tilts_slides_or_falls(friction, end, slope):
     found = largest_movement(cube, af.Settlement(0, (0.0, 0.0, 4.0)), tolerance=1e-3)
     assert found.end is end
     assert 4.0 * found.largest == pytest.approx(np.arctan(slope), abs=5e-3)
+
+
+def test_fill_is_refused_with_a_remedy_that_exists():
+    arch = af.shapes.Arch(span=4.0, rise=1.0, thickness=0.4, voussoirs=9)
+    soil = af.Material(6.25e6, 0.2, 18e3, name="fill")
+    backfill = af.shapes.Backfill(cover=0.3, material=soil)
+    bridge = af.bridge(arches=[arch], backfill=backfill, width=1.0)
+    support = af.Settlement(bridge.blocks[bridge.joints[0].blocks[0]].name, (-0.1, 0.0, 0.0))
+    with pytest.raises(af.errors.InvalidInput, match="takes no strength: leave the fill") as found:
+        largest_movement(bridge, support)
+    assert "fill=" not in str(found.value)  # `largest_movement` has no such argument
+    bare = af.bridge(arches=[arch], width=1.0)
+    assert largest_movement(bare, support).largest > 0.0
