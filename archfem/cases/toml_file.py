@@ -44,7 +44,26 @@ def read_with_base(path: Path, above: Sequence[Path] = ()) -> dict[str, Any]:
         raise InvalidInput(f"{path}: base = {base!r} is not the name of a file")
     below = read_with_base(path.parent / base, (*above, path.resolve()))
     remove_keys(below, settings.pop("remove", []), f"{path}: ")
+    _refuse_hidden_keys(below, settings, path)
     return merge_tables(below, settings)
+
+
+def _refuse_hidden_keys(below: Table, above: Table, path: Path) -> None:
+    """Refuse a value for all parts of a structure where in the base each part has its own."""
+    parts, known = above.get("structure", {}), below.get("structure", {})
+    for section, table in parts.items() if isinstance(parts, Mapping) else ():
+        under = known.get(section) if isinstance(known, Mapping) else None
+        if not (isinstance(table, Mapping) and isinstance(under, Mapping)):
+            continue
+        named = {name: each for name, each in under.items() if isinstance(each, Mapping)}
+        for key, value in table.items():
+            alike = not isinstance(value, Mapping) and named
+            if alike and all(key in each for each in named.values()):
+                raise InvalidInput(
+                    f"{path}: {key} of [structure.{section}] would have no effect, as each of "
+                    f"{[*named]} has its own in the base: give it under each, or take these out "
+                    f"by remove = ['structure.{section}.{format_key(next(iter(named)))}.{key}', …]"
+                )
 
 
 def read_tables(path: Path, what: str) -> dict[str, Any]:

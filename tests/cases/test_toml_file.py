@@ -13,6 +13,7 @@ from archfem.cases.toml_file import (
     format_tables,
     merge_tables,
     parse_change,
+    read_with_base,
     refuse_unknown,
     remove_key,
     set_value,
@@ -265,3 +266,22 @@ def test_a_material_without_strength_is_sent_to_limit_analysis():
         af.Case.of(settings)
     settings |= {"materials": {}, "limit": {"strength": "none"}}
     assert af.Case.of(settings).limit.strength == np.inf
+
+
+@pytest.mark.parametrize("own", [("left", "right"), ("left",)])
+def test_a_common_key_over_parts_with_their_own_is_refused(tmp_path, own):
+    walls = {name: "above = 0.3" if name in own else "length = 3.0" for name in ("left", "right")}
+    text = "\n".join(f"[structure.sidewalls.{name}]\n{line}" for name, line in walls.items())
+    (tmp_path / "base.toml").write_text(text, "utf-8")
+    case = tmp_path / "case.toml"
+    case.write_text('base = "base.toml"\n[structure.sidewalls]\nabove = 2.6\n', "utf-8")
+    if len(own) == 1:  # the other wall takes it
+        assert read_with_base(case)["structure"]["sidewalls"]["above"] == 2.6
+        return
+    with pytest.raises(
+        af.errors.InvalidInput, match="above of .structure.sidewalls. would have no effect"
+    ):
+        read_with_base(case)
+    removed = 'remove = ["structure.sidewalls.left.above", "structure.sidewalls.right.above"]'
+    case.write_text(f"{removed}\n{case.read_text('utf-8')}", "utf-8")
+    assert read_with_base(case)["structure"]["sidewalls"]["above"] == 2.6
