@@ -20,6 +20,13 @@ from archfem.units import format_ratio
 # Note on abutments, which a rating varies
 IMMOVABLE = "abutments are taken as immovable"
 
+# Note on the stiffness of joints, which counts for nothing in limit analysis
+RIGID_JOINTS = (
+    "joints are rigid in this factor: with elastic ones and large displacements three rings bore "
+    "0.45 of theirs, and with joints ten times as stiff 0.7; repeat the worst place by "
+    'archfem pushover, displacements = "large" and control = "path", with the k_n of these joints'
+)
+
 # All that is unfavourable in the variations of a rating, which may be left out
 ALL_AT_ONCE, NOT_COMPUTED = "all unfavourable at once", "not computed"
 AT_ONCE_BY_CS454 = f"{ALL_AT_ONCE}, by CS 454"
@@ -168,6 +175,7 @@ def doubt_rating(found: Rating, limit: LimitAnalysis) -> list[Remark]:
             lines.append(f"{NOTE_MARK}{words} pressure; 0 is not without pressure, which is beside")
     structure = found.structure
     lines += note_lower_crowns(structure, found.fill)
+    lines.append(f"{NOTE_MARK}{RIGID_JOINTS}")
     rings = [joint for joint in structure.joints if joint.role == "ring"]
     if any(structure.blocks[number].fixed for joint in rings for number in joint.blocks):
         words = 'state = "free" tests them, of [structure.sidewalls]'

@@ -1,12 +1,14 @@
 """Warnings of limit analysis: why a factor may be an upper estimate, or no bound."""
 
 from collections.abc import Sequence
+from math import hypot
 
+from archfem._typing import Array
 from archfem.errors import logger
 from archfem.limit.nonassociated import NonassociatedBounds
 from archfem.masonry.loads import Action, PointLoad
 from archfem.masonry.structure import Structure, join_joint_names
-from archfem.units import kN
+from archfem.units import Ends, Usual, kN
 
 
 def warn_lift(loads: Sequence[Action]) -> None:
@@ -77,3 +79,20 @@ def warn_lost_solution(solutions: NonassociatedBounds) -> None:
             "%.3g times the friction, from which the factor should rise little",
             *(least, factor, share),
         )
+
+
+def describe_closing(thrusts: Array, structure: Structure) -> str:
+    """Say that joints are rigid, and by how much elastic ones would shorten a ring, Σ N/(k_n A)."""
+    closing, stiffness = dict[str, float](), set[float]()
+    for joint, thrust in zip(structure.joints, thrusts, strict=True):
+        if joint.role == "ring" and thrust > 0.0:
+            each, (a, b) = joint.contact.normal_stiffness, (joint.intrados, joint.extrados)
+            area = structure.width * hypot(b[0] - a[0], b[1] - a[1])
+            closing[joint.part] = closing.get(joint.part, 0.0) + thrust / (each * area)
+            stiffness.add(each)
+    words = "joints are rigid; elastic ones close, so that a ring sinks and bears less"
+    if not stiffness:
+        return words
+    usual = " (default)" * all(isinstance(each, Usual) for each in stiffness)
+    by, of = 1e3 * max(closing.values()), f"{Ends.of([k / 1e9 for k in stiffness]):.3g}"
+    return f"{words}: with k_n {of} MPa/mm{usual} the thrust shortens it by {by:.2g} mm"

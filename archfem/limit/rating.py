@@ -11,6 +11,7 @@ from archfem._typing import Array, Metres, NewtonsPerMetre, Pascals
 from archfem._validation import validate_arguments
 from archfem.errors import InvalidInput
 from archfem.limit.collapse import describe_crushing, describe_fill
+from archfem.limit.collapse_warnings import describe_closing
 from archfem.limit.fill_range import say_part
 from archfem.limit.fill_strength import Fill, PlasticFill, as_pressure, has_backing, place_backing
 from archfem.limit.self_weight import check_options, say_strength
@@ -405,6 +406,7 @@ class Rating(ResultDisplay):
             *self.describe_pressure(),
             *self.describe_backing(),
             self._describe_basis(),
+            describe_closing(self.moving.worst.joints["N"].values, self.structure),
             f"least factor driving {', '.join(least)}",
             f"{self.moving}",
             *describe_axles(self.structure, self._axles_at, self.width),
@@ -616,6 +618,9 @@ def rate(  # noqa: PLR0913  (factors of the check, and the strength of the bridg
     factor of safety is Heyman's: all joints are narrowed about their middles, at unchanged weights
     and with the vehicle at its worst place, until it is carried no longer; or deepened until it is
     carried.
+
+    Joints are rigid. Elastic ones close, so that a ring sinks and bears less: `archfem.pushover`
+    with large displacements and control by "path" finds how much less.
 
     Args:
         structure: the bridge, or an `archfem.Analysis` of it.

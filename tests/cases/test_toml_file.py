@@ -278,9 +278,7 @@ def test_a_common_key_over_parts_with_their_own_is_refused(tmp_path, own):
     if len(own) == 1:  # the other wall takes it
         assert read_with_base(case)["structure"]["sidewalls"]["above"] == 2.6
         return
-    with pytest.raises(
-        af.errors.InvalidInput, match="above of .structure.sidewalls. would have no effect"
-    ):
+    with pytest.raises(af.errors.InvalidInput, match="would have no effect"):
         read_with_base(case)
     removed = 'remove = ["structure.sidewalls.left.above", "structure.sidewalls.right.above"]'
     case.write_text(f"{removed}\n{case.read_text('utf-8')}", "utf-8")

@@ -11,9 +11,10 @@ from backfilled import arch_bridge
 
 import archfem as af
 from archfem.cases.analysis_keys import LimitAnalysis, parse_limit
-from archfem.cases.rating_text import doubt_rating, state_ratings, tabulate_ratings
+from archfem.cases.rating_text import RIGID_JOINTS, doubt_rating, state_ratings, tabulate_ratings
 from archfem.cases.result_text import ResultTable
 from archfem.limit import VEHICLES, Vehicle, rating, vehicles, worst_places
+from archfem.limit.collapse_warnings import describe_closing
 from archfem.limit.rating import _places_along as places_along
 from archfem.models.model import Doubt
 from archfem.view.collapse import draw_ratings
@@ -1246,3 +1247,45 @@ def test_the_worst_place_on_a_fill_is_found_between_the_places_of_the_search(mon
         assert values[0] == pytest.approx(values[1], rel=1e-4)
     coarse = places_along(second.structure, np.array([[1.0, 0.675], [1.0, -0.675]]))
     assert second.factor < (1.0 - 1e-3) * np.nanmin(second.moving.factors_at(coarse))
+
+
+def test_a_rating_says_by_how_much_elastic_joints_would_close():
+    """A strut of three joints by hand: Σ N/(k_n A), of 300 kN on 0.5 m × 2 m and 1 MPa/mm."""
+    ring = af.circular_arch(radius=3.0, thickness=0.5, embrace=60.0, voussoirs=2, width=2.0)
+    thrusts = np.full(len(ring.joints), 300e3)
+    usual = describe_closing(thrusts, ring)
+    own = replace(af.masonry.STONE_TO_STONE, normal_stiffness=1e9)
+    given = describe_closing(
+        thrusts,
+        af.circular_arch(
+            radius=3.0, thickness=0.5, embrace=60.0, voussoirs=2, width=2.0, contact=own
+        ),
+    )
+    assert len(ring.joints) == 3
+    assert given.endswith("with k_n 1 MPa/mm the thrust shortens it by 0.9 mm")
+    by = f"{3 * 300 / 1.48e3:.2g}"
+    assert usual.endswith(f"with k_n 1.48 MPa/mm (default) the thrust shortens it by {by} mm")
+
+
+def test_a_rating_notes_that_joints_are_rigid(lorry_rating):
+    assert "joints are rigid; elastic ones close" in str(lorry_rating)
+    notes = [str(each) for each in doubt_rating(lorry_rating, LimitAnalysis((), None))]
+    assert any(RIGID_JOINTS in each for each in notes)
+
+
+@pytest.mark.slow
+def test_elastic_joints_and_large_displacements_bear_less_than_rigid_ones():
+    """Equilibrium of another formulation: a tenth at least is lost, and 0.3 remain."""
+    arch = af.shapes.Arch(span=5.0, rise=1.25, thickness=0.45, voussoirs=25)
+    walls = [
+        af.shapes.Sidewall(length=3.0, height=0.3, above=0.3, state="fixed", name=f"{side} wall")
+        for side in ("left", "right")
+    ]
+    contact = af.Contact(14.8e9, 6.4e9, friction=0.6)
+    ring = af.bridge(arches=[arch], sidewalls=walls, width=4.5, contact=contact)
+    live = [af.PointLoad(x=4.0, force=(0.0, -100e3))]
+    rigid = af.collapse_factor(ring, live=live, strength=np.inf).factor
+    model = af.Analysis(ring, fidelity="rigid", displacements="large").model
+    stop = af.statics.Stop(displacement=0.1)
+    elastic = af.pushover(model, live, control="path", stop=stop).factor
+    assert 0.3 < elastic / rigid < 0.9
