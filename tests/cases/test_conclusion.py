@@ -344,8 +344,21 @@ def test_a_first_fall_has_scale_peak_and_motion_of_one_search(case):
     data = data_of(case, first=verdict_of(), third=verdict_of())
     vars(data)["statements"] = {"scale": state("scale", first, third._replace(pga=0.198))}
     (words,) = find_first_failures(data)
-    over = "(by other motions or time steps up to 0.912 g)"
+    over = "(by other motions or time steps up to 0.912 g, 4.56 × 'first')"
     assert words == f"first falls at 0.903 g, 4.56 × 'third' {over}"  # 4.56 × 0.198 g
+
+
+def test_the_largest_scale_and_peak_of_a_first_fall_are_of_one_run(case):
+    """2.32 × 'third' is 0.664 g, and less than 2.22 × 'first', 0.692 g."""
+    first, third = scales("first", 1.35, falls=2.0), scales("third", 1.41, falls=2.28)
+    pair = first._replace(pga=0.3117, all_steps=2.22), third._replace(pga=0.2862, all_steps=2.32)
+    data = data_of(case, first=verdict_of(), third=verdict_of())
+    vars(data)["statements"] = {"scale": state("scale", *pair)}
+    (words,) = find_first_failures(data)
+    assert words == (
+        "first falls at 0.623 g, 2.00 × 'first' (by other motions or time steps up to 0.692 g, "
+        "2.22 × 'first')"
+    )
 
 
 def test_the_least_peak_of_a_fall_is_of_all_motions_scaled_or_not(case):
@@ -369,13 +382,14 @@ def test_the_range_of_a_first_fall_has_no_motion_that_was_not_searched(case):
     vars(data)["statements"] = {"scale": state("scale", *searched)}
     (words,) = find_first_failures(data)
     assert words == (
-        "first falls at 0.082 g, 0.410 × 'a' (by other motions or time steps up to 0.700 ×, "
-        "0.14 g); 2 of 3 motions were scaled: under others it may fail at less"
+        "first falls at 0.082 g, 0.410 × 'a' (by other motions or time steps up to 0.14 g, "
+        "0.700 × 'b'); 2 of 3 motions were scaled: under others it may fail at less"
     )
     vars(data)["statements"] = {"scale": state("scale", *searched, scales("c", 0.8, falls=0.9))}
     (words,) = find_first_failures(data)
     assert words == (
-        "first falls at 0.082 g, 0.410 × 'a' (by other motions or time steps up to 0.900 ×, 0.18 g)"
+        "first falls at 0.082 g, 0.410 × 'a' (by other motions or time steps up to 0.18 g, "
+        "0.900 × 'c')"
     )
 
 
@@ -565,8 +579,8 @@ def test_the_answer_has_displacements_the_first_fall_and_the_checks(case):
     assert head_of(facts.items()) == (
         "By the kinematic assessment it does not withstand the spectrum of the motion. Under its "
         "motions it survives: it stands under all 2 motions of PGA 0.20 g, and moves by 60 to 80 "
-        "mm. It first falls at 0.26 g, 1.30 × 'a' (by other motions or time steps up to 1.51 ×, "
-        "0.302 g). The least margin is 0.488 (0.592 with the weights apart), on the spectrum of "
+        "mm. It first falls at 0.26 g, 1.30 × 'a' (by other motions or time steps up to 0.302 g, "
+        "1.51 × 'b'). The least margin is 0.488 (0.592 with the weights apart), on the spectrum of "
         "the motion, by damage, which it fails. No property was varied. "
         "The stiffness of joints is a default: measured ones differ tenfold. "
         "Perpendicular to this section, as along a wall, it was not checked."
@@ -591,7 +605,7 @@ def test_the_answer_has_displacements_the_first_fall_and_the_checks(case):
         assert (words in head_of(conclusion.list_facts(data))) == said
     data.statements["scale"] = state("scale", first._replace(unfinished=True), other)
     begun = head_of(conclusion.list_facts(data))
-    assert "0.302 g). The search is unfinished: at less it may, too." in begun
+    assert "1.51 × 'b'). The search is unfinished: at less it may, too." in begun
     assert " It falls at " in begun
     data.statements["scale"] = searched
     vars(data)["case"] = af.Case.of({**case.settings, "assessment": SPECTRUM})

@@ -58,14 +58,14 @@ def find_first_failures(data: ReportData) -> Iterator[str]:
         if not first or min(first)[0] >= least:
             continue
         least, at, name = min(first)
-        ends = [(scale, scale * pga) for scale, pga, _ in made]
-        steps = (x for x in searches if state == "falls")
-        ends += [(x.all_steps, x.all_steps * x.pga) for x in steps if x.all_steps]
+        ends = [(scale * pga, scale, of) for scale, pga, of in made]
+        steps = (x for x in searches if state == "falls" and x.all_steps)
+        ends += [((x.all_steps or 0.0) * x.pga, x.all_steps or 0.0, x.motion) for x in steps]
         over = ["motions"] * (len(searches) > 1) + ["time steps"] * (state == "falls")
-        # the least is of those that were searched, or has no range
-        top = map(max, zip(*ends, strict=True)) if name not in unscaled else (at, least)
-        own, most = ([f"{x:#.3g} ×", f"{y:.3g} g"] for x, y in ((at, least), top))
-        wide = ", ".join(x for x in most if x not in own)
+        # the least is of those that were searched, or has no range; scale and peak are of one run
+        peak, scale, other = max(ends) if name not in unscaled else min(first)
+        wide = f"{peak:.3g} g, {scale:#.3g} × " + (f"'{other}'" if several else "the motion")
+        wide *= f"{peak:.3g}" != f"{least:.3g}"
         motion = f"'{name}'" if several or count > 1 else "the motion"
         beside = f" (by other {' or '.join(over)} up to {wide})" * bool(wide)
         does = _STATES[state][1].replace("first ", "" if unfinished else "first ")
