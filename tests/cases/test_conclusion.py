@@ -247,11 +247,10 @@ def test_a_check_of_what_begins_to_move_is_one_of_displacements_where_it_moves(c
     vars(data)["case"] = af.Case.of({**case.settings, "assessment": SPECTRUM})
     found = state("assessment", answers.Ratios("code", ["right"], 1.1, 1.1, moved=0.842))
     expected = [
-        "the least margin is 1.1 until it moves (0.842 by displacements), on the EC8 spectrum of "
-        "PGA 0.2 g, by code, right",
+        "the least margin is 0.842 by displacements, if it moved, and 1.1 until it moves, on the "
+        "EC8 spectrum of PGA 0.2 g, by code, right",
         "1.1 times the spectrum begins to move it, at the acceleration of the mechanism divided by "
         "FC",
-        "if it moved, it could be displaced by 0.842 times the demand",
     ]
     if verified:
         expected = [
@@ -460,7 +459,9 @@ def test_what_fails_under_a_motion_that_was_not_scaled_has_a_margin_below_one(ca
         "the next is 1.40 on 'a', at a PGA of 0.28 g, under one motion",
         "'c' was not scaled",
     ]
-    assert words_of(data)[0].startswith("The least margin is below 1 on 'b'")
+    assert dict(conclusion.list_facts(data))["margin"].startswith(
+        "The least margin is below 1 on 'b'"
+    )
     falls = dict.fromkeys("bde", verdict_of("fallen"))
     many = data_of(case, a=verdict_of(), **falls, f=verdict_of("dislocated"))
     many.runs["e"].dataset.attrs["pga"] = 3.0  # g is 9.81 m/s²
@@ -579,9 +580,9 @@ def test_the_answer_has_displacements_the_first_fall_and_the_checks(case):
     assert head_of(facts.items()) == (
         "By the kinematic assessment it does not withstand the spectrum of the motion. Under its "
         "motions it survives: it stands under all 2 motions of PGA 0.20 g, and moves by 60 to 80 "
-        "mm. It first falls at 0.26 g, 1.30 × 'a' (by other motions or time steps up to 0.302 g, "
-        "1.51 × 'b'). The least margin is 0.488 (0.592 with the weights apart), on the spectrum of "
-        "the motion, by damage, which it fails. No property was varied. "
+        "mm. The least margin is 0.488 (0.592 with the weights apart), on the spectrum of the "
+        "motion, by damage, which it fails. It first falls at 0.26 g, 1.30 × 'a' (by other motions "
+        "or time steps up to 0.302 g, 1.51 × 'b'). No property was varied. "
         "The stiffness of joints is a default: measured ones differ tenfold. "
         "Perpendicular to this section, as along a wall, it was not checked."
     )
@@ -636,8 +637,8 @@ def test_the_answer_has_displacements_the_first_fall_and_the_checks(case):
     assert "as its ratio, 1.04, is" in verdict
     data.statements["assessment"] = state("assessment", ratios)._replace(doubts=[bound])
     said = " ".join(say_margin(data, assessment=data.statements["assessment"]))
-    ratios = "1.04 until it moves (0.842 by displacements, 1.1 with the weights apart)"
-    assert f"the least margin is {ratios}, on" in said
+    ratios = "0.842 by displacements, if it moved, and 1.04 (1.1 with the weights apart) until it"
+    assert f"the least margin is {ratios} moves, on" in said
     assert "by damage, right, an upper bound 1.04 times the spectrum" in said
     assert "is an upper bound. The runs do not decide, for 3 at least are needed." in verdict
 
@@ -1132,17 +1133,40 @@ def test_a_single_change_of_another_outcome_stands_in_the_head(case, given, half
     assert outcomes.say_what_decides([found, other]) == [of_motion]
 
 
-def test_the_head_has_the_least_margin_where_it_is_that_of_a_check(case):
+def test_the_head_begins_with_the_least_margin_and_what_it_is_of(case):
     """First falls of 1.3 × are beyond 1.1 ×, up to which it stands."""
     data = data_of(case, a=verdict_of())
-    for ratio, said in (1.05, True), (1.15, False):
+    for ratio, of_check in (1.05, True), (1.15, False):
         check = state("assessment", answers.Ratios("linear", ["right"], ratio, ratio))
         searched = state("scale", scales("a", 1.1, falls=1.3))
         vars(data)["statements"] = {"assessment": check, "scale": searched}
         words = dict(conclusion.list_facts(data))["margin"]
-        least = f" The least margin is {ratio}, on the spectrum of the motion, by linear, right"
-        assert words.startswith("It first falls at 0.26 g, 1.30 × the motion.")
-        assert (least in words) == said == ("least margin" in words)
+        least = f"The least margin is {ratio}, on the spectrum of the motion, by linear, right"
+        if not of_check:
+            least = "The least margin is 1.10 on 'a', at a PGA of 0.22 g, under one motion"
+        assert words.startswith(f"{least}. It first falls at 0.26 g, 1.30 × the motion.")
+        assert words.count("least margin") == 1
+
+
+def test_the_least_margin_is_by_displacements_where_these_are_less_than_at_rest(case):
+    """1.35 begins to move it, 1.24 is what it withstands if it moved: the search has 1.3."""
+    data = data_of(case, a=verdict_of())
+    check = answers.Ratios("damage", ["right"], 1.35, 1.35, moved=1.24, displaced=1.24)
+    vars(data)["statements"] = {
+        "assessment": state("assessment", check),
+        "scale": state("scale", scales("a", 1.3, falls=2.0)),
+    }
+    words = dict(conclusion.list_facts(data))["margin"]
+    assert words.startswith(
+        "The least margin is 1.24 by displacements, if it moved, and 1.35 until it moves, on the "
+        "spectrum of the motion, by damage, right. "
+    )
+    joint = dict(conclusion.list_joint_facts({"A": data}))["margin"]
+    assert "of A 1.24 times the earthquake by displacements (damage, right), if it moved" in joint
+    # what falls short if it moved passes at rest alone, and is no failure
+    failing = state("assessment", check._replace(moved=0.9, displaced=0.9))
+    vars(data)["statements"] = {"assessment": failing}
+    assert min(margins.list_margins(data))[0] == 1.35
 
 
 @pytest.mark.parametrize(

@@ -165,11 +165,14 @@ def _say_factor(data: ReportData, factor: float, kind: str) -> str:
     bounds += [check.decisive for check in checks if check.bounded]
     bounds += [least for least, words, _ in margins.say_less(data) if "≤" in words]
     until = ""
-    for check in (x for x in checks if x.decisive == factor and kind == KINDS[0]):
+    for check in (x for x in checks if factor in (x.decisive, x.moved) and kind == KINDS[0]):
         until = f" by {check.name}"
-        if check.displaced is not None:
+        if check.displaced is not None and factor == check.decisive:
             by = f"{format_ratio(check.displaced)} by displacements ({check.name})"
             until = f" until it begins to move, {by}"
+        elif check.moved == factor:
+            at_rest = f"{format_ratio(check.decisive)} until it begins to move"
+            until = f" by displacements ({check.name}), if it moved, {at_rest}"
     rated = data.statements["rating"].rows if kind == KINDS[2] else []
     for row in (x for x in rated if x.numbers["least"] == factor):
         bounds += [factor] * (NOT_COMPUTED in row.numbers.get("state", ""))
@@ -240,7 +243,7 @@ def _say_plainly(data: ReportData, doubtful: Sequence[str]) -> Iterator[tuple[st
     if data.runs:
         failing = [*assessed * bool(failed), *unchecked * overturns]
         yield from ((answer, x) for x in _say_survival(data, doubtful, failing))
-        margin_texts = _say_first_failures(data), margins.say_least_check(data), say_fragile(data)
+        margin_texts = margins.say_least(data), _say_first_failures(data), say_fragile(data)
         yield from ((margin, x) for x in chain(*margin_texts))
         yield from ((depends, x) for x in _say_conditions(data))
     items = list_materials_and_contacts(data.case)
@@ -457,7 +460,7 @@ def _build_paragraphs(data: ReportData, doubtful: Sequence[str]) -> dict[str, li
         ordered = (sorted(x.sentences, key=lambda y: not is_of_norm(data, y)) for x in told)
         answer += chain.from_iterable(ordered)
     answer += outcomes.describe_ends(data)
-    said = {*margins.say_least_check(data)} if data.runs else set[str]()  # in the head
+    said = {*margins.say_least(data)} if data.runs else set[str]()  # in the head
     changes = list[str]()
     if not data.runs:  # the head has them beside runs
         changes += [text for study in data.own_studies for text in say_what_changes(study)]

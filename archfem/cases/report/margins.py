@@ -122,11 +122,10 @@ def build_transverse(data: ReportData) -> list[TextBlock]:
     return [TextBlock(sentence(text), manner, lead="Across its plane?")]
 
 
-def say_least_check(data: ReportData) -> Iterator[str]:
-    """Yield the least margin, if it is that of a check."""
-    least = min((x for x, is_margin, _ in list_margins(data) if is_margin), default=np.nan)
-    checks = read_numbers(Ratios, data.statements.get("assessment"))
-    if any(_describe_check(data, each)[0] == least for each in checks):
+def say_least(data: ReportData) -> Iterator[str]:
+    """Yield the least margin in the plane, which the head has; that across it stands by itself."""
+    found = [each for each in list_margins(data) if each[1]]
+    if found and min(found)[0] not in [scale for scale, *_ in say_across(data)]:
         yield next(describe_margin(data))
 
 
@@ -223,12 +222,16 @@ def _describe_check(data: ReportData, check: Ratios) -> tuple[float, list[str]]:
         begins = f"the check passes for what is at rest, and {moves}"  # judged by how far
         return check.moved, [f"{check.moved:.3g} by displacements, {by}", begins]
     _, fails = judge_check(data, check)
-    texts = [f"{check.range}{check.beside}, {by}{fails}{over}"]
-    if check.moved is not None:
-        of_fc = "at the acceleration of the mechanism divided by FC"
-        texts.append(f"{check.range} times the spectrum begins to move it, {of_fc}")
-        texts.append(f"if it moved, it could be displaced by {check.moved:.3g} times the demand")
-    return check.decisive, texts
+    if check.moved is None:
+        return check.decisive, [f"{check.range}{check.beside}, {by}{fails}{over}"]
+    at_rest = f"{check.range}{check._replace(moved=None).beside} until it moves"
+    if_moved = f"{check.moved:.3g} by displacements, if it moved"
+    ordered = [at_rest, if_moved][:: 1 if check.decisive <= check.moved else -1]  # the least first
+    of_fc = "at the acceleration of the mechanism divided by FC"
+    texts = [f"{', and '.join(ordered)}, {by}{fails}{over}"]
+    texts.append(f"{check.range} times the spectrum begins to move it, {of_fc}")
+    # what passes at rest alone is no failure
+    return (min(check.decisive, check.moved) if check.moved >= 1.0 else check.decisive), texts
 
 
 def _say_motion(data: ReportData, factor: float, site: float, push_of: str = "") -> str:
