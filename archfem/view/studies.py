@@ -171,6 +171,7 @@ def _draw_named_cases(
                 colour = Colour.LINES[number % len(Colour.LINES)]
                 label = {"label": f"{pair}"} if pairs else {}
                 axes.plot(dots[name], dots["place"], "o", ms=3.5, color=colour, **label)
+                _mark_falls(axes, dots[dots[name].isna()], "place", colour, across=True)
             if frame[name].min() > 0.0 and frame[name].max() > WIDE_RATIO * frame[name].min():
                 axes.set_xscale("log")
             else:
@@ -205,6 +206,19 @@ def _hatch_falls(axes: Axes, unknown: Any) -> None:
         axes.barh(falls["place"], 1.0, height=0.7, transform=axes.get_yaxis_transform(), **look)
 
 
+def _mark_falls(axes: Axes, unknown: Any, key: str, colour: str, *, across: bool = False) -> None:
+    """Draw points that fall, and so have no number, as triangles at the end of the axis."""
+    falls = unknown[unknown["fall"].isin(FALLEN_STATES)] if "fall" in unknown else unknown[:0]
+    if not len(falls):
+        return
+    at, end = falls[key], np.ones(len(falls))
+    look: Any = {"color": colour, "ms": 5.0, "ls": "", "clip_on": False}
+    if across:
+        axes.plot(end, at, ">", transform=axes.get_yaxis_transform(), **look)
+    else:
+        axes.plot(at, end, "^", transform=axes.get_xaxis_transform(), **look)
+
+
 def _label_key(table: xr.Dataset, key: str, gap: str = " ") -> str:
     """Return a key of a case, or a finding, with the unit of its values."""
     unit = table[key].attrs.get("units")
@@ -234,6 +248,7 @@ def _draw_over_key(
         look = {"ms": 3.5, "lw": 1.2, "color": colour, "label": label}
         dashes = LINE_DASHES[[*colours].index(words) % len(LINE_DASHES)]  # equal lines show through
         axes.plot(known[key], known["value"], "o" + dashes * joined, **look)
+        _mark_falls(axes, group[group["value"].isna()], key, colour)
         bounds = known[known["bounded"]]
         if len(bounds):
             axes.plot(bounds[key], bounds["value"], "o", **look | {"mfc": "white", "label": None})

@@ -49,9 +49,19 @@ def test_each_case_has_a_row_and_those_that_fall_are_the_first():
     grid = study_findings.tabulate_study(study(falls=[29]))
     assert grid.head == ["case", "residual displacement", "outcome"]
     assert len(grid.rows) == study_findings.MAX_CASES
-    assert grid.rows[0] == ["case 29", "-", "fallen, in 1 of 2"]
+    # the first motion, which does not fall, leaves it 30 mm
+    assert grid.rows[0] == ["case 29", "30 mm", "fallen, in 1 of 2"]
+    both = study(falls=[0], dislocated=[0], cases=2).table
+    both["fall"][:2] = ["dislocated", "fallen"]
+    rows = study_findings.tabulate_study(study_findings.collect_findings("", "", both)).rows
+    assert rows[0] == ["case 0", "1 mm", "fallen, in 1 of 2; dislocated, in 1"]
+    both["fall"][:2] = ["fallen", "fallen"]
+    rows = study_findings.tabulate_study(study_findings.collect_findings("", "", both)).rows
+    assert rows[0] == ["case 0", "-", "fallen, in 2 of 2"]
     assert grid.rows[1][:2] == ["case 0", "1 mm"]
-    assert grid.caption.endswith("over its motions; 6 of 30 cases are left out, of which 0 fall")
+    assert grid.caption.endswith(
+        "its motions that do not fall; 6 of 30 cases are left out, of which 0 fall"
+    )
     many = study_findings.tabulate_study(study(falls=range(27)))
     assert many.caption.endswith("6 of 30 cases are left out, of which 3 fall")
     assert "left out" not in study_findings.tabulate_study(study(cases=24)).caption
@@ -94,6 +104,19 @@ def test_a_case_that_falls_is_a_hatched_bar_and_the_lines_differ():
     assert [line.get_linestyle() for line in axes.lines] == ["--", ":"]
     legend = [text.get_text() for text in axes.figure.legends[0].get_texts()]
     assert sorted(legend) == ["case 0, the first", "falls"]
+
+
+def test_falls_under_some_motions_are_triangles_at_the_end_of_the_picture():
+    """Case 1 falls under the second of two motions; of a sweep falls are at the top."""
+    found = study(falls=[1], cases=3)
+    (axes,) = draw_findings(found.numbers).axes
+    marks = [x for x in axes.lines if x.get_marker() == ">" and len(x.get_xdata())]
+    assert [(list(x.get_xdata()), list(x.get_ydata())) for x in marks] == [([1.0], [1])]
+    assert marks[0].get_color() == axes.lines[1].get_color()  # of the second motion
+    swept = found.numbers.drop_vars("case").assign_coords(width=("point", np.r_[1, 1, 2, 2, 3, 3]))
+    axes = draw_findings(swept).axes[1]  # beside the one over the motions
+    marks = [x for x in axes.lines if x.get_marker() == "^" and len(x.get_xdata())]
+    assert [(list(x.get_xdata()), list(x.get_ydata())) for x in marks] == [([2], [1.0])]
 
 
 def test_of_many_cases_those_with_doubts_stand_before_others():

@@ -264,9 +264,12 @@ def _find_worst(frame: Any, keys: list[str], names: list[str]) -> Any:
     size = frame[names[0]] if names[0] in _FACTORS else -frame[names[0]]
     ranked = frame.assign(rank=-rank, size=size, falls=states.isin(FALLEN_STATES), runs=1)
     ranked = ranked.assign(dislocated=states == "dislocated", failed=frame.get("error", "") != "")
-    cases = ranked.groupby(keys, sort=False, dropna=False)
+    # of a fall the displacement is the way to the ground
+    sizes = [name for name in names if name in _SIZES]
+    ranked[sizes] = ranked[sizes].mask(ranked["falls"])
     ways = {name: "min" if name in _FACTORS else "max" for name in names}
     ways |= dict.fromkeys((*_COUNTED, "runs"), "sum")
+    cases = ranked.groupby(keys, sort=False, dropna=False)
     ranked = ranked.assign(**{name: cases[name].transform(way) for name, way in ways.items()})
     return ranked.sort_values(["rank", "size"]).drop_duplicates(keys).sort_index()
 
@@ -292,9 +295,14 @@ def tabulate_study(found: StudyFindings) -> Grid:
         cells += [_format_finding(row, name) for name in found.names]
         failed = row["falls"] or row["dislocated"]
         count = f", in {failed} of {row['runs']}" if several and failed else ""
+        count += f"; dislocated, in {row['dislocated']}" * bool(row["falls"] and row["dislocated"])
         rows.append([*cells, f"{row['fall'] or 'no outcome'}{count}"] if state else cells)
     caption = f"Study: {found.title}{found.under}"
-    caption += "; of each case the worst of each column over its motions" if several else ""
+    caption += (
+        "; of each case the worst of each column over its motions that do not fall"
+        if several
+        else ""
+    )
     caption += f"; {join_words(found.idle)} changed nothing" * bool(found.idle)
     if any(cell.startswith("≤") for row in rows for cell in row):
         caption += "; ≤ is an upper bound, below which the value may lie: such values show no trend"
@@ -314,10 +322,10 @@ def _label_finding(table: xr.Dataset, name: str) -> str:
 
 
 def _format_finding(row: Any, name: str) -> str:
-    """Return a finding of a row; a fall has no displacement but that to the ground."""
+    """Return a finding of a row; displacements are of runs without a fall, to the ground."""
     if name not in _SIZES or row[name] != row[name]:
         return mark_bound(row, name, _format(row[name]))
-    return "-" if row["fall"] in FALLEN_STATES else format_mm(row[name])
+    return format_mm(row[name])
 
 
 def _format(value: Any) -> str:
