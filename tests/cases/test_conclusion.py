@@ -1131,6 +1131,68 @@ def test_a_single_change_of_another_outcome_stands_in_the_head(case, given, half
     assert outcomes.say_what_decides([found, other]) == [of_motion]
 
 
+def change_alone(motion, **outcomes_of):
+    """Made-up variations: the unvaried stands, and single changes have outcomes; 20 samples."""
+    values = {"friction": -0.2, "k_s": 0.01, "k_n": 2.0}
+    count = 1 + len(outcomes_of)
+    found = range_of(*[0.02] * (count + 20), motion=motion).dataset
+    found["sampled"][:count] = False
+    for name, neutral in {"friction": 0.0, "k_s": 1.0, "k_n": 1.0}.items():
+        column = np.full(count + 20, neutral)
+        column[1:count] = [values[x] if x == name else neutral for x in outcomes_of]
+        column[count:] += np.tile([-0.1, 0.1], 10)  # of the samples
+        found[name] = "run", column
+    states = ["stands", *outcomes_of.values(), *["stands"] * 20]
+    found["outcome"] = "run", np.array(states)
+    found.attrs |= {"properties": ["friction", "k_s", "k_n"], "k_n": 1e9, "k_s": 1e9}
+    return VerdictRange(found)
+
+
+def test_a_survival_is_said_with_the_inputs_of_joints_without_which_it_falls(case):
+    """Of two motions the worse outcome of a single change counts; others do not matter."""
+    settings = {**case.settings, "contacts": {"stone to stone": {"friction": 0.5}}}
+    settings["report"] = {"sources": {"contacts.stone to stone.friction": "assumed, sawn faces"}}
+    data = data_of(af.Case.of(settings), a=verdict_of(), b=verdict_of())
+    first = change_alone("a", friction="fallen", k_s="dislocated", k_n="stands")
+    other = change_alone("b", friction="dislocated", k_s="stands", k_n="stands")
+    vars(data)["verdict_ranges"] = (first, other)
+    facts = dict(conclusion.list_facts(data))
+    verdict = facts["verdict"]
+    assert verdict.startswith("It survives with friction 0.5 (assumed, sawn faces) and shear stiff")
+    assert " MPa/mm (default): it stands under all 2 motions" in verdict
+    changes = "falls or is dislocated with friction - 0.2 and with shear stiffness / 100"
+    assert f" In single changes it {changes}." in verdict
+    assert "Friction was varied from 0.3 to 0.6 only." in facts["depends on"]
+    # where it is damaged as given, it is no worse if dislocated
+    for run in data.runs.values():
+        run.verdict.outcome = "dislocated"
+    for found in data.verdict_ranges:
+        found.dataset["outcome"][0] = "dislocated"
+    verdict = dict(conclusion.list_facts(data))["verdict"]
+    assert verdict.startswith("It survives with damage with friction 0.5 (assumed, sawn faces): it")
+    assert "In single changes it falls with friction - 0.2." in verdict
+    # and nothing is said of what matters nowhere, nor beside a fall
+    vars(data)["verdict_ranges"] = (change_alone("a", k_n="stands"),)
+    assert "with friction" not in dict(conclusion.list_facts(data))["verdict"]
+    vars(data)["verdict_ranges"] = (first,)
+    data.runs["a"].verdict.outcome = "fallen"
+    assert "with friction" not in dict(conclusion.list_facts(data))["verdict"]
+
+
+def test_what_decides_has_the_properties_of_single_changes_that_alter_the_outcome(case):
+    """Samples with small k_s fall, and of those with less friction none, as it varies by little."""
+    found = change_alone("a", friction="fallen", k_s="fallen", k_n="stands")
+    low = np.arange(len(found.dataset["outcome"])) >= 14
+    found.dataset["k_s"].values[low] = 0.01
+    found.dataset["outcome"].values[low] = "fallen"
+    assert found.deciding == ("shear stiffness",)
+    decide, *_ = outcomes.say_what_decides([found])
+    assert decide == "of what was varied, shear stiffness and friction decide"
+    (grid,) = response._tabulate_counts({"a": found})
+    alone = "explain no more than chance, but single changes of friction alter the outcome"
+    assert grid.caption.endswith(f"friction and k_n {alone}")
+
+
 def test_the_head_begins_with_the_least_margin_and_what_it_is_of(case):
     """First falls of 1.3 × are beyond 1.1 ×, up to which it stands."""
     data = data_of(case, a=verdict_of())

@@ -228,6 +228,30 @@ def test_cases_that_are_dislocated_or_have_no_outcome_fail_too(states, words):
     assert rows["case 8"] == "dislocated, in 2 of 2"
 
 
+@pytest.mark.parametrize(
+    ("states", "said"),
+    [
+        ({"falls": [0], "dislocated": [1]}, "falls or is dislocated at width = 1.5 m and below"),
+        ({"dislocated": [3]}, "is dislocated at width = 2.5 m and above"),
+        ({"falls": [0], "dislocated": [2]}, "falls or is dislocated at width = 1 m, width = 2 m"),
+        ({}, ""),
+    ],
+)
+def test_failures_of_a_swept_number_are_said_with_its_threshold(states, said):
+    table = study(cases=4, **states).table
+    widths = ("point", np.repeat([1.0, 1.5, 2.0, 2.5], 2), {"units": "m"})
+    swept = study_findings.collect_findings("", "", table.drop_vars("case").assign_coords(w=widths))
+    found = study_findings.collect_findings(
+        "", "", table.drop_vars("case").assign_coords(width=widths)
+    )
+    assert swept.keys == ("w",)
+    assert study_findings.say_failures(found) == said
+    named = study_findings.say_failures(study(cases=4, **states))
+    assert ("case" in named) == bool(said)
+    only = study_findings.say_failures(found, damaged=True)
+    assert ("dislocated" in only, bool(only)) == (False, "falls" in states)
+
+
 def test_a_study_states_each_doubt_of_its_runs_once_and_their_cases():
     steps = [af.models.model.Doubt("steps of {:g} ms are long", "halve them", (x,)) for x in (5, 2)]
     drift = af.models.model.Doubt("the energy drifts")

@@ -358,18 +358,19 @@ def _say_survival(
     survives, reason = answer.startswith("survives"), _say_why_undecided(data)
     answer = f"{'under its motions ' * bool(survives and failed)}it {answer}{in_doubt}"
     yield from failed if survives else ()
+    given, provisos = outcomes.say_provisos(data) if survives else ("", [])
     if survives and reason:
         yield f"not decided{in_doubt}, as {reason}"
     sizes = [x.displacement for x in verdicts if x.outcome in COLLAPSE_STATES[:2]]
     known = bool(sizes) and np.isfinite(sizes).all()
     moved = f", and moves by {Ends.of(sizes):mm}" if known else ""
     beside = any(scale <= 1.0 for scale, *_ in margins.say_across(data))
-    lead = f"in its plane{in_doubt} it" if beside else f"{answer}: it"
+    lead = f"in its plane{in_doubt} it" if beside else f"{answer}{given}: it"
     if survives and (reason or find_missed(data)):
         lead = f"it{in_doubt * (not reason)}"
     first, *others = outcomes.describe_outcomes(data)
     said = [f"{lead} {first}", *(f"it {each}" for each in others)]
-    yield from [*said[:-1], f"{said[-1]}{moved}"]
+    yield from [*said[:-1], f"{said[-1]}{moved}", *provisos]
     yield from () if survives else failed
 
 
@@ -388,10 +389,13 @@ def _say_conditions(data: ReportData) -> Iterator[str]:
     every = [(each.name, text) for each in data.own_studies for text in say_what_changes(each)]
     if ranges or not every:
         yield from outcomes.say_what_decides(ranges[::-1])
+        yield from outcomes.say_friction_range(data)
     # the verdict has these
     below = {study for least, _, study in margins.say_less(data) if least < 1.0}
     # the section of a study names its cases
-    yield from (text.partition(": ")[0] for study, text in every if study not in below)
+    yield from (
+        text.partition("; of the others ")[0] for study, text in every if study not in below
+    )
 
 
 def _say_why_undecided(data: ReportData) -> str:

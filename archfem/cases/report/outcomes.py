@@ -1,16 +1,23 @@
 """Outcomes of the runs of a report in words: the worst one, falls, lost blocks, displacements."""
 
+import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 
-from archfem.cases.report.doubts import peak_of_ground
+from archfem.cases.report.doubts import list_varied, peak_of_ground
+from archfem.cases.report.inputs import tabulate_inputs
 from archfem.cases.report.report_data import ReportData
+from archfem.cases.report.study_findings import list_studied, say_failures
 from archfem.dynamics.collapse_state import COLLAPSE_STATES, CollapseState
 from archfem.dynamics.history import History
 from archfem.dynamics.verdict import Verdict
 from archfem.dynamics.verdict_range import HALF_STEP, UNVARIED, VerdictRange
 from archfem.masonry.structure import Structure, join_words
 from archfem.units import Ends, format_mm
+
+# Names of varied properties by the words of their single changes, where they differ
+_SYMBOLS = {"shear stiffness": "k_s", "normal stiffness": "k_n", "damping": "damping ratio"}
+_SYMBOLS |= {HALF_STEP: "dt", "motion reversed": "sign"}
 
 # Words of a sentence
 MAX_WORDS = 25
@@ -128,6 +135,69 @@ def sentence(text: str) -> str:
     return text[:1].upper() + text[1:] + ("" if text.endswith((".", "?")) else ".")
 
 
+def _list_changes(found: VerdictRange, *, worse: bool = True) -> dict[str, int]:
+    """Return the rank of each single change with a worse outcome than the unvaried, or another."""
+    ranks = {each.name: min(each.rank, 2) for each in found.single_changes if each.rank >= 0}
+    given = ranks.get(UNVARIED, 3)
+    return {k: x for k, x in ranks.items() if x > given or (x < given < 3 and not worse)}
+
+
+def _name_property(change: str) -> str:
+    """Return the property of a single change, in words."""
+    return re.split(r" (?=[-+/×'(])", change)[0]
+
+
+def list_changing(found: VerdictRange) -> dict[str, str]:
+    """Return the properties, by their names, whose single changes have another outcome."""
+    words = dict.fromkeys(map(_name_property, _list_changes(found, worse=False)))
+    return {_SYMBOLS.get(each, each): each for each in words}
+
+
+def say_friction_range(data: ReportData) -> Iterator[str]:
+    """Yield between which coefficients of friction the samples lie, if friction is varied."""
+    for found in data.verdict_ranges[:1] if "friction" in list_varied(data) else ():
+        ends = Ends.of(found.dataset["friction"].values)
+        own, *others = {joint.contact.friction for joint in data.case.structure.joints}
+        if own is not None and not others:
+            low, high = (max(0.0, own + end) for end in ends)
+            yield f"friction was varied from {low:.2g} to {high:.2g} only"
+        else:
+            yield f"friction was varied by {ends:.2g} only"
+
+
+def say_provisos(data: ReportData) -> tuple[str, list[str]]:
+    """Say with which inputs a survival holds, and with which others it falls or is dislocated.
+
+    They are of single changes and of cases of studies that do worse than the runs.
+    """
+    damaged, verbs = "damage" in find_worst(data)[1], ("is dislocated", "falls")
+    changes = dict[str, int]()  # the worst under any motion
+    for name, rank in (x for each in data.verdict_ranges for x in _list_changes(each).items()):
+        changes |= {name: max(rank, changes.get(name, 0))} if rank > damaged else {}
+    properties, told = dict.fromkeys(map(_name_property, changes)), list[str]()
+    if changes:
+        does = " or ".join(verbs[rank - 1] for rank in sorted({*changes.values()})[::-1])
+        told.append(f"in single changes it {does} {join_words([f'with {x}' for x in changes])}")
+    for study in data.own_studies:
+        if failing := say_failures(study, damaged=damaged):
+            told.append(f"in {study.name} it {failing}")
+            properties |= dict.fromkeys(list_studied(study) & {"friction"})
+    return _say_inputs(data, properties), told
+
+
+def _say_inputs(data: ReportData, properties: Iterable[str]) -> str:
+    """Say the values of some properties of joints with their marks or sources; "" without any."""
+    said, rows = list[str](), tabulate_inputs(data).rows if properties else ()
+    for words in properties:
+        symbol = {"friction": "μ"}.get(words, _SYMBOLS.get(words, words))
+        for name, value, mark in rows:
+            if name.endswith(f": {symbol}"):
+                source = mark.removesuffix(")").removeprefix("given (")
+                size = re.split(r" at | \((?=[a-z])", value)[0]
+                said.append(f"{words} {size} ({source.partition(' (')[0]})")
+    return f" with {join_words([*dict.fromkeys(said)])}" * bool(said)
+
+
 def say_by_motion(ranges: Sequence[VerdictRange], said: Iterable[Sequence[str]]) -> Iterator[str]:
     """Yield what is said of each of some variations with their motions, equal texts once."""
     motions: dict[str, list[str]] = {}
@@ -141,6 +211,8 @@ def say_by_motion(ranges: Sequence[VerdictRange], said: Iterable[Sequence[str]])
 def say_what_decides(ranges: Sequence[VerdictRange]) -> list[str]:
     """Say which of the properties that were varied decides, also alone, or displaces it most."""
     names = dict.fromkeys(name for each in ranges if each.is_mixed for name in each.deciding)
+    for each in ranges if names else ():  # what changes an outcome alone decides, too
+        names |= dict.fromkeys(list_changing(each).values())
     said = [f"of what was varied, {join_words([*names])} decide{'s' * (len(names) == 1)}"]
     said *= bool(names)
     said += say_by_motion(ranges, map(_say_changed, ranges))

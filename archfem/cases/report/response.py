@@ -12,7 +12,13 @@ from archfem.cases.case import Case
 from archfem.cases.motion_keys import find_matched_band
 from archfem.cases.report.doubts import list_ranges, spans_run
 from archfem.cases.report.motion_rules import find_target, tabulate_checks
-from archfem.cases.report.outcomes import describe_lost, find_worst_run, list_lost, sentence
+from archfem.cases.report.outcomes import (
+    describe_lost,
+    find_worst_run,
+    list_changing,
+    list_lost,
+    sentence,
+)
 from archfem.cases.report.report_data import ReportData, build_player
 from archfem.dynamics.collapse_state import DISLOCATION, FALLEN_STATES, shallowest_part
 from archfem.dynamics.history import History
@@ -298,15 +304,19 @@ def _tabulate_counts(found: Mapping[str, VerdictRange]) -> list[Grid]:
     tables = {pair: each.tabulate()[1] for pair, each in found.items()}
     cells = {k: {x: ": ".join(own) for x, *own in rows} for k, rows in tables.items()}
     telling = {property_text(x) for each in found.values() for x in each.beyond_chance}
-    counted = dict.fromkeys(COUNTED[each.counted][0] for each in found.values())
+    counted = {each.counted for each in found.values()}
+    kind = counted.pop() if len(counted) == 1 else "falls or dislocated"
     caption = (
-        f"{join_words([*counted]).capitalize()} by the value of each property: of k_n, k_s and "
+        f"{COUNTED[kind][0].capitalize()} by the value of each property: of k_n, k_s and "
         "damping ratio factors on the values of the case, of friction what is added"
     )
     if telling:
         caption += ". Before it stands the share of the variance of the outcome that it explains"
         if others := [x for x in next(iter(cells.values())) if x not in telling]:
             caption += f"; {join_words(others)} explain no more than chance"
+            changing = dict.fromkeys(x for each in found.values() for x in list_changing(each))
+            if alone := [x for x in others if x in changing]:
+                caption += f", but single changes of {join_words(alone)} alter the outcome"
         cells = {k: {x: own[x] for x in own if x in telling} for k, own in cells.items()}
     return _set_abreast(cells, "property", caption)
 

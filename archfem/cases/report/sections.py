@@ -498,8 +498,12 @@ def _build_study(data: ReportData, found: StudyFindings) -> list[Any]:
         dotted = f", dotted the limit of dislocation of the case, {format_mm(limit)}"
         dotted += "; cases of other lengths have others" * ("lengths" in list_studied(found))
         caption += f"; all points{dotted * (key in found.numbers)}"
-        falls = bool(found.worst["falls"].any()) and len(found.worst) < len(found.table["fall"])
-        caption += "; triangles at the end are falls" * falls
+        bars = (
+            found.keys == ("case",) and found.worst["runs"].max() == 1
+        )  # of falls they are hatched
+        caption += "; triangles at the end are falls" * bool(
+            found.worst["falls"].any() and not bars
+        )
         bounds = np.any(found.table.get(UPPER_BOUNDS, "") != "")
         caption += "; open marks are upper bounds" * bool(bounds)
         blocks.append(FigureBlock.of(figure, sentence(caption)))

@@ -366,6 +366,28 @@ def say_what_changes(found: StudyFindings) -> Iterator[str]:
         yield f"it stands with {each}{list_first([*map(found.label, others)], MAX_NAMES)}"
 
 
+def say_failures(found: StudyFindings, *, damaged: bool = False) -> str:
+    """Say which cases fall or are dislocated, of one number from which on; "" if none is.
+
+    Of what is damaged as given those that fall.
+    """
+    counts = [*_COUNTED][: 1 if damaged else 2]
+    rows = found.worst.to_dict("records")
+    failing = [row for row in rows if any(row[count] for count in counts)]
+    if not failing:
+        return ""
+    does = " or ".join(_COUNTED[x][0] for x in counts if any(row[x] for row in failing))
+    at, key = list_first([*map(found.label, failing)], MAX_NAMES), found.keys[0]
+    if len(found.keys) == 1 and found.table[key].dtype.kind in "fi" and len(failing) < len(rows):
+        low, high = (choose(failing, key=lambda row: row[key]) for choose in (min, max))
+        others = [row[key] for row in rows if row not in failing]
+        if high[key] < min(others):
+            at = f"{found.label(high)} and below"
+        elif low[key] > max(others):
+            at = f"{found.label(low)} and above"
+    return f"{does} at {at}"
+
+
 def say_below_site(found: StudyFindings) -> Iterator[str]:
     """Yield a sentence on the cases of a study that move below the site's acceleration, if any."""
     rows = found.worst.to_dict("records")
