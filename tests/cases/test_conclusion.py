@@ -1920,6 +1920,36 @@ def test_a_push_is_compared_with_a_demand_in_numbers_and_words_are_not_read(
     assert answers.NO_DEMAND not in text + verdict
 
 
+@pytest.mark.parametrize(
+    ("text", "equal"), [("ag = 0.2 g on rock", True), ("ag = 0.25 g", False), ("0.2 g", False)]
+)
+def test_a_stated_ag_is_compared_with_that_of_the_spectrum(case, text, equal):
+    settings = {**case.settings, "assessment": SPECTRUM, "report": {"demand": text}}
+    data = data_of(af.Case.of(settings), a=verdict_of())
+    vars(data)["statements"] = {
+        "assessment": state("assessment", answers.Ratios("a", [], 2.0, 2.0))
+    }
+    (grid,) = capacities.tabulate_demands(data)
+    words = "those of the EC8 spectrum, as its ag is equal"
+    assert (grid.rows[0][-1] == words) == equal
+    assert ("compared with none" in grid.rows[0][-1]) != equal
+
+
+def test_a_note_of_mirrored_mechanisms_stands_once_and_begins_with_its_symbol(case):
+    """They differ in the names of blocks alone; others that differ in a number are two."""
+    words = "d* is of the centroid of {}, at first the fastest, whose capacity is {} times"
+    notes = [words.format("v 11", 1.28), "faces slide flat", words.format("v 1", 1.28)]
+    notes.append(words.format("v 1", 1.5))
+    data = data_of(case, a=verdict_of())
+    checked = state("assessment", answers.Ratios("a", [], 2.0, 2.0))._replace(notes=notes)
+    vars(data)["statements"] = {"assessment": checked}
+    assert doubts.list_notes(data) == {"kinematic assessment": [notes[0], notes[1], notes[3]]}
+    assert sentence(notes[0]).startswith("d* is of the centroid of v 11")
+    assert [sentence(x) for x in ("it stands", "k_s is small", "a")] == [
+        *("It stands.", "k_s is small.", "A.")
+    ]
+
+
 def test_runs_beyond_the_push_of_a_demand_say_nothing_of_it():
     """A run of 0.3 g that moves; a push of twice the demand is more than that, or less."""
     case = af.Case.of({"structure": {"shape": "column", "breadth": 0.5, "heights": [1.0]}})

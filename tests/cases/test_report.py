@@ -244,7 +244,9 @@ def test_demand_and_capacity_stand_beside_their_doubts(kept, undrawn):
     assert head_of(facts.items()).startswith(f"{failed} {but}")
     default = "The stiffness of joints is a default: measured ones differ tenfold."
     assert head_of(facts.items()).endswith(f"No property was varied. {default} {unchecked}")
-    assert f" {rest}{rate} From which acceleration" in head_of(facts.items())
+    # the head has the least margin first
+    assert f" {rest}{rate} The least margin is 0.45 (0.5 with the" in head_of(facts.items())
+    assert " which it fails. From which acceleration" in head_of(facts.items())
     alone = report_data.ReportData(case, {}, found.folder)
     given, _, margin = build_conclusion(alone).pieces[:3]
     assert given.rows == demands.rows[:1]

@@ -1,5 +1,6 @@
 """Demands and capacities of a report: one row for each check, with its factor and doubt."""
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
@@ -73,6 +74,10 @@ def tabulate_demands(data: ReportData) -> list[Grid]:
     found, text = [each for each in list_demands(data) if each[-1]], data.case.report.get("demand")
     compared = "words alone, which are compared with none"
     compared += ": limit.demand is" * (data.case.limit.demand is not None)
+    spectrum = data.case.assessment.spectrum or data.case.target
+    ag, stated = getattr(spectrum, "ag", None), re.search(r"\ba_?g *= *([\d.]*\d) *g\b", text or "")
+    if ag is not None and stated and np.isclose(float(stated[1]), ag):
+        compared = f"those of the {read_spectrum(data)['code']} spectrum, as its ag is equal"
     rows = [("as stated", text, "[report]", compared)] if text else []
     rows += [(x, f"{'PGA ' * (x != 'push')}{p:.3g} g", y, join_words(of)) for x, p, y, of in found]
     peaks = [peak for _, ends, *_ in found for peak in ends]

@@ -1,5 +1,6 @@
 """Doubts and notes of the results in a report, and what was not varied."""
 
+import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -37,6 +38,9 @@ MIN_MOTIONS = 3
 
 # Results of runs: histories, and their variations
 HISTORIES, VARIATIONS = "time histories", "variations"
+
+# Names of blocks in a note, by which those of mirrored mechanisms differ alone
+_OF_BLOCKS = re.compile(r"centroid of .*?(?=, at first|, whose)")
 
 # Result of cases beside the given one
 STUDIES = "study"
@@ -194,8 +198,15 @@ def list_notes(data: ReportData) -> dict[str, list[str]]:
         for name, each in data.statements.items()
         for notes in [[*(note_rating(data) if name == "rating" else ()), *each.notes]]
         # what is not about the least factor of a push stands in its text alone, and a paragraph
-        # has what is not checked across
-        if (own := [x for x in notes if not x.startswith((OF_GIVEN_FILL, UNCHECKED_ACROSS))])
+        # has what is not checked across; of two mirrored mechanisms the first has it
+        for kinds in [[_OF_BLOCKS.sub("", x) for x in notes]]
+        if (
+            own := [
+                x
+                for k, x in enumerate(notes)
+                if kinds[k] not in kinds[:k] and not x.startswith((OF_GIVEN_FILL, UNCHECKED_ACROSS))
+            ]
+        )
     }
     left_out = [x.removeprefix(NOTE_MARK) for x in note_loads_left_out(data.case)]
     missed = [*note_checks(data), *left_out * bool(data.runs)]

@@ -132,7 +132,8 @@ def sentence(text: str) -> str:
     text, clause = text.strip(), text.partition("; ")[0]
     if len(text.split()) > MAX_WORDS and clause != text and ": " not in clause:  # no list
         return " ".join(map(sentence, text.split("; ")))
-    return text[:1].upper() + text[1:] + ("" if text.endswith((".", "?")) else ".")
+    first = 0 if re.match(r"\w[*_]", text) else 1  # a symbol remains what it is
+    return text[:first].upper() + text[first:] + ("" if text.endswith((".", "?")) else ".")
 
 
 def _list_changes(found: VerdictRange, *, worse: bool = True) -> dict[str, int]:
