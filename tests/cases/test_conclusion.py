@@ -986,8 +986,11 @@ def test_the_least_margins_of_several_cases_are_at_most_what_is_an_upper_bound(c
 
 
 @pytest.mark.parametrize(("breadth", "across"), [(0.5, True), (0.45, False)])
-def test_a_stack_as_broad_as_another_case_is_wide_is_its_plane_across(case, breadth, across):
+def test_a_stack_as_broad_as_another_case_is_wide_is_its_plane_across(
+    case, breadth, across, monkeypatch
+):
     """An arch on piers, which a push across its plane may overturn."""
+    monkeypatch.setattr(ReportData, "transverse_slide", np.inf)
     lengths = {"radius": 1.5, "thickness": 0.4, "voussoirs": 9, "courses": [1.0]}
     lengths |= {"shape": "arch_on_piers", "pier_breadth": 1.0, "width": 0.5}
     stack = {"shape": "column", "breadth": breadth, "heights": [1.0, 1.0], "width": 4.0}
@@ -1948,6 +1951,44 @@ def test_a_note_of_mirrored_mechanisms_stands_once_and_begins_with_its_symbol(ca
     assert [sentence(x) for x in ("it stands", "k_s is small", "a")] == [
         *("It stands.", "k_s is small.", "A.")
     ]
+
+
+@pytest.mark.parametrize(("friction", "slides"), [(0.5, 0.45), (0.3, 0.15)])
+def test_supports_slide_across_the_plane_by_the_friction_that_the_thrust_leaves(friction, slides):
+    """By hand: 56.11 kN on springings inclined by 80.312°, with a thrust of 12.72 kN at rest."""
+    inclined, weight, thrust = np.radians(80.312), 56.11e3, 12.72e3
+    normal = 0.5 * weight * np.sin(inclined) + thrust * np.cos(inclined)
+    shear = 0.5 * weight * np.cos(inclined) - thrust * np.sin(inclined)
+    by_hand = 2.0 * np.sqrt((friction * normal) ** 2 - shear**2) / weight
+    assert by_hand == pytest.approx(slides, abs=5e-3)  # two digits
+    ring = {"shape": "circular_arch", "span": 3.2, "rise": 1.35, "thickness": 0.42}
+    ring |= {"voussoirs": 13, "width": 1.0}
+    settings = {"structure": ring, "contacts": {"stone to stone": {"friction": friction}}}
+    settings |= {"materials": {"stone": {"unit_weight": 26000.0}}}
+    settings |= {"motion": {"synthetic": {"duration": 1.0, "pga": 2.0}}}
+    data = data_of(af.Case.of(settings), a=verdict_of())
+    joints = len(data.case.structure.joints)
+    forces = {"N": np.full(joints, 1e9), "V": np.zeros(joints)}
+    for name, size in {"N": normal, "V": shear}.items():
+        forces[name][[0, -1]] = size
+    forces["V"][0] *= -1.0  # its sense does not matter
+    vars(data)["dead"] = xr.Dataset({name: ("joint", each) for name, each in forces.items()})
+    assert data.transverse_slide == pytest.approx(by_hand, rel=1e-3)  # of the weight by hand
+    # the demand is 2 m/s², 0.204 g; the ring overturns at 0.489 g
+    said = " ".join(conclusion._say_unchecked(data)[0])
+    ratio = format_ratio(data.transverse_slide / (2.0 / 9.80665))
+    words = (
+        f"where it may slide from {by_hand:.3g} g on ({ratio} × the demand, 0.204 g), and overtur"
+    )
+    assert words in said
+    assert conclusion._say_unchecked(data)[1] == (slides < 0.204)
+    (block,) = margins.build_transverse(data)
+    assert f"its supports slide across at {by_hand:.3g} g" in block.text
+    assert block.manner == ("doubt" if slides < 0.204 else "plain")
+    vars(data).pop("transverse_slide")
+    vars(data)["dead"] = None
+    (block,) = margins.build_transverse(data)
+    assert "Sliding across it was not checked." in block.text
 
 
 def test_runs_beyond_the_push_of_a_demand_say_nothing_of_it():

@@ -75,8 +75,8 @@ def tabulate_demands(data: ReportData) -> list[Grid]:
     compared = "words alone, which are compared with none"
     compared += ": limit.demand is" * (data.case.limit.demand is not None)
     spectrum = data.case.assessment.spectrum or data.case.target
-    ag, stated = getattr(spectrum, "ag", None), re.search(r"\ba_?g *= *([\d.]*\d) *g\b", text or "")
-    if ag is not None and stated and np.isclose(float(stated[1]), ag):
+    ag, given = getattr(spectrum, "ag", None), re.search(r"\ba_?g *= *([\d.]*\d) *g\b", text or "")
+    if ag is not None and given and np.isclose(float(given[1]), ag):
         compared = f"those of the {read_spectrum(data)['code']} spectrum, as its ag is equal"
     rows = [("as stated", text, "[report]", compared)] if text else []
     rows += [(x, f"{'PGA ' * (x != 'push')}{p:.3g} g", y, join_words(of)) for x, p, y, of in found]

@@ -273,14 +273,17 @@ def _say_unchecked(data: ReportData) -> tuple[list[str], bool]:
     if (found := margins.find_unchecked_push(data)) is None:
         return [], False
     push, demand = found
-    beside = ""
-    if demand > 0.0:
-        beside = f" ({format_ratio(push / demand)} × the demand, {demand:.3g} g)"
-    falls = f", where it may overturn from {push:.3g} g on{beside}" * (push > 0.0)
+    ways = list[str]()
+    for size, verb in sorted([(push, "overturn"), (data.transverse_slide, "slide")]):
+        of = (
+            f" ({format_ratio(size / demand)} × the demand, {demand:.3g} g)" if demand > 0.0 else ""
+        )
+        ways += [f"{verb} from {size:.3g} g on{of}"] * bool(size < np.inf)
+    falls = f", where it may {', and '.join(ways)}" * bool(push > 0.0)
     way = "across the plane of the drawing"
     if np.isnan(push):
         way = "perpendicular to this section, as along a wall,"
-    return [f"{way} it was not checked{falls}"], push < demand
+    return [f"{way} it was not checked{falls}"], min(push, data.transverse_slide) < demand
 
 
 def _say_first_failures(data: ReportData) -> Iterator[str]:

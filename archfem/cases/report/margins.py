@@ -113,12 +113,18 @@ def build_transverse(data: ReportData) -> list[TextBlock]:
         cases = f"case{'s' * (' and ' in labels)} {labels}"
         return [TextBlock(f"It is that of {cases}.", lead=f"{plane.capitalize()}?")]
     text = describe_transverse_push(data.case.structure)
-    push, demand = data.transverse_push, find_demand(data)
+    push, demand, slide = data.transverse_push, find_demand(data), data.transverse_slide
     if push < demand:
         text += f"; the demand, {demand:.3g} g, exceeds it ({format_ratio(demand / push)} ×)"
     # the head says that it was not checked
     text = text.removeprefix(f"{UNCHECKED_ACROSS}: ") + data.across[1]
-    manner = "doubt" if push < demand else "plain"
+    if slide < np.inf:
+        text += f"; with the thrust at rest its supports slide across at {slide:.3g} g, by the "
+        text += "friction that N and V leave over, sqrt((μ N)² - V²)"
+        text += f": the demand is {demand:.3g} g" * bool(slide < demand)
+    elif push > 0.0:
+        text += "; sliding across it was not checked"
+    manner = "doubt" if min(push, slide) < demand else "plain"
     return [TextBlock(sentence(text), manner, lead="Across its plane?")]
 
 

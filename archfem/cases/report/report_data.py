@@ -129,6 +129,21 @@ class ReportData:
         return find_transverse_push(self.case.structure)[0]
 
     @cached_property
+    def transverse_slide(self) -> float:
+        """Push across the plane at which the supports slide with the thrust at rest [g].
+
+        Each joint resists by the friction that N and V leave over, sqrt((μ N)² - V²). It is
+        infinite where it is unknown: without a run, and of a single stack.
+        """
+        structure, dead = self.case.structure, self.dead
+        if dead is None or np.isnan(self.transverse_push) or len(dead["N"]) != len(structure.pairs):
+            return np.inf
+        bears = [any(structure.blocks[number].fixed for number in pair) for pair in structure.pairs]
+        friction = np.array([joint.contact.friction or 0.0 for joint in structure.joints])
+        left = (friction * dead["N"].values.clip(0.0)) ** 2 - dead["V"].values ** 2
+        return float(np.sqrt(left.clip(0.0))[bears].sum() / structure.weight)
+
+    @cached_property
     def fidelity(self) -> str:
         """Fidelity of the runs, which "auto" has selected; without runs that of the case."""
         recorded = {run.dataset.attrs["fidelity"] for run in self.runs.values()}
