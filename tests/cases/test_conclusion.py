@@ -1991,6 +1991,19 @@ def test_supports_slide_across_the_plane_by_the_friction_that_the_thrust_leaves(
     assert "Sliding across it was not checked." in block.text
 
 
+def test_the_factor_at_rest_stands_in_the_section_of_the_least_thickness_alone(case, undrawn):
+    """That section has it with thinner stones, and of less deep joints under the same weight."""
+    ring = {"shape": "circular_arch", "span": 3.2, "rise": 1.35, "thickness": 0.42}
+    settings = {**case.settings, "structure": ring | {"voussoirs": 9}}
+    for name, said in ("limit", True), ("thickness", False):
+        data = data_of(af.Case.of(settings))
+        vars(data)["statements"] = {name: state(name)}
+        pieces = sections.build_structure_section(data).pieces
+        text = " ".join(getattr(x, "text", "") for x in pieces)
+        assert ("Geometric factor" in text) == said
+        assert "coefficient of friction" in text
+
+
 def test_runs_beyond_the_push_of_a_demand_say_nothing_of_it():
     """A run of 0.3 g that moves; a push of twice the demand is more than that, or less."""
     case = af.Case.of({"structure": {"shape": "column", "breadth": 0.5, "heights": [1.0]}})

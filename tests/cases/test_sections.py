@@ -348,8 +348,14 @@ def test_a_report_of_several_runs_shows_the_worst_of_them(runs, piers, undrawn, 
     case = SimpleNamespace(**vars(made_case(piers)) | {"suite": {}})
     data = report_data.ReportData(case, runs)
     every, worst = response.build_run_sections(data)
-    assert (worst.title, worst.level) == ("The worst: first", 3)
+    assert (worst.title, worst.level) == (
+        *("The worst as given, by outcome and then displacement: first", 3),
+    )
     assert worst.pieces[-1] == "one of 1 players"
+    assert every.pieces[1].caption == "First mechanisms at 1.00 × each motion"
+    vars(data)["statements"] = {"scale": None}  # which may find some at less
+    every, _ = response.build_run_sections(data)
+    assert every.pieces[1].caption.endswith("; scaled ones form others at other scales")
     for table in every.pieces[:2]:  # outcomes and mechanisms
         assert [row[0] for row in table.rows] == ["first", "second"]
     worse = SimpleNamespace(verdict=replace(runs["second"].verdict, outcome="fallen"))

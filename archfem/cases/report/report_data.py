@@ -139,7 +139,9 @@ class ReportData:
         if dead is None or np.isnan(self.transverse_push) or len(dead["N"]) != len(structure.pairs):
             return np.inf
         bears = [any(structure.blocks[number].fixed for number in pair) for pair in structure.pairs]
-        friction = np.array([joint.contact.friction or 0.0 for joint in structure.joints])
+        friction = np.array([joint.contact.coefficient for joint in structure.joints])
+        if np.isinf(friction[bears]).any():  # they do not slide
+            return np.inf
         left = (friction * dead["N"].values.clip(0.0)) ** 2 - dead["V"].values ** 2
         return float(np.sqrt(left.clip(0.0))[bears].sum() / structure.weight)
 

@@ -110,7 +110,8 @@ def build_run_sections(data: ReportData) -> list[Section]:
     every = Section("Response: all pairs", [*_build_suite_response(data), *missing])
     if not data.shows_all:
         worst = find_worst_run(data)
-        return [every, Section(f"The worst: {worst}", _build_response(data, worst, 1), level=3)]
+        title = f"The worst as given, by outcome and then displacement: {worst}"
+        return [every, Section(title, _build_response(data, worst, 1), level=3)]
     sections = [every, Section("Response: pair by pair", [])]
     for name in data.runs:
         sections.append(Section(name, _build_response(data, name, len(data.runs)), level=3))
@@ -233,7 +234,9 @@ def _build_suite_response(data: ReportData) -> list[Any]:
             (name, describe_mechanism(run.verdict).partition("; it ")[0])
             for name, run in data.runs.items()
         ]
-        tables.append(Grid(("pair", "first mechanism"), first, "First mechanisms", "words"))
+        caption = "First mechanisms at 1.00 × each motion"
+        caption += "; scaled ones form others at other scales" * ("scale" in data.statements)
+        tables.append(Grid(("pair", "first mechanism"), first, caption, "words"))
     falls, structure = {k: run.verdict.fall for k, run in data.runs.items()}, data.case.structure
     lost = [
         (name, f"{len(fall.blocks)}", f"{fall.time:.2f} s", list_lost(structure, fall.blocks))

@@ -249,11 +249,17 @@ def build_structure_section(data: ReportData) -> Section:
     blocks: list[Any] = [TextBlock(_describe_extent(structure))]
     if (drawing := data.read_text(DRAWING_FILE)) is not None:
         blocks.append(TextBlock(f"The outlines were read from {drawing}."))
+    at_rest = [
+        x
+        for x in describe_margins_at_rest(case, structure)
+        # the section on the least thickness has both factors, with what differs
+        if "thickness" not in data.statements or not x.startswith("geometric factor")
+    ]
     blocks += [
         *(replace(each, beside=beside) for each in figures),
         _tabulate_parts(structure),
         *([] if data.dead is None else [_tabulate_dead_load(data.dead)]),
-        *map(TextBlock, map(sentence, describe_margins_at_rest(case, structure))),
+        *map(TextBlock, map(sentence, at_rest)),
     ]
     caption = "Principal compression under dead load."
     blocks += data.read_result("dead_stress", caption, table="Largest stresses of each part")
