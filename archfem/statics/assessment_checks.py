@@ -292,7 +292,9 @@ class AssessmentCheck:
             return at_least + self.over_fill.format_ends(digits=3) + f" ({of})" * bool(of)
         own = at_least + format_ratio(self.ratio)
         if at_least and self.bodies is not None:
-            own += f" ({format_ratio(self.bodies)} with one weight a body)"
+            splits = (self.ratio, "the weights apart"), (self.bodies, "one weight a body")
+            least, (most, of) = sorted(splits)  # the deciding one first
+            own = f"{at_least}{format_ratio(least[0])} ({format_ratio(most)} with {of})"
         return own if self.floor is None else f"{format_ratio(self.floor)} ({floor}) to {own}"
 
     @property
