@@ -41,10 +41,14 @@ LIGHT_AXLE = 20e3
 FRICTION_LAWS = ("coulomb", "nonassociated", "none")
 FILL_LAWS: Mapping[str, type[Fill | PlasticFill]] = {"pressure": Fill, "plastic": PlasticFill}
 
-# Note on the strip of a whole wall that has courses of different lengths
+# Notes on the strip of a whole wall that has courses of different lengths, and where it has none
 _STRIP = (
-    "it has courses as long as the longest and all loads of the wall, weights on a gable at its "
-    "top, and falls alone unless the gable is tied together along its length, as by a beam on it"
+    "it is {:.4g} m of wall with courses as long as the longest, heavier than the wall, and has "
+    "all loads of this, weights on a gable at its top; it falls alone unless the gable is tied "
+    "together along its length, as by a beam on it: then say by what, as `tied_along`"
+)
+_LEFT_OUT = (
+    "its strip through the highest place is left out, as by the case it is tied along by: {}"
 )
 
 
@@ -206,7 +210,7 @@ def rating_keys() -> dict[str, Any]:
 
 def assessment_keys() -> dict[str, Any]:
     """Return the keys of [assessment]; the strength is that of [limit]."""
-    return _keys_beside(kinematic_assessment, "strength")
+    return _keys_beside(kinematic_assessment, "strength") | {"tied_along": str}
 
 
 def find_given_strength(structure: Structure, settings: Table) -> float | None:
@@ -363,12 +367,18 @@ def rate_case(structure: Structure, rating: Table, limit: LimitAnalysis) -> Rati
 
 @dataclass(frozen=True)
 class AssessmentSettings:
-    """Kinematic assessment of a case."""
+    """Kinematic assessment of a case.
+
+    Args:
+        tied_along: what ties a gable together along its slopes, as "a concrete beam": of a whole
+            wall across its plane the strip through the highest place is then not assessed.
+    """
 
     spectrum: DesignSpectrum | None  # of the demand; None for that of the case's suite or motion
     directions: tuple[float, ...]  # of the horizontal forces, 1 to the right and -1 to the left
     options: dict[str, Any]  # other arguments of `kinematic_assessment`
     of_limit: tuple[str, ...] = ()  # names of those options that are of the limit analysis
+    tied_along: str = ""
 
     def solve(
         self, structure: Structure, demand: DesignSpectrum | Motion | None, parts: bool = False
@@ -396,11 +406,13 @@ class AssessmentSettings:
                 continue
             loads, whole = options.pop("loads", ()), np.full(2, np.inf)
             bodies = [(side, structure, loads)]
-            if taken := take_highest_strip(structure, loads):
+            if (taken := take_highest_strip(structure, loads)) and not self.tied_along:
                 bodies.append((f"{side}, strip through the highest place", *taken))
             for name, body, own in bodies:
                 last = kinematic_assessment(body, spectrum, loads=own, **options)
-                notes = (*last.notes, *[_STRIP] * (body is not structure))
+                own_notes = [_STRIP.format(body.width)] * (body is not structure)
+                own_notes += [_LEFT_OUT.format(self.tied_along)] * bool(taken and self.tied_along)
+                notes = (*last.notes, *own_notes)
                 listed = {name: replace(last, notes=notes)}
                 while above := last.above:
                     listed[f"{name}, {above.mechanism_name}"] = last = above
@@ -417,6 +429,7 @@ def parse_assessment(
 ) -> AssessmentSettings:
     """Return the kinematic assessment of a case, by default with fill and sliding of its limit."""
     options = check_table(table, assessment_keys(), "assessment")
+    tied_along = options.pop("tied_along", "")
     if limit and limit.strength is not None:
         options["strength"] = limit.strength
     spectrum = None
@@ -447,7 +460,7 @@ def parse_assessment(
     if flat and not loaded and not {"friction", "fill"} & options.keys():
         options["friction"] = "nonassociated"
         of_limit.append("friction")
-    return AssessmentSettings(spectrum, directions, options, tuple(of_limit))
+    return AssessmentSettings(spectrum, directions, options, tuple(of_limit), tied_along)
 
 
 def _keys_beside(function: Callable[..., Any], *given: str) -> dict[str, Any]:

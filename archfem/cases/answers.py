@@ -275,7 +275,14 @@ def state_assessments(
         sentences += [f"kinematic assessment, {ways}: {text}"] if text in last else []
     sentences.append(describe_margin(found.values()))
     doubts = [doubt for result in found.values() for doubt in result.doubts]
-    notes = [note for result in found.values() for note in result.notes]
+    owners = dict[str, list[str]]()
+    for name, note in ((name, x) for name, result in found.items() for x in result.notes):
+        owners.setdefault(note, []).append(name)
+    # a note on some says on which
+    notes = [
+        note if len(names) == len(found) else f"{' and '.join(names)}: {note}"
+        for note, names in owners.items()
+    ]
     return Statement(sentences, rows, doubts, notes).with_remarks(remarks)
 
 
@@ -488,7 +495,11 @@ class _TieSearch:
         if scale < np.inf:
             length = describe_tied_length(self.case.structure)
             text = f"from {self.say_forces(scale)} on, {length}, all forces tried pass its checks"
-            text += ", one by an upper bound alone" * self.solve(scale).bounded
+            bound = ", one by an upper bound alone, so that more may be needed"
+            free = ": give the `free_length` of ties" * any(
+                x.free_length is None for x in self.ties
+            )
+            text += f"{bound}{free}" * self.solve(scale).bounded
         elif not any(tie.anchor or self.sense * tie.force[0] < 0.0 for tie in self.ties):
             return f"no tie holds it: if floors and walls do, give direction = {-self.sense:g}"
         else:

@@ -244,7 +244,8 @@ def _show_assessment(
     out: str | None,
 ) -> list[result_text.Remark]:
     """Write the results of an assessment and print them; return all its remarks."""
-    remarks += [*answers.doubt_strip(case.structure), *answers.doubt_ties(case)]
+    remarks += [] if case.assessment.tied_along else answers.doubt_strip(case.structure)
+    remarks += [*answers.doubt_ties(case)]
     remarks += answers.note_sense(case)
     remarks += answers.note_band(case, found.values())
     remarks += answers.note_across(case.structure, found.values())

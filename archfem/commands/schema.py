@@ -92,7 +92,7 @@ _DECLARATIONS: Mapping[str, Any] = {
     "limit": (analysis_keys.LimitAnalysis, collapse_factor, BodyForce),
     "pushover": (pushover, BodyForce),
     "rating": rate,
-    "assessment": kinematic_assessment,
+    "assessment": (kinematic_assessment, analysis_keys.AssessmentSettings),
     "verdict": verdict_range,
 }
 

@@ -190,7 +190,8 @@ class CollapseScale:
         if first is None:
             return said
         rocks = f"rocks from {first.rocks:#.3g} × on and " * (first.rocks < inf)
-        one = f"as one rigid body it {rocks}{rocking_body.describe_first_fall(first, self.pga)}"
+        falls = rocking_body.describe_first_fall(first, self.pga)
+        one = f"as one rigid body without crushing it {rocks}{falls}"
         return f"{one}; in courses it {said}" if first.scale < least else f"{said}; {one}"
 
     def __repr__(self) -> str:

@@ -71,7 +71,9 @@ class Material:
                 number = f"{self.unit_weight:.4g}"
                 raise InvalidInput(
                     f"unit_weight {number} N/m³ of '{self.name}' looks like {unit}: give it in "
-                    f"N/m³: {number} {unit} have {self.unit_weight * factor:.4g}"
+                    f"N/m³: {number} {unit} have {self.unit_weight * factor:.4g}; that of a "
+                    f"course across the plane, scaled by its length, needs stands_for = "
+                    f"'{COURSE_LENGTH}'"
                 )
         if self.strength is not None:
             check_strength(self.strength, f"strength of '{self.name}'")

@@ -68,10 +68,11 @@ def columns_across(wall: Structure, *, above: Metres | None = None) -> dict[str,
     """
     blocks = [wall.blocks[number] for number in wall.free]
     levels, shares = _divide_into_courses(blocks)
-    ground = float(levels[0])
+    title, ground = wall.name, float(levels[0])
     if above is not None:
         check_between(above, "above [m], up to the last bed,", *levels[[0, -2]].tolist(), ends="[]")
-        first = int(np.searchsorted(levels, above - 1e-9))  # but for round-off
+        # but for round-off
+        first, title = int(np.searchsorted(levels, above - 1e-9)), f"{title} above {above:g} m"
         levels, shares = levels[first:], shares[:, first:]
     areas = np.array([[block.area] for block in blocks]) * shares
     unit_weights = np.array([block.material.unit_weight for block in blocks])
@@ -99,7 +100,7 @@ def columns_across(wall: Structure, *, above: Metres | None = None) -> dict[str,
             if weight != material.unit_weight:  # or it remains the default that it may be
                 stone = replace(material, unit_weight=weight, stands_for=load or COURSE_LENGTH)
             stones.append(replace(block, material=stone))
-        return replace(stack, blocks=tuple(stones), width=width, name=f"{wall.name}, {piece}")
+        return replace(stack, blocks=tuple(stones), width=width, name=f"{title}, {piece}")
 
     sides = np.array([[block.points[:, 0].min(), block.points[:, 0].max()] for block in blocks])
     length, foot = float(np.ptp(sides)), float(areas[:, 0].sum() / (levels[1] - levels[0]))

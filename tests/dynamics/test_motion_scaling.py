@@ -623,12 +623,14 @@ def test_collapse_is_between_a_stable_and_a_falling_run_at_every_step():
     for one, begins, factor in (
         (
             0.95,
-            "as one rigid body it first falls at 0.950 × the motion; in courses it stands at 1.00",
+            "as one rigid body without crushing it first falls at 0.950 × the motion; in courses it"
+            " stands at 1.00",
             "< 0.950",
         ),
         (
             1.8,
-            "as one rigid body it first falls at 1.80 × the motion; in courses it stands at 1.00",
+            "as one rigid body without crushing it first falls at 1.80 × the motion; in courses it "
+            "stands at 1.00",
             "1.00",
         ),
         (2.2, "stands at 1.00 × the motion, falls at 2.00 ×", "1.00"),

@@ -302,7 +302,8 @@ def test_a_roof_is_on_the_ridge_of_a_strip_and_weighs_on_the_piers(tmp_path):
         assert strip.weight == pytest.approx(stone * high + roof)
         by_hand = half * (stone * high + roof) / (stone * high**2 / 2 + roof * high)
         assert push(strip) == pytest.approx(by_hand, rel=3e-3)
-        assert (strip.above, strip.name) == (4.0 - high, "front, strip")
+        title = "front" + " above 3 m" * (above is not None)  # each has its own
+        assert (strip.above, strip.name) == (4.0 - high, f"{title}, strip")
         assert {x.material.stands_for for x in strip.blocks[-2:]} == {None, "roof"}
     # a pier of 1.5 m beside the door, with 0.5 m above it: up to 3 m, below the slope, and roof
     parts = [(4.5, 1.5), (0.5, 2.5), (0.5 * 2.0 * 1.0, 3.0 + 1.0 / 3.0)]
@@ -382,7 +383,7 @@ def test_a_column_above_a_level_doubts_the_spectrum_of_the_ground(tmp_path):
         path = af.Analysis(column, fidelity="rigid").write(tmp_path / "strip.toml")
         read = af.Case.read(path)
         assert read.structure == column
-        assert (read.title, read.structure.above) == ("front, strip", above or 0.0)
+        assert (read.title, read.structure.above) == (column.name, above or 0.0)
         assert describe_transverse_push(read.structure) == ""  # it is across the plane
         found = af.kinematic_assessment(read.structure, af.Eurocode8(ag=0.1, ground="A"), q=1.5)
         said = [str(doubt) for doubt in found.doubts if "that of the ground" in str(doubt)]

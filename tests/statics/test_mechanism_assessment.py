@@ -512,7 +512,7 @@ def test_a_check_that_alone_fails_is_in_every_headline_with_the_force_of_a_tie()
     assert note_ties(case) == [
         f"note: pushed to the right, from {needed:.3g} kN of the tie at block 1 on, in all for 1 m "
         "of width, without a factor on the tie, all forces tried pass its checks, one by an upper "
-        "bound alone",
+        "bound alone, so that more may be needed: give the `free_length` of ties",
         "note: pushed to the left, no tie holds it: if floors and walls do, give direction = 1",
     ]
     bounded = replace(free, displacement=replace(free.displacement, bounded=True))
@@ -680,7 +680,9 @@ def test_a_path_that_ends_early_has_a_lower_bound(held_top, verified):
     assert f"{NOT_SHOWN}, the spectrum may be at least {ratio} times as strong" in str(found)
     split = replace(check, ratio=1.2, bodies=0.9)  # passes with the weights apart alone
     assert split.ratios == "at least 0.9 (1.2 with the weights apart)"
-    assert replace(split, bodies=1.3, ratio=0.8).ratios == "at least 0.8 (1.3 with one weight a body)"
+    assert (
+        replace(split, bodies=1.3, ratio=0.8).ratios == "at least 0.8 (1.3 with one weight a body)"
+    )
     assert (split.doubt_split(), len(split.doubt_end(""))) == ([], 1)
     # no other mechanism is in equilibrium where it ends, and up to there none has a lower factor
     higher = replace(check, ratio=1.2)
@@ -774,7 +776,16 @@ def test_the_strip_of_a_whole_gable_is_in_its_verdict(verified):
     verified("gable: least ratio of a strip", ratio, "overturning of a prism", own.linear.decisive)
     assert own.linear.decisive == pytest.approx(ratio, rel=1e-6) == find_margin(found.values())
     assert find_margin([found["right"]]) > 1.2 * ratio
-    assert any("tied together along its length" in note for note in own.notes)
+    (note,) = (note for note in own.notes if "tied together along its length" in note)
+    assert note.startswith("it is 5.2 m of wall with courses as long as the longest")
+    assert own.structure.weight == pytest.approx(5.2 * columns["strip"].weight)
+    # a beam on the slopes holds it: the rest is as without this key
+    beam = {"tied_along": "a concrete beam"}
+    _, alone = assess_case(columns["whole"], spectrum, **beam)
+    assert [*alone] == [name for name in found if "strip" not in name]
+    assert find_margin(alone.values()) == find_margin(x for k, x in found.items() if k in alone)
+    for side in ("right", "left"):
+        assert alone[side].notes[-1].endswith("tied along by: a concrete beam")
     rows = state_assessments(found, []).rows
     assert any(", strip through the highest place" in row.result for row in rows)
     assert evaluate_assessment(case)["least_margin"] == pytest.approx(ratio, rel=1e-6)
