@@ -273,11 +273,8 @@ class Rating(ResultDisplay):
         """Factors over all that is assumed of fill and stones, or this one [-]."""
         full = [] if np.isnan(self.full_pressure) else [self.full_pressure]
         states = self._list_states().values() if full or self.crushing else ()
-        return [
-            self.factor,
-            *(self._factor_in(x) for s in states for x in self._list_alike(s)),
-            *full,
-        ]
+        alike = [x for each in states for x in self._list_alike(each)]
+        return [self.factor, *map(self._factor_in, alike), *full]
 
     @property
     def least(self) -> float:
