@@ -872,8 +872,8 @@ def test_the_verdict_of_several_cases_is_the_worst_and_names_its_case(case):
         vars(data)["statements"] = {"assessment": state("assessment", check)} if ratio else {}
     lorry = answers.Row("rating", "LM1", "fails", "0.85", {"passes": False, "least": 0.8})
     load = answers.Row("limit analysis", "a load", "", "1.2", PushFactors(1.2, 1.2)._asdict())
-    ranks = [(1, {"the vehicle": 0.8}, {"the vehicle": 0.85})]
-    ranks += [(4, {"the given load": 1.2}, {"the given load": 1.2})]
+    ranks = [((1, False), {"the vehicle": 0.8}, {"the vehicle": 0.85})]
+    ranks += [((4, False), {"the given load": 1.2}, {"the given load": 1.2})]
     for name, row, rank in zip(("rating", "limit"), (lorry, load), ranks, strict=True):
         static = ReportData(case, {})
         vars(static)["statements"] = {name: answers.Statement([], [row])}
@@ -910,7 +910,7 @@ def test_margins_side_by_side_are_in_the_plane_and_what_is_across_it_is_said_onc
         "The least margins are of weak 0.6 times the earthquake by linear, right; "
         "of strong 1.5 times the earthquake by linear, right."
     )
-    assert conclusion._rank_verdict(parts["strong"])[0] == 1  # it may overturn
+    assert conclusion._rank_verdict(parts["strong"])[0] == (1, False)  # it may overturn
     assert sum("cross the plane of" in text for _, text in facts) == 1
     assert said["not checked"] == (
         "strong and weak: Across the plane of the drawing it was not checked, where it may "
@@ -2363,3 +2363,19 @@ def test_titles_and_names_of_studies_hold_any_character(case, tmp_path, undrawn)
         "'as: given', 0.25 g. 'wide; thick' raises the push most, to 0.35 g. "
         + sentence(conclusion.DEFAULT_STIFFNESS)
     )
+
+
+def test_a_case_that_fails_all_its_checks_is_worse_than_one_that_passes_by_displacements(case):
+    """The linear check of the latter alone has the least ratio of all."""
+    parts, numbers = {}, {"mixed": (0.386, 1.03), "failing": (0.516, 0.663)}
+    for name, (linear, damage) in numbers.items():
+        data = parts[name] = ReportData(case, {})
+        checks = (
+            answers.Ratios("linear", ["right"], linear, linear, linear=True),
+            answers.Ratios("life safety", ["right"], damage, damage),
+        )
+        vars(data).update(statements={"assessment": state("assessment", *checks)})
+        vars(data).update(transverse_push=np.nan)
+    facts = dict(conclusion.list_joint_facts(parts))
+    assert facts["verdict"].startswith("The worst of 2 cases is failing: ")
+    assert facts["margin"].startswith("The least margins are of mixed 0.386 times ")

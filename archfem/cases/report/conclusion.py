@@ -69,6 +69,9 @@ VERDICTS = (
     "All that was checked is passed",
 )
 
+# Place of a case among others: of its verdict, and whether a check passes where another fails
+Place = tuple[int, bool]
+
 # Project in the templates of new cases
 PLACEHOLDER = "Name of the project"
 
@@ -132,7 +135,7 @@ def list_joint_facts(parts: Mapping[str, ReportData]) -> list[tuple[str, str]]:
         kinds = ", each by its kind of demand," * (len({*map(tuple, worst.values())}) > 1)
         words = f"the worst of {len(parts)} cases{kinds} are {join_words(named)}."
         doubt = ", some of it in doubt" * bool(doubts)
-        facts.append((answer, f"{VERDICTS[place]}{doubt}: {words}"))
+        facts.append((answer, f"{VERDICTS[place[0]]}{doubt}: {words}"))
     else:
         name = next(iter(worst), min(ranks, key=lambda x: ranks[x][0]))
         facts.append((answer, f"The worst of {len(parts)} cases is {name}: {said.pop(name)}"))
@@ -199,9 +202,10 @@ def _list_loads(data: ReportData) -> list[PushFactors]:
     return [load for each in stated for load in read_numbers(PushFactors, each)]
 
 
-def _rank_verdict(data: ReportData) -> tuple[int, dict[str, float], dict[str, float]]:
+def _rank_verdict(data: ReportData) -> tuple[Place, dict[str, float], dict[str, float]]:
     """Return the place of a case among others, the worst first, and its least factors by kind.
 
+    A place is that of `VERDICTS`, and whether a check of an assessment passes where another fails.
     Factors are those in the plane of the drawing, where all cases have them. Those behind are with
     the properties as given, by which cases are compared, as not all are varied.
     """
@@ -213,19 +217,23 @@ def _rank_verdict(data: ReportData) -> tuple[int, dict[str, float], dict[str, fl
         rows = [row for row in rows if is_of_norm(data, row.demand)] or rows
     loads = _list_loads(data)
     factors = [load.least for load in loads if not load.site]
-    fails = [x < 1.0 for x, is_ranked, _ in ranked if is_ranked] + [x < 1.0 for x in factors]
+    fails = [x < 1.0 for x, is_ranked, _ in ranked if is_ranked]
     fails += [least < 1.0 for least, *_ in margins.say_less(data)]
-    fails += [scale < 1.0 for scale, *_ in margins.say_across(data)] + [_say_unchecked(data)[1]]
-    fails += [not x.numbers["passes"] or x.numbers["least"] < 1.0 for x in rows]
+    fails_otherwise = [not x.numbers["passes"] or x.numbers["least"] < 1.0 for x in rows]
+    fails_otherwise += [x < 1.0 for x in factors] + [_say_unchecked(data)[1]]
+    fails_otherwise += [scale < 1.0 for scale, *_ in margins.say_across(data)]
     shaken = [x for x, is_margin, _ in ranked if is_margin]
     pushed = [load.least for load in loads if load.site and not shaken]
     demands = shaken, pushed, [x.numbers["least"] for x in rows], factors
     ratings = [0.0 if row.factor == "-" else float(row.factor) for row in rows]
     undecided = outcome.startswith("may") or (bool(data.runs) and bool(_say_why_undecided(data)))
-    holds = outcome == "does not survive", any(fails), undecided, "damage" in outcome, True
+    failed = any([*fails, *fails_otherwise])
+    holds = outcome == "does not survive", failed, undecided, "damage" in outcome, True
     listed = zip(KINDS, demands, strict=True)
     leasts = {kind: min(x) for kind, x in listed if min(x, default=np.inf) < np.inf}
-    return holds.index(True), leasts, leasts | ({KINDS[2]: min(ratings)} if ratings else {})
+    verdict, passing = holds.index(True), any(x.decisive >= 1.0 for x in list_checks(data))
+    place = verdict, verdict == 1 and passing and not any(fails_otherwise)
+    return place, leasts, leasts | ({KINDS[2]: min(ratings)} if ratings else {})
 
 
 def _say_plainly(data: ReportData, doubtful: Sequence[str]) -> Iterator[tuple[str, str]]:
