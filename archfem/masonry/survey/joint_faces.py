@@ -105,7 +105,7 @@ def measure_openings(drawn: Sequence[Array], touches: Sequence[Touch], reach: fl
     They are sought within a reach of the contact [m]; faces that overlap are apart by less than 0.
     """
     shapes = shapely.make_valid(np.array([shapely.Polygon(each) for each in drawn]))
-    return [float(np.mean([*_measure_gaps(shapes, *each, reach), 0.0][:3])) for each in touches]
+    return [float(np.mean([*_measure_gaps(shapes, *each, reach)] or [0.0])) for each in touches]
 
 
 def _measure_gaps(
