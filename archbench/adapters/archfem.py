@@ -302,7 +302,7 @@ def find_displacement(scene: dict[str, Any], settings: dict[str, Any]) -> dict[s
         times, moved, said = rigid_history(scene, motion, dt)
     else:
         model = model_of(scene, settings["joints"])
-        run = shaken(scene, model, motion, dt, af.Record(fields_every=1))
+        run = shaken(scene, model, motion, dt, af.Record(fields_every=1, repeat=False))
         times, moved = run.displacement["time"].values, observed(scene, run)
         said = run.verdict.headline
     return history(times.tolist(), (1e3 * moved).tolist(), said)
@@ -312,7 +312,8 @@ def shaken(
     scene: dict[str, Any], model: Any, motion: af.Motion, dt: float, record: Any = None
 ) -> Any:
     """Return the history of a model; where a step fails, by varying or by smaller steps."""
-    given = {"damping": damping_of(scene), "record": record}
+    # other programs take each step once
+    given = {"damping": damping_of(scene), "record": record or af.Record(repeat=False)}
     for step in (dt, None, dt / 2.0):
         with contextlib.suppress(af.DidNotConverge):
             return af.time_history(model, motion, dt=step, **given)

@@ -51,6 +51,7 @@ def ring_history(displacements: Any, dt: float, threshold: float | None, duratio
     model = af.build(structure, fidelity="rigid", displacements=displacements)
     motion = af.Motion.synthetic(duration=duration, pga=6.0, seed=3)
     settings = {"start": af.dead_load(model), "damping": af.StiffnessDamping(0.05, 8.0), "dt": dt}
+    settings["record"] = af.Record(repeat=False)
     return lambda: af.time_history(model, motion, **settings)
 
 

@@ -65,6 +65,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         given = {
             "dt": DT,
             "damping": None if rng.random() < 0.3 else af.StiffnessDamping(0.05, 8.0),
+            "record": af.Record(repeat=False),
         }
         for name, scheme in SCHEMES.items():
             model = af.build(

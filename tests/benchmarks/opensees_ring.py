@@ -104,6 +104,7 @@ def stepped_ring(
     model = af.build(elastic_ring(), fidelity=fidelity, cells=cells, quadrature=rule)
     model = lumped(model) if mass == "lumped" else model
     settings = {"dt": DT, "damping": DAMPING, "scheme": af.dynamics.Newmark(), "method": method}
+    settings["record"] = af.Record(repeat=False)
     dead = af.dead_load(model)
     return SteppedRun(lambda: af.time_history(model, motion, start=dead, **settings))
 

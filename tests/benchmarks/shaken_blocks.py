@@ -61,7 +61,7 @@ def run_elastic_joints(stiffer: float, motion: af.Motion) -> tuple[tuple[str, fl
     """Run with elastic joints and large displacements: outcome, and time of a step [ms]."""
     arch = ring(stiffer)
     model = af.build(arch, fidelity="rigid", displacements="large")
-    settings = {"dt": DT, "damping": DAMPING, "record": af.Record(fields_every=1)}
+    settings = {"dt": DT, "damping": DAMPING, "record": af.Record(fields_every=1, repeat=False)}
     dead = af.dead_load(model)
     stepped = SteppedRun(lambda: af.time_history(model, motion, start=dead, **settings))
     run = stepped.history
