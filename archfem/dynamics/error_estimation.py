@@ -106,22 +106,23 @@ Parts = Sequence[tuple[State, float]]
 
 @single_threaded
 def run_peaks(
-    model: Model,
-    motion: Motion,
-    damping: Viscous | None,
-    dt: float,
-    parts: Parts | None = None,
-    stepper: Stepper | None = None,
+    model: Model, motion: Motion, damping: Viscous | None, dt: float, parts: Parts | None = None
 ) -> RunPeaks:
-    """Run a model, from dead load by default, and return its peaks; none where blocks come loose.
-
-    The rotation is that of small displacements. A stepper is of the same model, motion and damping.
-    """
-    structure = model.structure
-    stepper = stepper or stepper_for("auto", Equation(model, motion, damping))
+    """Run a model of small displacements, from dead load by default, and return its peaks."""
+    equation = Equation(model, motion, damping)
     if parts is None:
         rest = dead_load(model)
-        parts = [(stepper.equation.at_rest(rest.q, memory=rest.model.memory), motion.duration)]
+        parts = [(equation.at_rest(rest.q, memory=rest.model.memory), motion.duration)]
+    return follow_peaks(stepper_for("auto", equation), dt, parts)
+
+
+def follow_peaks(stepper: Stepper, dt: float, parts: Parts) -> RunPeaks:
+    """Return the peaks over parts of a run by a solver; none where a step fails or blocks are lost.
+
+    The rotation is that of small displacements.
+    """
+    model, motion = stepper.equation.model, stepper.equation.motion
+    structure = model.structure
     depths = structure.depths[structure.judged]
     peaks, times, rotation, states = np.zeros(len(depths)), np.zeros(len(depths)), 0.0, []
     observer, slip, displacement = model.observer(), 0.0, 0.0

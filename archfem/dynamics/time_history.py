@@ -18,7 +18,7 @@ from archfem._validation import check_between, check_type, validate_arguments
 from archfem.dynamics import events
 from archfem.dynamics.analysis import Analysis, takes_analysis
 from archfem.dynamics.damping import resolve_effective_damping
-from archfem.dynamics.error_estimation import RunPeaks, run_peaks
+from archfem.dynamics.error_estimation import RunPeaks, follow_peaks
 from archfem.dynamics.fall import follow_fall, mark_interrupted
 from archfem.dynamics.history import Ending, History
 from archfem.dynamics.monitor import RunMonitor
@@ -223,22 +223,21 @@ def _repeat_with_shorter_steps(
     10 erred by over a fifth of their displacement or 0.02 of |e|: a fifth of the steps showed all
     of them, and half the steps 8.
     """
-    attrs, equation = history.dataset.attrs, stepper.equation
+    attrs = history.dataset.attrs
     joints = eccentricity_magnitude(assessed_joints(history.joints)).values
     largest = float(joints.max(initial=0.0))
     end, mean = float(attrs["last_time"]), dt or 0.0
     if (taken := attrs["steps"]) and not dt:
         mean = (end - start.time) / taken
     asked = record.whole_fall if record.repeat is None else record.repeat
-    asked = asked and equation.model.size <= MAX_REPEATED_SIZE
+    asked = asked and stepper.equation.model.size <= MAX_REPEATED_SIZE
     # closed joints multiply no error, and loose blocks have no joints
     if not asked or largest <= 1.0 / 6.0 or not taken or history.ending not in REPEATED_ENDINGS:
         return history
     step = float(f"{min(0.5 * mean, max(0.2 * mean, 1e-4)):.2g}")
-    settings = equation.damping, step, [(start, end)], stepper
     try:
         with keep_warnings():  # which are those of the run
-            run = run_peaks(equation.model, equation.motion, *settings)
+            run = follow_peaks(stepper, step, [(start, end)])
     except KeyboardInterrupt:
         return mark_interrupted(history, "its comparison with shorter steps, at the end")
     peaks = (largest, attrs["displacement"]), run, record.every == 1

@@ -326,14 +326,14 @@ def test_what_rocking_multiplies_is_doubted(chosen, off, verified):
 def test_a_repetition_that_is_stopped_or_fails_is_stated(monkeypatch):
     """Ctrl-C keeps the run; blocks that come loose by shorter steps alone are a doubt."""
     model, motion = rocking(1, 2.5, 2.0)
-    monkeypatch.setattr("archfem.dynamics.time_history.run_peaks", lambda *_: RunPeaks(None))
+    monkeypatch.setattr("archfem.dynamics.time_history.follow_peaks", lambda *_: RunPeaks(None))
     (doubt,) = af.time_history(model, motion, dt=0.005, damping=LAG).doubts
     assert "with steps of 1 ms in place of 5 ms the run fails" in doubt.cause
 
     def stop(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("archfem.dynamics.time_history.run_peaks", stop)
+    monkeypatch.setattr("archfem.dynamics.time_history.follow_peaks", stop)
     run = af.time_history(model, motion, dt=0.005, damping=LAG)
     assert run.ending is Ending.INTERRUPTED
     assert run.time[-1] == pytest.approx(2.5)
