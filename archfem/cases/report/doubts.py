@@ -191,22 +191,24 @@ def spans_run(data: ReportData, found: VerdictRange) -> bool:
     return not max(sizes) > MAX_RATIO_TO_RUN * min(sizes)
 
 
+def _select_notes(notes: Sequence[str]) -> list[str]:
+    """Return the notes that the conclusion has; of two mirrored mechanisms the first has it."""
+    # what is not about the least factor of a push stands in its text alone, and a paragraph has
+    # what is not checked across
+    kept = (x for x in notes if not x.startswith((OF_GIVEN_FILL, UNCHECKED_ACROSS)))
+    first = dict[str, str]()
+    for note in kept:
+        first.setdefault(_OF_BLOCKS.sub("", note), note)
+    return [*first.values()]
+
+
 def list_notes(data: ReportData) -> dict[str, list[str]]:
     """Return the notes of each result, with those on the norm: of motions, and of ratings."""
     notes = {
         RESULTS[name]: own
         for name, each in data.statements.items()
         for notes in [[*(note_rating(data) if name == "rating" else ()), *each.notes]]
-        # what is not about the least factor of a push stands in its text alone, and a paragraph
-        # has what is not checked across; of two mirrored mechanisms the first has it
-        for kinds in [[_OF_BLOCKS.sub("", x) for x in notes]]
-        if (
-            own := [
-                x
-                for k, x in enumerate(notes)
-                if kinds[k] not in kinds[:k] and not x.startswith((OF_GIVEN_FILL, UNCHECKED_ACROSS))
-            ]
-        )
+        if (own := _select_notes(notes))
     }
     left_out = [x.removeprefix(NOTE_MARK) for x in note_loads_left_out(data.case)]
     missed = [*note_checks(data), *left_out * bool(data.runs)]

@@ -504,12 +504,10 @@ def _build_study(data: ReportData, found: StudyFindings) -> list[Any]:
         dotted = f", dotted the limit of dislocation of the case, {format_mm(limit)}"
         dotted += "; cases of other lengths have others" * ("lengths" in list_studied(found))
         caption += f"; all points{dotted * (key in found.numbers)}"
-        bars = (
-            found.keys == ("case",) and found.worst["runs"].max() == 1
-        )  # of falls they are hatched
-        caption += "; triangles at the end are falls" * bool(
-            found.worst["falls"].any() and not bars
-        )
+        # bars of falls are hatched
+        has_bars = found.keys == ("case",) and found.worst["runs"].max() == 1
+        falls = bool(found.worst["falls"].any() and not has_bars)
+        caption += "; triangles at the end are falls" * falls
         bounds = np.any(found.table.get(UPPER_BOUNDS, "") != "")
         caption += "; open marks are upper bounds" * bool(bounds)
         blocks.append(FigureBlock.of(figure, sentence(caption)))
